@@ -1,0 +1,142 @@
+"""What is declared about a rig and its camera: ``rig.yaml``, every key optional, an unknown key an error."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from anglecam.errors import RigError
+
+Byte = Annotated[int, Field(ge=0, le=255)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _Declared(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Mouth(_Declared):
+    """The mark at the far end of the lever: its colour, or ``None`` to find it."""
+
+    rgb: tuple[Byte, Byte, Byte] | None = None
+
+
+class Pivot(_Declared):
+    """Where the mechanism turns and how that place is marked."""
+
+    near: tuple[Finite, Finite] | None = None
+    """A hint, px."""
+    marker: Literal["auto", "disc", "ring", "none"] = "auto"
+    """``none``: the centre of rotation fitted to the mouth's path."""
+
+
+class Camera(_Declared):
+    """What is known about the camera."""
+
+    calibration: str | None = None
+    row_time_s: Positive | None = None
+    exposure_s: Positive | None = None
+
+
+class Sync(_Declared):
+    """What ties the command's clock to the clip's."""
+
+    lamp: tuple[Finite, Finite] | None = None
+
+
+class Model(_Declared):
+    """Starting values of θ̈ = c·u − a·θ̇ − b·θ (Eq. (30) of the paper)."""
+
+    a: Finite = 26.0
+    """1/s."""
+    b: Finite = 524.0
+    """1/s²."""
+    c: Finite = 508.0
+    """1/s²."""
+    gravity_deg: Finite | None = None
+    """The centre of mass from upright at neutral, degrees."""
+
+
+class Rig(_Declared):
+    """One rig, as ``rig.yaml`` declares it."""
+
+    mouth: Mouth | Literal["auto"] = "auto"
+    pivot: Pivot = Pivot()
+    facing: Literal["right", "left"] = "right"
+    neutral: Finite | Literal["auto"] = "auto"
+    """``line_deg`` that counts as zero; ``auto``: the rest before the first command change, else the median."""
+    pixel_error_px: tuple[Positive, ...] = (6.0, 10.0)
+    held_out: tuple[str, ...] = ()
+    camera: Camera = Camera()
+    sync: Sync = Sync()
+    model: Model = Model()
+
+    @property
+    def mouth_rgb(self) -> tuple[int, int, int] | None:
+        """The declared colour of the mouth, ``None`` where it is to be found."""
+        return None if self.mouth == "auto" else self.mouth.rgb
+
+    def not_applied(self) -> list[str]:
+        """Name the declared keys that this version reads but does not yet act on."""
+        keys = {
+            "camera.calibration": self.camera.calibration,
+            "camera.row_time_s": self.camera.row_time_s,
+            "camera.exposure_s": self.camera.exposure_s,
+            "sync.lamp": self.sync.lamp,
+            "model.gravity_deg": self.model.gravity_deg,
+        }
+        return [key for key, value in keys.items() if value is not None]
+
+
+def read_rig(path: Path) -> Rig:
+    """Read and validate a rig file.
+
+    Parameters
+    ----------
+    path : Path
+        A YAML file as the README describes it.
+
+    Returns
+    -------
+    Rig
+        With the defaults in place of what is not declared.
+
+    Raises
+    ------
+    RigError
+        Naming the file, the key and the cause.
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise RigError(f"{path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise RigError(f"{path}: not a UTF-8 text file") from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        problem = getattr(error, "problem", None) or "not valid YAML"
+        mark = getattr(error, "problem_mark", None)
+        where = f", line {mark.line + 1}" if mark else ""
+        raise RigError(f"{path}: not YAML ({problem}{where})") from error
+    if content is None:
+        return Rig()
+    if not isinstance(content, dict):
+        raise RigError(f"{path}: expected keys and values, found a {type(content).__name__}")
+    try:
+        return Rig.model_validate(content)
+    except ValidationError as error:
+        raise RigError(f"{path}: {_first(error)}") from error
+
+
+def _first(error: ValidationError) -> str:
+    """Say the most telling of pydantic's findings in one line."""
+    findings = error.errors()
+    unknown = [f for f in findings if f["type"] == "extra_forbidden"]
+    finding = (unknown or findings)[0]
+    key = ".".join(str(part) for part in finding["loc"] if part not in ("Mouth", "literal['auto']", "float"))
+    if unknown:
+        return f"unknown key {key}"
+    return f"{key}: {finding['msg'][0].lower()}{finding['msg'][1:]} (got {str(finding['input'])[:60]})"

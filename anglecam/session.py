@@ -1,0 +1,158 @@
+"""A session read and validated at the door: one rig, several recordings, their commands.
+
+A recording is a clip or, in its place, an angle series from elsewhere. What is wrong with one recording costs
+that recording alone: `read_session` returns it among ``problems`` and goes on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.errors import InputError, RigError
+from anglecam.rig import Rig, read_rig
+from anglecam.series import read_columns, require_increasing
+
+CLIP_ENDINGS = (".avi", ".mp4", ".mkv", ".mov")
+SERIES_ENDING = ".angles.csv"
+COMMAND_ENDING = ".command.csv"
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Command:
+    """A piecewise constant command, each value held until the next; arrays of length m."""
+
+    time: Floats
+    """Instants of the rows, s on the clip's clock, strictly increasing."""
+    angle: Floats
+    """Commanded head angle from neutral, rad."""
+
+    def first_change(self) -> float | None:
+        """Return the instant (s) of the first row that differs from the one before it, ``None`` if none does."""
+        changes = np.flatnonzero(np.diff(self.angle) != 0.0)
+        return float(self.time[changes[0] + 1]) if len(changes) else None
+
+    def at(self, time: Floats) -> Floats:
+        """Look the command up at ``time`` (s); before the first row the first value holds."""
+        index = np.searchsorted(self.time, time, side="right") - 1
+        return self.angle[np.maximum(index, 0)]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recording of a session before it is measured."""
+
+    name: str
+    source: Path
+    """The clip, or the ``.angles.csv`` in its place."""
+    command: Command | None = None
+
+    @property
+    def is_clip(self) -> bool:
+        """Whether ``source`` still has to be measured."""
+        return self.source.suffix.lower() in CLIP_ENDINGS
+
+
+@dataclass(frozen=True)
+class Session:
+    """A folder of recordings of one rig."""
+
+    directory: Path
+    rig: Rig
+    recordings: tuple[Recording, ...]
+    """In the order of their names."""
+    problems: tuple[InputError, ...] = field(default=())
+    """What made a recording unusable, one for each."""
+
+
+def read_command(path: Path) -> Command:
+    """Read ``NAME.command.csv``: ``time_s,command_deg``, held constant until the next row.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Command
+        In radians.
+
+    Raises
+    ------
+    InputError
+        Where a row cannot be read or times do not increase, naming file and line.
+    """
+    table = read_columns(path, required=("time_s", "command_deg"))
+    require_increasing(path, table["time_s"])
+    return Command(table["time_s"], np.radians(table["command_deg"]))
+
+
+def command_beside(source: Path) -> Command | None:
+    """Read the command file that stands beside a clip or a series, ``None`` if there is none."""
+    path = source.with_name(recording_name(source) + COMMAND_ENDING)
+    return read_command(path) if path.exists() else None
+
+
+def recording_name(source: Path) -> str:
+    """Return a recording's name: its file's name without the ending."""
+    return source.name.removesuffix(SERIES_ENDING) if source.name.endswith(SERIES_ENDING) else source.stem
+
+
+def rig_beside(source: Path) -> Rig:
+    """Read ``rig.yaml`` in the folder of ``source`` (or ``source`` itself, if a folder), or the defaults."""
+    path = (source if source.is_dir() else source.parent) / "rig.yaml"
+    return read_rig(path) if path.exists() else Rig()
+
+
+def find_clips(directory: Path) -> list[Path]:
+    """List the clips of a folder by name."""
+    return sorted(p for p in directory.iterdir() if p.is_file() and p.suffix.lower() in CLIP_ENDINGS)
+
+
+def read_session(directory: Path) -> Session:
+    """Read a session's rig and commands and list its recordings.
+
+    Parameters
+    ----------
+    directory : Path
+        The session's folder.
+
+    Returns
+    -------
+    Session
+        Where a clip and a series share a name the series stands in the clip's place.
+
+    Raises
+    ------
+    RigError
+        Where the folder, its rig file or the names it holds out are wrong, or it has no recording at all.
+    """
+    if not directory.is_dir():
+        raise RigError(f"{directory}: no such folder")
+    rig = rig_beside(directory)
+    sources: dict[str, Path] = {}
+    problems: list[InputError] = []
+    for clip in find_clips(directory):
+        if clip.stem in sources:
+            problems.append(InputError(f"{clip}: {sources[clip.stem].name} has the same name; rename one"))
+            continue
+        sources[clip.stem] = clip
+    sources |= {recording_name(p): p for p in directory.glob(f"*{SERIES_ENDING}") if p.is_file()}
+    if not sources:
+        raise RigError(f"{directory}: no clip ({', '.join(CLIP_ENDINGS)}) and no *{SERIES_ENDING} in it")
+    unknown = sorted(set(rig.held_out) - set(sources))
+    if unknown:
+        raise RigError(f"{directory / 'rig.yaml'}: held_out names {unknown[0]}, which is no recording here")
+    recordings = []
+    for name, source in sorted(sources.items()):
+        try:
+            recordings.append(Recording(name, source, command_beside(source)))
+        except InputError as problem:
+            problems.append(problem)
+    return Session(directory, rig, tuple(recordings), tuple(problems))
