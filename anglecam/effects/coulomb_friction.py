@@ -1,0 +1,44 @@
+"""Dry friction: the sleeve bearings oppose motion with a torque that does not depend on speed.
+
+    θ̈ = c·u − a·θ̇ − b·θ − F·sgn θ̇        while sliding
+    θ̇ = 0                                 while |c·u − b·θ| ≤ F: the head sticks
+
+F is the friction torque divided by the moment of inertia. The paper's damping is a lubricant film alone,
+Eqs. (19)–(22).
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+from numpy.typing import NDArray
+
+from anglecam.effects.effect import Effect, Parameter
+
+
+@njit
+def _dry(parameters: NDArray) -> tuple[float, float]:
+    return parameters[0], parameters[0]
+
+
+EFFECT = Effect(
+    id="coulomb_friction",
+    summary="Dry friction opposes motion with a torque that does not depend on speed, and holds the head near rest.",
+    equation="θ̈ = c·u − a·θ̇ − b·θ − F·sgn θ̇; at rest while |c·u − b·θ| ≤ F",
+    relaxes="Eq. (22): damping is viscous only",
+    parameters=(
+        Parameter(
+            "friction_deg_per_s2",
+            null=0.0,
+            lower=0.0,
+            upper=500.0,
+            starts=(0.3, 3.0, 15.0),
+            to_file=math.degrees(1.0),
+        ),
+    ),
+    aliases=("quadratic_drag", "backlash", "dead_zone"),
+    separating_experiment="a slow triangle of small amplitude, on which dry friction shows as a constant lag in angle",
+    source="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994",
+    dry=_dry,
+)

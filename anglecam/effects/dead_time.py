@@ -1,0 +1,38 @@
+"""Dead time: what is commanded now begins to act a fixed time later.
+
+    θ̈ = c·u(t − τ) − a·θ̇ − b·θ
+
+The paper's command acts at once, Eqs. (5) and (29), though its own Fig. 14 shows "an initial delay in the actual
+response that was not captured". A serial link, a 50 Hz pulse frame and the servo's electronics each hold a command
+back. The camera cannot tell this from a constant offset between its clock and the command's: without a lamp that
+lights at the first command change, what is found is the sum of both.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.effects.effect import Effect, Parameter
+
+Floats = NDArray[np.float64]
+
+
+def _shift(time: Floats, value: Floats, parameters: Floats) -> tuple[Floats, Floats]:
+    return time + parameters[0], value
+
+
+EFFECT = Effect(
+    id="dead_time",
+    summary="The head starts to move a fixed time after the command changes.",
+    equation="θ̈ = c·u(t − τ) − a·θ̇ − b·θ",
+    relaxes="Eqs. (5), (29): the command acts at once",
+    parameters=(Parameter("tau_s", null=0.0, lower=0.0, upper=0.5, starts=(0.01, 0.05, 0.15)),),
+    aliases=("actuator_lag", "clock_scale"),
+    separating_experiment=(
+        "a lamp in the picture that lights at the first command change separates delay from clock offset; "
+        "a chirp up to twice the natural frequency, filmed at 60 Hz or more, separates delay from lag"
+    ),
+    source="Ljung, System Identification, 2nd ed., 1999, sec. 4.2; the paper's Remarks on Fig. 14",
+    shift_command=_shift,
+)

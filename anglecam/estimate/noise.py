@@ -1,0 +1,100 @@
+"""What the camera adds: the size and colour of the angle's noise, from what cannot be motion.
+
+Two witnesses: the rest before the first command change, and, in a film, the mouth's distance from the pivot, which
+no motion can alter. The second sees what a picture at rest hides: the pixel grid and the codec under a moving edge.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.estimate.record import Record
+
+Floats = NDArray[np.float64]
+
+LEAST_REST = 6
+"""Frames; a shorter rest says nothing about colour."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """First-order autoregressive noise."""
+
+    sigma: float
+    """Standard deviation, rad."""
+    phi: float
+    """Correlation from frame to frame."""
+    phi_error: float
+    """Standard error of ``phi``."""
+    source: str
+    """``rest``, ``distance from the pivot``, ``stated`` or ``residual``."""
+
+
+def witness_noise(records: Sequence[Record]) -> Noise | None:
+    """Estimate the noise from what cannot be motion.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Recordings by one camera.
+
+    Returns
+    -------
+    Noise or None
+        The larger of the two witnesses; ``None`` where there is neither a rest nor a pair of marks.
+    """
+    rests = []
+    for record in records:
+        change = record.command.first_change() if record.command else None
+        if change is not None and (record.time < change).sum() >= LEAST_REST:
+            rests.append(record.angle[record.time < change])
+    crosses = [r.cross for r in records if r.cross is not None]
+    found = [
+        autoregression(parts, source)
+        for parts, source in ((rests, "rest"), (crosses, "distance from the pivot"))
+        if parts
+    ]
+    return max(found, key=lambda noise: noise.sigma, default=None)
+
+
+def stated_noise(records: Sequence[Record]) -> Noise | None:
+    """Return the median stated uncertainty as white noise of unknown colour, ``None`` where none is stated."""
+    stated = np.concatenate([r.sigma for r in records])
+    stated = stated[np.isfinite(stated)]
+    return Noise(float(np.median(stated)), 0.0, 1.0, "stated") if len(stated) else None
+
+
+def autoregression(parts: Sequence[Floats], source: str) -> Noise:
+    """Fit one AR(1) process to several stretches.
+
+    Parameters
+    ----------
+    parts : sequence of (n,) ndarray
+        Stretches, rad; each is taken about its own mean.
+    source : str
+        What they are, for the reader.
+
+    Returns
+    -------
+    Noise
+        With φ corrected for the bias that taking out the means brings, and kept within [0, 0.98].
+    """
+    total = count = lagged = pairs = 0.0
+    for part in parts:
+        e = part - part.mean()
+        total += e @ e
+        count += len(e) - 1
+        lagged += e[1:] @ e[:-1]
+        pairs += len(e) - 1
+    if total <= 0.0:
+        return Noise(0.0, 0.0, 1.0 / math.sqrt(max(pairs, 1.0)), source)
+    length = pairs / len(parts) + 1.0
+    raw = lagged / total * length / (length - 1.0)
+    phi = (raw * length + 1.0) / (length - 3.0) if length > 6 else raw
+    phi = min(max(phi, 0.0), 0.98)
+    return Noise(math.sqrt(total / count), phi, math.sqrt((1.0 - phi**2) / pairs), source)

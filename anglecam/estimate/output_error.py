@@ -1,0 +1,252 @@
+"""Output error: the model runs freely, and its parameters are those whose angle is nearest to the measured one.
+
+    minimise Σ_recordings |W(y − z − θ(t; p, x₀))|²  over p (shared) and x₀, z (each recording's own)
+
+W whitens first-order autoregressive noise, so that a coloured residual is not counted as so many independent
+observations. The initial state x₀ and, unless declared, the zero z of the angle are unknown in every recording.
+Ljung, System Identification, 2nd ed., 1999, sec. 7.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from anglecam.estimate.record import Record
+from anglecam.session import Command
+
+Floats = NDArray[np.float64]
+
+
+class Model(Protocol):
+    """What can be fitted: `anglecam.simulate.plant.Plant` and `anglecam.simulate.third_order.ThirdOrder`."""
+
+    states: int
+
+    @property
+    def names(self) -> tuple[str, ...]: ...  # noqa: D102  # documented where implemented
+    @property
+    def lower(self) -> Floats: ...  # noqa: D102
+    @property
+    def upper(self) -> Floats: ...  # noqa: D102
+    @property
+    def scales(self) -> Floats: ...  # noqa: D102
+    @property
+    def to_file(self) -> Floats: ...  # noqa: D102
+    def predict(  # noqa: D102
+        self, parameters: Floats, time: Floats, command: Command | None, state: Floats
+    ) -> Floats: ...
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model."""
+
+    model: Model
+    parameters: Floats
+    """(p,) shared parameters, SI, in the order of ``model.names``."""
+    own: tuple[Floats, ...]
+    """Each recording's own unknowns: initial states, then the zero (rad) unless declared."""
+    residuals: tuple[Floats, ...]
+    """Measured minus predicted angle of each recording, rad."""
+    jacobian: Floats
+    """(N, p + Σ own) derivative of the whitened predictions, 1/σ left out."""
+    phi: float
+    """Autocorrelation of the noise from frame to frame that the fit was whitened with."""
+    white: Floats
+    """(N,) whitened residuals of all recordings, rad."""
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square residual, rad."""
+        return float(np.sqrt(np.mean(np.concatenate(self.residuals) ** 2)))
+
+    @property
+    def cost(self) -> float:
+        """Sum of squared whitened residuals, rad²."""
+        return float(self.white @ self.white)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """(p, p) covariance of ``parameters``, SI; a parameter held by its bound has none (NaN)."""
+        p = len(self.parameters)
+        margin = 1e-6 * self.model.scales
+        free = (self.parameters > self.model.lower + margin) & (self.parameters < self.model.upper - margin)
+        columns = np.concatenate([free, np.ones(self.jacobian.shape[1] - p, bool)])
+        jacobian = self.jacobian[:, columns]
+        norm = np.linalg.norm(jacobian, axis=0)
+        norm[norm == 0.0] = 1.0
+        variance = self.cost / max(1, len(self.white) - jacobian.shape[1])
+        inverse = np.linalg.pinv((jacobian / norm).T @ (jacobian / norm)) / np.outer(norm, norm) * variance
+        covariance = np.full((p, p), np.nan)
+        n = int(free.sum())
+        covariance[np.ix_(free, free)] = inverse[:n, :n]
+        return covariance
+
+    @property
+    def sigma(self) -> Floats:
+        """(p,) standard uncertainties of ``parameters``, SI."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+def whiten(record: Record, phi: float, values: Floats) -> Floats:
+    """Turn first-order autoregressive noise into white noise of the same variance.
+
+    Parameters
+    ----------
+    record : Record
+        For the frame times: over a gap of k frames the correlation is φᵏ.
+    phi : float
+        Correlation from frame to frame, 0 ≤ φ < 1.
+    values : (n,) or (n, k) ndarray
+        What to whiten, along the first axis.
+
+    Returns
+    -------
+    (n,) or (n, k) ndarray
+        e₁, (eᵢ − φᵏeᵢ₋₁)/√(1 − φ²ᵏ).
+    """
+    if phi == 0.0:
+        return values
+    step = phi ** (np.diff(record.time) / record.interval)
+    scale = 1.0 / np.sqrt(1.0 - step**2)
+    if values.ndim == 2:
+        step, scale = step[:, None], scale[:, None]
+    return np.concatenate([values[:1], (values[1:] - step * values[:-1]) * scale])
+
+
+def fit_output_error(
+    model: Model,
+    records: Sequence[Record],
+    starts: Sequence[Floats],
+    *,
+    own: Sequence[Floats] | None = None,
+    phi: float = 0.0,
+    fixed: bool = False,
+) -> Fit:
+    """Fit a model to recordings by output error.
+
+    Parameters
+    ----------
+    model : Model
+        What to fit.
+    records : sequence of Record
+        All fitted at once.
+    starts : sequence of (p,) ndarray
+        Shared parameters to start from, SI; the best end is kept.
+    own : sequence of ndarray, optional
+        Starts of each recording's own unknowns; from its first frames otherwise.
+    phi : float
+        Autocorrelation of the noise from frame to frame.
+    fixed : bool
+        Hold the shared parameters at ``starts[0]`` and fit only what is each recording's own: a prediction.
+
+    Returns
+    -------
+    Fit
+        The best of the starts.
+    """
+    own = [_first_state(model, record) for record in records] if own is None else list(own)
+    best: Fit | None = None
+    for start in starts:
+        fit = _fit_once(model, records, np.clip(start, model.lower, model.upper), own, phi, fixed)
+        if best is None or fit.cost < best.cost:
+            best = fit
+    if best is None:
+        raise ValueError("no start was given")
+    return best
+
+
+def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:
+    """Predict recordings in free run with the parameters of ``fit``; only initial states and zeros are fitted."""
+    return fit_output_error(fit.model, records, [fit.parameters], phi=fit.phi, fixed=True)
+
+
+def _fit_once(
+    model: Model, records: Sequence[Record], start: Floats, own: Sequence[Floats], phi: float, fixed: bool
+) -> Fit:
+    p = len(start)
+    edges = np.cumsum([p, *(len(o) for o in own)])
+    rows = np.cumsum([0, *(len(r.time) for r in records)])
+    shared = slice(p, p) if fixed else slice(0, p)
+
+    def split(x: Floats) -> tuple[Floats, list[Floats]]:
+        return x[:p], [x[edges[i] : edges[i + 1]] for i in range(len(records))]
+
+    def predict(record: Record, parameters: Floats, unknowns: Floats) -> Floats:
+        zero = 0.0 if record.zero_known else unknowns[model.states]
+        return zero + model.predict(parameters, record.time, record.command, unknowns[: model.states])
+
+    def errors(x: Floats) -> Floats:
+        parameters, unknowns = split(x)
+        parts = [whiten(r, phi, r.angle - predict(r, parameters, o)) for r, o in zip(records, unknowns, strict=True)]
+        return np.concatenate(parts)
+
+    def jacobian(x: Floats) -> Floats:
+        parameters, unknowns = split(x)
+        result = np.zeros((rows[-1], len(x)))
+        for i, (record, o) in enumerate(zip(records, unknowns, strict=True)):
+            both = np.concatenate([parameters, o])
+            magnitudes = np.concatenate([np.maximum(model.scales, np.abs(parameters)), np.full(len(o), 0.1)])
+            columns = [*range(*shared.indices(p)), *range(p, p + len(o))]
+            place = [*range(*shared.indices(p)), *range(edges[i], edges[i + 1])]
+            block = np.empty((len(record.time), len(columns)))
+            for k, j in enumerate(columns):
+                step = 1e-5 * magnitudes[j]
+                low, high = both.copy(), both.copy()
+                low[j] -= step
+                high[j] += step
+                if j < p:  # a bound may be a wall of the physics: difference on its inner side there
+                    low[j], high[j] = max(low[j], model.lower[j]), min(high[j], model.upper[j])
+                change = predict(record, high[:p], high[p:]) - predict(record, low[:p], low[p:])
+                block[:, k] = change / (high[j] - low[j])
+            result[rows[i] : rows[i + 1], place] = -whiten(record, phi, block)
+        return result
+
+    x0 = np.concatenate([start, *own])
+    free = np.arange(p, len(x0)) if fixed else np.arange(len(x0))
+    lower, upper = np.full(len(x0), -np.inf), np.full(len(x0), np.inf)
+    lower[:p], upper[:p] = model.lower, model.upper
+
+    def whole(x: Floats) -> Floats:
+        full = x0.copy()
+        full[free] = x
+        return full
+
+    inside = np.clip(x0, np.nextafter(lower, np.inf), np.nextafter(upper, -np.inf))
+    if not np.all(np.isfinite(errors(inside))):
+        return _ended(model, records, split(x0), np.full(rows[-1], np.inf), np.zeros((rows[-1], len(x0))), phi, predict)
+    found = least_squares(
+        lambda x: errors(whole(x)),
+        inside[free],
+        jac=lambda x: jacobian(whole(x))[:, free],
+        bounds=(lower[free], upper[free]),
+        x_scale="jac",
+        xtol=1e-10,
+        ftol=1e-10,
+        gtol=1e-12,
+        max_nfev=60,
+    )
+    x = whole(found.x)
+    return _ended(model, records, split(x), errors(x), -jacobian(x), phi, predict)
+
+
+def _ended(model, records, parts, white, jacobian, phi, predict) -> Fit:  # type: ignore[no-untyped-def]
+    parameters, own = parts
+    residuals = tuple(r.angle - predict(r, parameters, o) for r, o in zip(records, own, strict=True))
+    return Fit(model, parameters, tuple(own), residuals, jacobian, phi, white)
+
+
+def _first_state(model: Model, record: Record) -> Floats:
+    """Start a recording's own unknowns at its first angle, and at rest if that is also where its command holds it."""
+    few = slice(0, min(4, len(record.time)))
+    slope = np.polyfit(record.time[few] - record.time[0], record.angle[few], 1)[0] if record.command is None else 0.0
+    state = np.zeros(model.states)
+    state[:2] = record.angle[0], slope
+    return state if record.zero_known else np.append(state, 0.0)

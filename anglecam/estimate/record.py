@@ -1,0 +1,89 @@
+"""A recording as an estimator sees it: the frames that were measured, and what cannot be motion among them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.errors import InputError
+from anglecam.series import AngleSeries
+from anglecam.session import Command
+
+Floats = NDArray[np.float64]
+
+LEAST_FRAMES = 20
+"""Fewer measured frames than this tell nothing about a model of three parameters and three unknowns of its own."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """The measured frames of one recording; arrays of length n."""
+
+    name: str
+    time: Floats
+    """s, strictly increasing."""
+    angle: Floats
+    """rad from neutral."""
+    command: Command | None
+    """``None`` where nothing was commanded or the command never changes: a free swing."""
+    zero_known: bool
+    """Whether the zero of the angle is declared; otherwise it is one of the recording's own unknowns."""
+    sigma: Floats
+    """Stated standard uncertainty, rad; NaN where none is stated."""
+    cross: Floats | None = None
+    """Scatter of the mouth's distance from the pivot, divided by that distance, rad: what the camera adds in the
+    direction in which nothing can move; ``None`` for a series without marks."""
+
+    @property
+    def interval(self) -> float:
+        """Median frame interval, s."""
+        return float(np.median(np.diff(self.time)))
+
+    def between(self, start: float, stop: float) -> Record:
+        """Return the part with ``start ≤ time < stop`` (s); the command keeps its whole history."""
+        part = (self.time >= start) & (self.time < stop)
+        cross = None if self.cross is None else self.cross[part]
+        return replace(self, time=self.time[part], angle=self.angle[part], sigma=self.sigma[part], cross=cross)
+
+
+def record_from_series(series: AngleSeries, command: Command | None, *, zero_known: bool) -> Record:
+    """Keep what an estimator can use of a series.
+
+    Parameters
+    ----------
+    series : AngleSeries
+        Measured or read.
+    command : Command or None
+        On the same clock.
+    zero_known : bool
+        Whether the rig declares ``neutral`` as a number.
+
+    Returns
+    -------
+    Record
+        Of the frames whose status is ``ok``.
+
+    Raises
+    ------
+    InputError
+        Where fewer than `LEAST_FRAMES` frames are measured.
+    """
+    ok = series.ok
+    if ok.sum() < LEAST_FRAMES:
+        raise InputError(f"{series.name}: {ok.sum()} measured frames are too few to fit a model (need {LEAST_FRAMES})")
+    cross = None
+    if series.mouth_px is not None and series.pivot_px is not None:
+        lever = np.hypot(*(series.mouth_px - series.pivot_px)[ok].T)
+        cross = lever / np.mean(lever) - 1.0
+    moving = command is not None and command.first_change() is not None
+    return Record(
+        series.name,
+        series.time[ok],
+        series.angle[ok],
+        command if moving else None,
+        zero_known,
+        series.sigma[ok],
+        cross,
+    )
