@@ -191,9 +191,7 @@ def read_columns(path: Path, *, required: Sequence[str], may_be_empty: bool = Fa
             raise InputError(f"{path}: line {number} has {len(row)} cells, the header has {len(header)}")
         for name, cell in zip(header, row, strict=True):
             numeric = name in required or (name in COLUMNS and name != "status")
-            columns[name].append(
-                _number(path, number, name, cell.strip(), may_be_empty) if numeric else cell.strip()
-            )
+            columns[name].append(_number(path, number, name, cell.strip(), may_be_empty) if numeric else cell.strip())
     if not columns[header[0]]:
         raise InputError(f"{path}: a header but no rows")
     return {name: np.array(column) for name, column in columns.items()}

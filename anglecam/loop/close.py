@@ -128,8 +128,8 @@ def close_records(
     before_held_out, after_held_out = (predict_output_error(f, predicted) for f in (before, fit))
     noise = witness or stated_noise(fitted) or _left_over(fit)
     remains = not gate.passed and fit.rmse > noise.sigma * np.sqrt(1.0 + NEGLIGIBLE**2)
-    if remains:
-        fit, after_held_out = (fit, after_held_out) if accepted else (before, before_held_out)
+    if remains:  # nothing is named, so nothing is added
+        fit, after_held_out = before, before_held_out
     verdict = "unexplained" if remains else "attributed" if accepted else "nothing_missing"
     return Verdict(
         verdict,

@@ -72,7 +72,7 @@ def test_residual(fit: Fit, records: Sequence[Record], candidates: Sequence[Effe
     Gate
         Calibrated at `DRAWS` draws.
     """
-    used = np.linalg.norm(fit.jacobian, axis=0) > 0.0
+    used = np.linalg.norm(fit.jacobian, axis=0) > 0.0  # a parameter held by its bound may move nothing
     absorbed, _ = np.linalg.qr(fit.jacobian[:, used])
     n = len(fit.white)
     draws = rng.standard_normal((n, DRAWS))
@@ -88,10 +88,11 @@ def test_residual(fit: Fit, records: Sequence[Record], candidates: Sequence[Effe
         strength[name] = float(np.linalg.norm(left[:, 0]))
     statistics["autocorrelation"] = _portmanteau(both, records)
 
+    # under the null the data are one more draw: each is ranked among all, and so is the smallest of its ranks
     table = np.array(list(statistics.values()))
-    p_each = np.array([(1 + np.sum(row[None, 1:] >= row[:, None], axis=1)) / (DRAWS + 1.0) for row in table])
+    p_each = np.array([np.mean(row[None, :] >= row[:, None], axis=1) for row in table])
     smallest = p_each.min(axis=0)
-    p_value = (1 + np.sum(smallest[1:] <= smallest[0])) / (DRAWS + 1.0)
+    p_value = np.mean(smallest <= smallest[0])
     critical = float(np.quantile(smallest[1:], LEVEL))
     noise = np.sqrt(fit.cost / (n - absorbed.shape[1]))
     detectable = {}
@@ -131,17 +132,17 @@ def _shapes(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
     groups: dict[str, list[Floats]] = {"angle": [], "velocity": [], "command": [], "time": []}
     predicted = [r.angle - e for r, e in zip(records, fit.residuals, strict=True)]
     rates = [np.gradient(p, r.time) for p, r in zip(predicted, records, strict=True)]
-    swing = max(float(np.ptp(p)) for p in predicted) or 1.0
-    speed = max(float(np.ptp(w)) for w in rates) or 1.0
+    swing = float(max(np.ptp(p) for p in predicted)) or 1.0
+    speed = float(max(np.ptp(w) for w in rates)) or 1.0
     for record, path, rate in zip(records, predicted, rates, strict=True):
         x, v = (path - path.mean()) / swing, rate / speed
         s = (record.time - record.time[0]) / (record.time[-1] - record.time[0])
-        shapes = {
+        earlier = [record.time - k * record.interval for k in range(6)]
+        held = [np.zeros(len(t)) if record.command is None else record.command.at(t) for t in earlier]
+        shapes: dict[str, list[Floats]] = {
             "angle": [x**2, x**3],
             "velocity": [v, v * np.abs(v), np.tanh(v / 0.02)],
-            "command": [np.zeros_like(x)] * 6
-            if record.command is None
-            else [record.command.at(record.time - k * record.interval) for k in range(6)],
+            "command": held,
             "time": [s - 0.5, *(np.cos(np.pi * k * s) for k in range(2, 6))],
         }
         for name, columns in shapes.items():
@@ -152,7 +153,7 @@ def _shapes(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
 def _share(left: Floats, basis: Floats, residuals: Floats, *, one_sided: bool) -> Floats:
     """Return the energy of each residual (columns) within the space of ``left``."""
     u, size, _ = np.linalg.svd(left, full_matrices=False)
-    u = u[:, size > 1e-6 * max(np.linalg.norm(basis), 1e-300)]
+    u = u[:, size > 1e-6 * max(float(np.linalg.norm(basis)), 1e-300)]
     along = u.T @ residuals
     if one_sided and left.shape[1] == 1 and u.shape[1] == 1:
         along *= np.sign(u[:, 0] @ left[:, 0])

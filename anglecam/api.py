@@ -1,0 +1,101 @@
+"""The public face: three functions, each from a path to a result."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from anglecam.errors import InputError
+from anglecam.estimate.record import Record
+from anglecam.identify import Estimator, Identified, declared_start, identify_records
+from anglecam.loop.close import Verdict, close_records
+from anglecam.measure import measure_clip
+from anglecam.recordings import measure_session
+from anglecam.rig import Rig
+from anglecam.series import AngleSeries
+from anglecam.session import Session, command_beside, read_session, rig_beside
+
+
+def measure(clip: str | Path, rig: Rig | None = None) -> AngleSeries:
+    """Measure the angle in every frame of a clip.
+
+    Parameters
+    ----------
+    clip : path
+        A film; ``rig.yaml`` and ``NAME.command.csv`` beside it are read.
+    rig : Rig, optional
+        In place of the ``rig.yaml`` beside the clip.
+
+    Returns
+    -------
+    AngleSeries
+        A row a frame, radians.
+
+    Raises
+    ------
+    InputError
+        Where the clip cannot be measured.
+    RigError
+        Where the rig file is wrong.
+    """
+    path = Path(clip)
+    return measure_clip(path, rig or rig_beside(path), command_beside(path)).series
+
+
+def identify(session: str | Path, estimator: Estimator = "oe2") -> Identified:
+    """Fit a model to a session's recordings, those that its rig file holds out apart.
+
+    Parameters
+    ----------
+    session : path
+        A folder of clips or angle series, with commands or without.
+    estimator : {'ekf', 'oe2', 'oe3'}
+        See `anglecam.identify.identify_records`.
+
+    Returns
+    -------
+    Identified
+        The model, its uncertainties, its errors.
+
+    Raises
+    ------
+    AnglecamError
+        Where nothing can be fitted.
+    """
+    opened, records = _records(session)
+    held_out = [r for r in records if r.name in opened.rig.held_out]
+    fitted = [r for r in records if r.name not in opened.rig.held_out]
+    return identify_records(fitted, opened.rig, estimator, held_out=held_out)
+
+
+def close_loop(session: str | Path, hold_out: Sequence[str] = ()) -> Verdict:
+    """Find what the base model lacks in a session.
+
+    Parameters
+    ----------
+    session : path
+        A folder of clips or angle series.
+    hold_out : sequence of str
+        Recordings to predict only, besides those that the rig file names.
+
+    Returns
+    -------
+    Verdict
+        What was added, the evidence, the error before and after.
+
+    Raises
+    ------
+    AnglecamError
+        Where nothing can be fitted.
+    """
+    opened, records = _records(session)
+    starts = [declared_start(opened.rig)]
+    return close_records(records, held_out=[*opened.rig.held_out, *hold_out], starts=starts)
+
+
+def _records(session: str | Path) -> tuple[Session, tuple[Record, ...]]:
+    opened = read_session(Path(session))
+    measured = measure_session(opened)
+    if not measured.records:
+        raise InputError(f"{session}: no recording can be used; {'; '.join(map(str, measured.problems))}")
+    return opened, measured.records

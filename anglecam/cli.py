@@ -1,0 +1,225 @@
+"""The command line: one thin command a verb.
+
+What goes wrong with one clip is one line on standard error and exit status 1, and the rest is done; what is wrong
+with the call or a rig file is one line and exit status 2. Progress is shown on a terminal only.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+from anglecam.errors import AnglecamError, InputError, RigError
+from anglecam.files import write_json
+from anglecam.identify import ESTIMATORS, Estimator, declared_start, identify_records
+from anglecam.loop.close import close_records
+from anglecam.loop.holdout import split_records
+from anglecam.loop.result import verdict_as_dict
+from anglecam.measure import measure_clip
+from anglecam.recordings import Measured, measure_session
+from anglecam.report.figures import plot_series
+from anglecam.report.page import write_report
+from anglecam.report.summary import loop_table, model_table, series_table
+from anglecam.rig import Rig, read_rig
+from anglecam.series import write_series
+from anglecam.session import SERIES_ENDING, Session, command_beside, find_clips, read_session, rig_beside
+from anglecam.video.overlay import write_overlay
+
+app = typer.Typer(
+    name="anglecam",
+    help="From clips of a moving mechanism to its angle, its model, and what the model lacks.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+screen = Console()
+errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+
+Out = Annotated[Path, typer.Option("--out", help="Folder for the results; made if missing.")]
+SessionFolder = Annotated[Path, typer.Argument(metavar="SESSION", help="Folder of clips or *.angles.csv of one rig.")]
+
+
+@app.command()
+def measure(
+    clips: Annotated[list[Path], typer.Argument(metavar="CLIP…", help="Clips, or folders of clips.")],
+    out: Out,
+    rig: Annotated[
+        Path | None, typer.Option("--rig", help="Rig file for all clips; default: rig.yaml beside each clip.")
+    ] = None,
+    overlay: Annotated[bool, typer.Option("--overlay", help="Also write NAME.overlay.mp4.")] = False,
+) -> None:
+    """Measure the angle in every frame: NAME.angles.csv and a plot for each clip."""
+    declared = read_rig(rig) if rig else None
+    _make_folder(out)
+    problems: list[AnglecamError] = []
+    done: dict[str, Path] = {}
+    rows = []
+    with _progress() as bars:
+        for clip in _expand(clips, problems):
+            try:
+                if clip.stem in done:
+                    raise InputError(f"{clip}: {done[clip.stem]} has the same name; measure them to separate folders")
+                done[clip.stem] = clip
+                bar = bars.add_task(clip.name, total=None)
+                used = declared if declared is not None else rig_beside(clip)
+                _say_what_is_not_applied(used, clip)
+                measurement = measure_clip(
+                    clip,
+                    used,
+                    command_beside(clip),
+                    progress=lambda n, total, bar=bar: bars.update(bar, completed=n, total=total or None),  # type: ignore[misc]
+                )
+                write_series(measurement.series, out / f"{clip.stem}{SERIES_ENDING}")
+                plot_series(measurement.series, out / f"{clip.stem}.png")
+                if overlay:
+                    write_overlay(clip, measurement, out / f"{clip.stem}.overlay.mp4")
+                rows.append(measurement)
+                if measurement.truncated:
+                    raise InputError(f"{clip}: {measurement.truncated}")
+            except AnglecamError as problem:
+                problems.append(problem)
+    if rows:
+        screen.print(series_table(rows))
+    _end(problems)
+
+
+@app.command()
+def identify(
+    session: SessionFolder,
+    out: Out,
+    estimator: Annotated[str, typer.Option("--estimator", help=f"One of {', '.join(ESTIMATORS)}.")] = "oe2",
+) -> None:
+    """Fit a model to a session: model.json."""
+    if estimator not in ESTIMATORS:
+        raise RigError(f"--estimator {estimator}: choose one of {', '.join(ESTIMATORS)}")
+    chosen: Estimator = estimator  # type: ignore[assignment]
+    opened, measured = _open(session, out)
+    fitted = [r for r in measured.records if r.name not in opened.rig.held_out]
+    held_out = [r for r in measured.records if r.name in opened.rig.held_out]
+    if not fitted:
+        raise RigError(f"{session}: every recording that can be used is held out; nothing is left to fit")
+    model = identify_records(fitted, opened.rig, chosen, held_out=held_out)
+    write_json(out / "model.json", model.as_dict())
+    screen.print(model_table([model]))
+    _end(measured.problems)
+
+
+@app.command()
+def close(
+    session: SessionFolder,
+    out: Out,
+    hold_out: Annotated[
+        list[str] | None, typer.Option("--hold-out", metavar="NAME", help="A recording to predict only; repeatable.")
+    ] = None,
+) -> None:
+    """Find what the model lacks: loop.json and report.html."""
+    opened, measured = _open(session, out)
+    names = [*opened.rig.held_out, *(hold_out or ())]
+    unknown = sorted(set(names) - {r.name for r in opened.recordings})
+    if unknown:
+        raise RigError(f"--hold-out {unknown[0]}: no such recording in {session}")
+    fitted, held_out = split_records(measured.records, names)
+    with _progress() as bars:
+        bar = bars.add_task("extended Kalman filter", total=None)
+        models = [identify_records(fitted, opened.rig, estimator, held_out=held_out) for estimator in ("ekf", "oe2")]
+        verdict = close_records(
+            measured.records,
+            held_out=names,
+            starts=[declared_start(opened.rig)],
+            progress=lambda stage: bars.update(bar, description=stage),
+        )
+        bars.update(bar, description="report")
+        for model, name in zip(models, ("ekf", "model"), strict=True):
+            write_json(out / f"{name}.json", model.as_dict())
+        write_json(out / "loop.json", verdict_as_dict(verdict))
+        title = session.resolve().name
+        write_report(out / "report.html", title, verdict, measured.series, models, measured.problems)
+        bars.update(bar, description="done", completed=1, total=1)
+    screen.print(model_table(models))
+    screen.print(loop_table(verdict))
+    screen.print(f"report: {out / 'report.html'}", soft_wrap=True)
+    _end(measured.problems)
+
+
+def main() -> None:
+    """Run the command line; every failure is one line on standard error and an exit status."""
+    try:
+        app()
+    except InputError as problem:
+        errors.print(str(problem))
+        sys.exit(1)
+    except RigError as problem:
+        errors.print(str(problem))
+        sys.exit(2)
+    except OSError as problem:
+        errors.print(f"{problem.filename or 'anglecam'}: {problem.strerror or problem}")
+        sys.exit(1)
+
+
+def _open(session: Path, out: Path) -> tuple[Session, Measured]:
+    """Read a session and measure its clips, writing their series to ``out``."""
+    opened = read_session(session)
+    _make_folder(out)
+    _say_what_is_not_applied(opened.rig, session / "rig.yaml")
+    with _progress() as bars:
+        tasks = {r.name: bars.add_task(r.source.name, total=None) for r in opened.recordings if r.is_clip}
+        measured = measure_session(
+            opened, out=out, progress=lambda name, n, total: bars.update(tasks[name], completed=n, total=total or None)
+        )
+    if not measured.records:
+        for problem in measured.problems:
+            errors.print(str(problem))
+        raise InputError(f"{session}: no recording can be used")
+    return opened, measured
+
+
+def _expand(paths: list[Path], problems: list[AnglecamError]) -> Iterator[Path]:
+    for path in paths:
+        if path.is_dir():
+            clips = find_clips(path)
+            if not clips:
+                problems.append(InputError(f"{path}: no clip in this folder"))
+            yield from clips
+        else:
+            yield path
+
+
+def _make_folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        raise RigError(f"--out {out}: {problem.strerror}") from problem
+
+
+def _say_what_is_not_applied(rig: Rig, where: Path) -> None:
+    for key in rig.not_applied():
+        errors.print(f"{where}: {key} is declared but this version does not apply it")
+
+
+@contextmanager
+def _progress() -> Iterator[Progress]:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=errors, disable=not errors.is_terminal) as bars:
+        yield bars
+
+
+def _end(problems: list[AnglecamError] | tuple[InputError, ...]) -> None:
+    """Say what went wrong, a line each, and leave with the contract's exit status."""
+    for problem in problems:
+        errors.print(str(problem))
+    if problems:
+        raise typer.Exit(2 if any(isinstance(p, RigError) for p in problems) else 1)

@@ -1,0 +1,150 @@
+"""Recordings to a model: the paper's filter, or output error of second or third order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.estimate.ekf import fit_ekf, settings_for
+from anglecam.estimate.noise import autoregression, stated_noise, witness_noise
+from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error
+from anglecam.estimate.record import Record
+from anglecam.estimate.start import start_parameters
+from anglecam.estimate.step_figures import NO_STEP, StepFigures, step_figures
+from anglecam.rig import Rig
+from anglecam.simulate.plant import Plant
+from anglecam.simulate.third_order import ThirdOrder
+
+Floats = NDArray[np.float64]
+Estimator = Literal["ekf", "oe2", "oe3"]
+ESTIMATORS: tuple[str, ...] = get_args(Estimator)
+
+
+@dataclass(frozen=True)
+class Identified:
+    """A model with its uncertainty and its errors."""
+
+    estimator: str
+    names: tuple[str, ...]
+    values: Floats
+    """In the units of ``names``."""
+    sigmas: Floats
+    """Standard uncertainties, in the same units."""
+    fit: Fit
+    """Free run on the recordings that were fitted."""
+    held_out: Fit | None
+    """Free run on those that were not; ``None`` where none is declared."""
+    step: StepFigures
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the content of ``model.json``."""
+        parameters = {
+            name: {"value": value, "sigma": sigma}
+            for name, value, sigma in zip(self.names, self.values, self.sigmas, strict=True)
+        }
+        if "a_per_s" in parameters and "c_per_s2" not in parameters:
+            parameters["c_per_s2"] = {"value": np.nan, "sigma": np.nan}  # a free swing does not tell
+        return {
+            "estimator": self.estimator,
+            "parameters": parameters,
+            "rmse_deg": {
+                "fit": np.degrees(self.fit.rmse),
+                "held_out": np.degrees(self.held_out.rmse) if self.held_out else None,
+            },
+            "step": {
+                "command_deg": 1.0,
+                "rise_time_s": self.step.rise_time,
+                "overshoot": self.step.overshoot,
+                "overshoot_percent": 100.0 * self.step.overshoot,
+                "settling_time_s": self.step.settling_time,
+                "steady_state_deg": self.step.steady_state,
+            },
+            "noise_correlation": self.fit.phi,
+        }
+
+
+def identify_records(
+    fitted: Sequence[Record], rig: Rig, estimator: Estimator, *, held_out: Sequence[Record] = ()
+) -> Identified:
+    """Fit a model to recordings of one rig.
+
+    Parameters
+    ----------
+    fitted : sequence of Record
+        With or without commands; initial states are unknown in each.
+    rig : Rig
+        For the starting values of the model, where declared.
+    estimator : {'ekf', 'oe2', 'oe3'}
+        The paper's extended Kalman filter (SYS1), output error of second order, output error of third order with
+        zeros (SYS2, Eq. (36)).
+    held_out : sequence of Record
+        Recordings to predict only.
+
+    Returns
+    -------
+    Identified
+        The model.
+    """
+    driven = any(r.command is not None for r in fitted)
+    starts = start_parameters(fitted)
+    if "model" in rig.model_fields_set:
+        starts.insert(0, declared_start(rig)[: 3 if driven else 2])
+    plant = Plant(driven=driven)
+    fit = _coloured(fit_output_error(plant, fitted, starts), fitted)
+    if estimator == "ekf":
+        fit, values, sigmas = _by_filter(fit, fitted, starts[0])
+    else:
+        if estimator == "oe3":
+            fit = _coloured(_third_order(fit, fitted), fitted)
+        values, sigmas = fit.parameters, fit.sigma
+    scale = fit.model.to_file
+    return Identified(
+        estimator,
+        fit.model.names,
+        values * scale,
+        sigmas * scale,
+        fit,
+        predict_output_error(fit, held_out) if held_out else None,
+        _step(fit) if driven else NO_STEP,
+    )
+
+
+def declared_start(rig: Rig) -> Floats:
+    """Return the rig's starting values a (1/s), b (1/s²), c (1/s²)."""
+    return np.array([rig.model.a, rig.model.b, rig.model.c])
+
+
+def _coloured(fit: Fit, records: Sequence[Record]) -> Fit:
+    """Fit again with the correlation that the residual itself shows, so that the stated sigma counts it."""
+    phi = autoregression(fit.residuals, "residual").phi
+    return fit_output_error(fit.model, records, [fit.parameters], own=fit.own, phi=phi)
+
+
+def _by_filter(fit: Fit, records: Sequence[Record], start: Floats) -> tuple[Fit, Floats, Floats]:
+    noise = witness_noise(records) or stated_noise(records)
+    sigma = max(noise.sigma if noise else 0.0, fit.rmse)
+    initial = start if len(start) == 3 else np.append(start, 0.0)
+    estimate = fit_ekf(records, initial, settings_for(records, initial, sigma))
+    n = len(fit.parameters)
+    free_run = fit_output_error(fit.model, records, [estimate.parameters[:n]], own=fit.own, fixed=True)
+    return free_run, estimate.parameters[:n], np.sqrt(np.diag(estimate.covariance))[:n]
+
+
+def _third_order(second: Fit, records: Sequence[Record]) -> Fit:
+    """Start from the second-order model times (s + p)/(s + p), for a few p, and let the fit part the two."""
+    a, b = second.parameters[:2]
+    c = second.parameters[2] if len(second.parameters) > 2 else 0.0
+    fast = np.sqrt(abs(b))
+    starts = [np.array([0.0, c, c * p, a + p, b + a * p, b * p]) for p in (0.5 * fast, fast, 3.0 * fast)]
+    return fit_output_error(ThirdOrder(), records, starts)
+
+
+def _step(fit: Fit) -> StepFigures:
+    p = fit.parameters
+    if isinstance(fit.model, Plant):
+        return step_figures(fit.model, p, np.roots([1.0, p[0], p[1]]), p[2] / p[1] if p[1] else 0.0)
+    return step_figures(fit.model, p, np.roots([1.0, *p[3:]]), p[2] / p[5] if p[5] else 0.0)

@@ -1,0 +1,72 @@
+"""A session's recordings as angle series: clips measured, series read; what fails costs itself alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from anglecam.errors import InputError
+from anglecam.estimate.record import Record, record_from_series
+from anglecam.measure import measure_clip
+from anglecam.series import AngleSeries, read_series, write_series
+from anglecam.session import SERIES_ENDING, Session
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a session gave."""
+
+    series: tuple[AngleSeries, ...]
+    records: tuple[Record, ...]
+    """One for each of ``series`` that has enough measured frames."""
+    problems: tuple[InputError, ...]
+    """What could not be used, one line each."""
+
+
+def measure_session(
+    session: Session,
+    *,
+    out: Path | None = None,
+    progress: Callable[[str, int, int], None] = lambda name, done, total: None,
+) -> Measured:
+    """Measure every clip of a session and read every series.
+
+    Parameters
+    ----------
+    session : Session
+        From `anglecam.session.read_session`.
+    out : Path, optional
+        Folder to write ``NAME.angles.csv`` of every measured clip to.
+    progress : callable
+        Told a clip's name, its frames done and (if known, else 0) in total.
+
+    Returns
+    -------
+    Measured
+        In the order of the recordings' names.
+    """
+    series, records, problems = [], [], list(session.problems)
+    zero_known = session.rig.neutral != "auto"
+    for recording in session.recordings:
+        name = recording.name
+        try:
+            if recording.is_clip:
+                measurement = measure_clip(
+                    recording.source,
+                    session.rig,
+                    recording.command,
+                    progress=lambda done, total, name=name: progress(name, done, total),  # type: ignore[misc]
+                )
+                one = measurement.series
+                if out is not None:
+                    write_series(one, out / f"{name}{SERIES_ENDING}")
+                if measurement.truncated:
+                    problems.append(InputError(f"{recording.source}: {measurement.truncated}"))
+            else:
+                one = read_series(recording.source)
+            series.append(one)
+            records.append(record_from_series(one, recording.command, zero_known=zero_known))
+        except InputError as problem:
+            problems.append(problem)
+    return Measured(tuple(series), tuple(records), tuple(problems))
