@@ -136,15 +136,17 @@ def _by_filter(fit: Fit, records: Sequence[Record], start: Floats) -> tuple[Fit,
 
 def _third_order(second: Fit, records: Sequence[Record]) -> Fit:
     """Start from the second-order model times (s + p)/(s + p), for a few p, and let the fit part the two."""
-    a, b = second.parameters[:2]
-    c = second.parameters[2] if len(second.parameters) > 2 else 0.0
+    a, b, *c = second.parameters
     fast = np.sqrt(abs(b))
-    starts = [np.array([0.0, c, c * p, a + p, b + a * p, b * p]) for p in (0.5 * fast, fast, 3.0 * fast)]
-    return fit_output_error(ThirdOrder(), records, starts)
+    starts = [
+        np.array([a + p, b + a * p, b * p] + [n for gain in c for n in (0.0, gain, gain * p)])
+        for p in (0.5 * fast, fast, 3.0 * fast)
+    ]
+    return fit_output_error(ThirdOrder(driven=bool(c)), records, starts)
 
 
 def _step(fit: Fit) -> StepFigures:
     p = fit.parameters
     if isinstance(fit.model, Plant):
         return step_figures(fit.model, p, np.roots([1.0, p[0], p[1]]), p[2] / p[1] if p[1] else 0.0)
-    return step_figures(fit.model, p, np.roots([1.0, *p[3:]]), p[2] / p[5] if p[5] else 0.0)
+    return step_figures(fit.model, p, np.roots([1.0, *p[:3]]), p[5] / p[2] if p[2] else 0.0)

@@ -24,6 +24,7 @@ def _dry(parameters: NDArray) -> tuple[float, float]:
 
 EFFECT = Effect(
     id="coulomb_friction",
+    station="load",
     summary="Dry friction opposes motion with a torque that does not depend on speed, and holds the head near rest.",
     equation="θ̈ = c·u − a·θ̇ − b·θ − F·sgn θ̇; at rest while |c·u − b·θ| ≤ F",
     relaxes="Eq. (22): damping is viscous only",

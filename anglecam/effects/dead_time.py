@@ -24,6 +24,7 @@ def _shift(time: Floats, value: Floats, parameters: Floats) -> tuple[Floats, Flo
 
 EFFECT = Effect(
     id="dead_time",
+    station="command",
     summary="The head starts to move a fixed time after the command changes.",
     equation="θ̈ = c·u(t − τ) − a·θ̇ − b·θ",
     relaxes="Eqs. (5), (29): the command acts at once",

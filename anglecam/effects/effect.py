@@ -37,6 +37,8 @@ class Effect:
     """One entry of the ledger. At most one of the ports is filled."""
 
     id: str
+    station: str
+    """Where on the signal's path: ``command``, ``actuator``, ``load`` or ``camera``."""
     summary: str
     """What happens, in a sentence that a student understands."""
     equation: str

@@ -20,6 +20,7 @@ def _load(theta: float, omega: float, command: float, parameters: NDArray) -> fl
 
 EFFECT = Effect(
     id="quadratic_drag",
+    station="load",
     summary="A resistance that grows with the square of speed slows fast motion more than slow motion.",
     equation="θ̈ = c·u − a·θ̇ − b·θ − q·θ̇·|θ̇|",
     relaxes="Eq. (22): damping is viscous only, proportional to speed",

@@ -1,7 +1,8 @@
 """What the camera adds: the size and colour of the angle's noise, from what cannot be motion.
 
-Two witnesses: the rest before the first command change, and, in a film, the mouth's distance from the pivot, which
-no motion can alter. The second sees what a picture at rest hides: the pixel grid and the codec under a moving edge.
+In a film that is the mouth's distance from the pivot, which no motion alters; it sees what a picture at rest hides,
+the pixel grid and the codec under a moving edge. In a series from elsewhere it is the rest before the first command
+change, where the mechanism may still be shaken by something of its own.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from anglecam.estimate.record import Record
 
 Floats = NDArray[np.float64]
 
+DISTANCE = "distance from the pivot"
 LEAST_REST = 6
 """Frames; a shorter rest says nothing about colour."""
 
@@ -32,7 +34,7 @@ class Noise:
     phi_error: float
     """Standard error of ``phi``."""
     source: str
-    """``rest``, ``distance from the pivot``, ``stated`` or ``residual``."""
+    """`DISTANCE`, ``rest``, ``stated`` or ``residual``."""
 
 
 def witness_noise(records: Sequence[Record]) -> Noise | None:
@@ -46,20 +48,17 @@ def witness_noise(records: Sequence[Record]) -> Noise | None:
     Returns
     -------
     Noise or None
-        The larger of the two witnesses; ``None`` where there is neither a rest nor a pair of marks.
+        From the distance to the pivot where there are marks, else from the rest; ``None`` where there is neither.
     """
+    crosses = [r.cross for r in records if r.cross is not None]
+    if crosses:
+        return autoregression(crosses, DISTANCE)
     rests = []
     for record in records:
         change = record.command.first_change() if record.command else None
         if change is not None and (record.time < change).sum() >= LEAST_REST:
             rests.append(record.angle[record.time < change])
-    crosses = [r.cross for r in records if r.cross is not None]
-    found = [
-        autoregression(parts, source)
-        for parts, source in ((rests, "rest"), (crosses, "distance from the pivot"))
-        if parts
-    ]
-    return max(found, key=lambda noise: noise.sigma, default=None)
+    return autoregression(rests, "rest") if rests else None
 
 
 def stated_noise(records: Sequence[Record]) -> Noise | None:

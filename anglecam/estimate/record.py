@@ -13,6 +13,8 @@ from anglecam.session import Command
 
 Floats = NDArray[np.float64]
 
+STILL = 0.02
+"""Share of the whole swing within which the angle counts as not yet released."""
 LEAST_FRAMES = 20
 """Fewer measured frames than this tell nothing about a model of three parameters and three unknowns of its own."""
 
@@ -77,13 +79,24 @@ def record_from_series(series: AngleSeries, command: Command | None, *, zero_kno
     if series.mouth_px is not None and series.pivot_px is not None:
         lever = np.hypot(*(series.mouth_px - series.pivot_px)[ok].T)
         cross = lever / np.mean(lever) - 1.0
-    moving = command is not None and command.first_change() is not None
-    return Record(
+    acts = command is not None and (command.first_change() is not None or (zero_known and command.angle[0] != 0.0))
+    record = Record(
         series.name,
         series.time[ok],
         series.angle[ok],
-        command if moving else None,
+        command if acts else None,
         zero_known,
         series.sigma[ok],
         cross,
     )
+    return record if acts else _from_release(record)
+
+
+def _from_release(record: Record) -> Record:
+    """Leave out the frames in which something still holds what will swing freely; the model knows no hand."""
+    start = np.median(record.angle[:5])
+    moved = np.abs(record.angle - start) > STILL * np.ptp(record.angle)
+    first = int(np.argmax(moved))
+    if len(record.time) - first < LEAST_FRAMES:
+        raise InputError(f"{record.name}: no command, and the angle moves in too few frames to fit a free swing")
+    return record.between(record.time[first], np.inf)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from anglecam.effects import LEDGER, Effect
-from anglecam.estimate.noise import Noise, autoregression, stated_noise, witness_noise
+from anglecam.estimate.noise import DISTANCE, Noise, autoregression, stated_noise, witness_noise
 from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error
 from anglecam.estimate.record import Record
 from anglecam.estimate.start import start_parameters
@@ -24,9 +24,9 @@ from anglecam.loop.holdout import Gain, held_out_gain, split_records
 from anglecam.simulate.plant import Plant
 
 MOST_EFFECTS = 3
-NEGLIGIBLE = 0.25
-"""Structure whose size is below this share of the noise, and which no effect explains, is not called unexplained:
-the witnesses of the noise are themselves not known better than to a few per cent of its energy."""
+NEGLIGIBLE = 0.5
+"""In a film, structure smaller than this share of the noise is neither traced nor called unexplained: the pixel grid
+leaves that much along the path, the same wherever the mouth passes, which it does not leave across it."""
 
 
 @dataclass(frozen=True)
@@ -94,6 +94,7 @@ def close_records(
     plant = Plant(driven=driven)
     ledger = [e for e in LEDGER if driven or e.shift_command is None]
     witness = witness_noise(fitted)
+    negligible = NEGLIGIBLE * witness.sigma if witness and witness.source == DISTANCE else 0.0
 
     progress("base model")
     own_starts = [s[: plant.base_count] for s in starts]
@@ -112,8 +113,9 @@ def close_records(
     accepted: list[Accepted] = []
     while not gate.passed and len(accepted) < MOST_EFFECTS and candidates:
         best = candidates[0]
-        gain = held_out_gain(predict_output_error(fit, predicted), best.prediction, predicted, rng)
-        if best.log_likelihood_gain <= 0.0 or gain.interval_95[0] <= 0.0:
+        so_far = predict_output_error(fit, predicted)
+        gain = held_out_gain(so_far, best.prediction, predicted, rng)
+        if gain.interval_95[0] <= 0.0 or so_far.rmse**2 - best.prediction.rmse**2 <= negligible**2:
             break
         progress(f"adding {best.effect.id}")
         accepted.append(Accepted(best.effect, tuple(alias_set(best, fit, fitted, candidates[1:]))))
@@ -127,7 +129,7 @@ def close_records(
     before = _recolour(before, fitted, fit.phi)
     before_held_out, after_held_out = (predict_output_error(f, predicted) for f in (before, fit))
     noise = witness or stated_noise(fitted) or _left_over(fit)
-    remains = not gate.passed and fit.rmse > noise.sigma * np.sqrt(1.0 + NEGLIGIBLE**2)
+    remains = not gate.passed and (negligible == 0.0 or fit.rmse**2 > noise.sigma**2 + negligible**2)
     if remains:  # nothing is named, so nothing is added
         fit, after_held_out = before, before_held_out
     verdict = "unexplained" if remains else "attributed" if accepted else "nothing_missing"

@@ -28,7 +28,7 @@ def series_table(measurements: Sequence[Measurement]) -> Table:
             f"{degrees.min():.2f} … {degrees.max():.2f}",
             f"{np.degrees(np.median(series.sigma[ok])):.4f}",
             f"{np.degrees(np.median(series.bounds[6.0][ok])):.2f}",
-            measurement.pivot_source,
+            measurement.pivot.source,
         )
     return table
 

@@ -55,33 +55,44 @@ def _integrate(time, state, switches, values, n, d, max_step):  # type: ignore[n
 class ThirdOrder:
     """Third-order plant with zeros."""
 
+    driven: bool = True
+    """Whether any recording has a command; a free swing tells nothing about the numerator."""
+
     states = 3
     """Unknown initial states of a recording: angle (rad) and the two inner ones of the observer form."""
-    names = ("n2_per_s", "n1_per_s2", "n0_per_s3", "d2_per_s", "d1_per_s2", "d0_per_s3")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters in their order, as result files name them: denominator, then numerator."""
+        return ("d2_per_s", "d1_per_s2", "d0_per_s3", "n2_per_s", "n1_per_s2", "n0_per_s3")[: self._count]
 
     @property
     def lower(self) -> Floats:
         """Lower bounds, SI."""
-        return np.array([-1e4, -1e6, -1e8, -100.0, -1e4, -1e6])
+        return np.array([-100.0, -1e4, -1e6, -1e4, -1e6, -1e8])[: self._count]
 
     @property
     def upper(self) -> Floats:
         """Upper bounds, SI; below the limit of stability of the series."""
-        return np.array([1e4, 1e6, 1e8, 600.0, 2e5, 2e7])
+        return np.array([600.0, 2e5, 2e7, 1e4, 1e6, 1e8])[: self._count]
 
     @property
     def scales(self) -> Floats:
         """Magnitudes, SI, that difference quotients are taken against."""
-        return np.array([1.0, 10.0, 1e3, 1.0, 10.0, 1e3])
+        return np.array([1.0, 10.0, 1e3, 1.0, 10.0, 1e3])[: self._count]
 
     @property
     def to_file(self) -> Floats:
         """Factors from SI to the units in `names`."""
-        return np.ones(6)
+        return np.ones(self._count)
+
+    @property
+    def _count(self) -> int:
+        return 6 if self.driven else 3
 
     def predict(self, parameters: Floats, time: Floats, command: Command | None, state: Floats) -> Floats:
-        """Run the plant freely from an initial state; see `anglecam.simulate.plant.Plant.predict`."""
-        p = parameters
+        """Run the plant freely from an initial state; see `anglecam.simulate.plant.Plant.run`."""
         switches = np.zeros(1) if command is None else command.time
         values = np.zeros(1) if command is None else command.angle
-        return _integrate(time, state, switches, values, p[:3], p[3:], MAX_STEP)
+        numerator = parameters[3:] if self.driven else np.zeros(3)
+        return _integrate(time, state, switches, values, numerator, parameters[:3], MAX_STEP)

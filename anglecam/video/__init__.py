@@ -1,0 +1,1 @@
+"""Films as files: frames with their own timestamps, read forward, and the overlay written back."""

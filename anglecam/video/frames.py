@@ -1,0 +1,245 @@
+"""Frames of a clip with their own timestamps, read forward, one at a time.
+
+Seeking lands on wrong frames and headers lie about rates and counts, so nothing here seeks and no time comes from
+a frame's number. A packet that cannot be decoded keeps its row: a frame without an image.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import av
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.errors import InputError
+from anglecam.video.container import is_cut_short
+
+Image = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame of a clip."""
+
+    index: int
+    """0 for the first."""
+    time: float
+    """Presentation time, s, on the clip's own clock."""
+    image: Image | None
+    """(height, width, 3) blue, green, red; ``None`` where the data cannot be decoded."""
+
+
+@dataclass(frozen=True)
+class ClipInfo:
+    """What a clip's container says about it."""
+
+    path: Path
+    width: int
+    """px."""
+    height: int
+    """px."""
+    declared_frames: int
+    """The container's own count, 0 where it states none. It may be wrong in an intact file."""
+    cut_short: bool
+    """Whether bytes are missing at the end of the file."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Evenly spread frames of a whole clip."""
+
+    frames: tuple[Frame, ...]
+    """Those that could be decoded."""
+    count: int
+    """Frames in the clip, those without an image included."""
+    decoded: int
+    """Frames with an image."""
+
+
+def inspect_clip(path: Path) -> ClipInfo:
+    """Open a clip and read what its container declares.
+
+    Parameters
+    ----------
+    path : Path
+        The film.
+
+    Returns
+    -------
+    ClipInfo
+        Size, declared number of frames, and whether the file ends too early.
+
+    Raises
+    ------
+    InputError
+        Where the file is missing, empty, no video file, or has no video stream.
+    """
+    with _open(path) as container:
+        stream = container.streams.video[0]
+        return ClipInfo(path, stream.width, stream.height, stream.frames, is_cut_short(path))
+
+
+def read_frames(path: Path) -> Iterator[Frame]:
+    """Yield every frame of a clip in the order of presentation; memory does not grow with its length.
+
+    Parameters
+    ----------
+    path : Path
+        The film.
+
+    Yields
+    ------
+    Frame
+        With ``image=None`` where a packet does not decode or is flagged corrupt.
+
+    Raises
+    ------
+    InputError
+        As `inspect_clip`, and where timestamps do not increase or there is no frame at all.
+    """
+    for index, (time, picture) in enumerate(_decode(path)):
+        yield Frame(index, time, _to_image(picture))
+
+
+def sample_frames(path: Path, most: int) -> Sample:
+    """Decode a whole clip and keep at most ``most`` evenly spaced frames of it.
+
+    The length of the clip is not known beforehand: when more than ``most`` are kept, every second one is dropped
+    and the stride doubles.
+
+    Parameters
+    ----------
+    path : Path
+        The film.
+    most : int
+        Upper limit of frames to keep, at least 2.
+
+    Returns
+    -------
+    Sample
+        Between half of ``most`` and ``most`` frames, all of a shorter clip.
+
+    Raises
+    ------
+    InputError
+        As `read_frames`.
+    """
+    kept: list[Frame] = []
+    stride, count, decoded = 1, 0, 0
+    for index, (time, picture) in enumerate(_decode(path)):
+        count += 1
+        decoded += picture is not None
+        if index % stride or picture is None:
+            continue
+        kept.append(Frame(index, time, _to_image(picture)))
+        if len(kept) > most:
+            stride *= 2
+            kept = [frame for frame in kept if frame.index % stride == 0]
+    return Sample(tuple(kept), count, decoded)
+
+
+def _open(path: Path) -> av.container.InputContainer:
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if not path.is_file():
+        raise InputError(f"{path}: not a file")
+    try:
+        if path.stat().st_size == 0:
+            raise InputError(f"{path}: empty file")
+        container = av.open(str(path), mode="r")
+    except (av.error.FFmpegError, OSError, ValueError) as error:
+        if path.suffix.lower() in (".mp4", ".mov") and is_cut_short(path):
+            raise InputError(f"{path}: truncated: its index is missing, no frame can be read") from error
+        reason = getattr(error, "strerror", None) or "unknown format"
+        raise InputError(f"{path}: not a readable video file ({reason})") from error
+    if not container.streams.video:
+        container.close()
+        raise InputError(f"{path}: no video stream in it")
+    return container
+
+
+def _decode(path: Path) -> Iterator[tuple[float, av.VideoFrame | None]]:
+    """Yield (time in s, picture or None) in the order of presentation.
+
+    Decoders drop some broken packets without an error, so every packet's timestamp is remembered until a picture
+    with that timestamp, or a later one, comes out: what is left behind was lost. Where a container gives packets
+    no presentation time (AVI with reordered frames), only a packet that raises is known to be lost.
+    """
+    with _open(path) as container:
+        stream = container.streams.video[0]
+        stream.codec_context.thread_type = "SLICE"
+        base = float(stream.time_base or 0.0)
+        pending: list[int] = []
+        broken: set[int] = set()
+        last: int | None = None
+        some = False
+
+        def row(pts: int, picture: av.VideoFrame | None) -> tuple[float, av.VideoFrame | None]:
+            nonlocal last, some
+            if last is not None and pts <= last:
+                raise InputError(f"{path}: timestamps do not increase at {pts * base:g} s")
+            last, some = pts, True
+            return pts * base, picture
+
+        for packet, pictures in _packets(path, container, stream):
+            stamp = packet.pts if packet.pts is not None else packet.dts
+            if packet.pts is not None:
+                heapq.heappush(pending, packet.pts)
+            if stamp is not None and (packet.is_corrupt or pictures is None):
+                broken.add(stamp)
+                if packet.pts is None:
+                    heapq.heappush(pending, stamp)
+            for picture in pictures or ():
+                pts = picture.pts if picture.pts is not None else picture.dts
+                if pts is None:
+                    raise InputError(f"{path}: frames without timestamps")
+                while pending and pending[0] < pts:
+                    yield row(heapq.heappop(pending), None)
+                if pending and pending[0] == pts:
+                    heapq.heappop(pending)
+                usable = not (picture.is_corrupt or pts in broken) and _same_size(picture, stream)
+                broken.discard(pts)
+                yield row(pts, picture if usable else None)
+        while pending:
+            yield row(heapq.heappop(pending), None)
+        if not some:
+            cut = is_cut_short(path)
+            raise InputError(f"{path}: truncated before its first frame" if cut else f"{path}: no frames in it")
+
+
+def _packets(
+    path: Path, container: av.container.InputContainer, stream: av.VideoStream
+) -> Iterator[tuple[av.Packet, list[av.VideoFrame] | None]]:
+    """Yield each packet with the pictures that came out after it, ``None`` where it could not be decoded."""
+    packets = container.demux(stream)
+    while True:
+        try:
+            packet = next(packets)
+        except StopIteration:
+            return
+        except av.error.FFmpegError as error:
+            if is_cut_short(path):
+                return
+            raise InputError(f"{path}: cannot be read to its end ({error.strerror})") from error
+        if packet.size == 0 and packet.dts is not None:
+            # An empty packet would flush the decoder; in AVI it stands for a frame that was dropped in recording.
+            yield packet, None
+            continue
+        try:
+            yield packet, packet.decode()
+        except av.error.EOFError:
+            return
+        except av.error.FFmpegError:
+            yield packet, None
+
+
+def _same_size(picture: av.VideoFrame, stream: av.VideoStream) -> bool:
+    return picture.width == stream.width and picture.height == stream.height
+
+
+def _to_image(picture: av.VideoFrame | None) -> Image | None:
+    return None if picture is None else picture.to_ndarray(format="bgr24")

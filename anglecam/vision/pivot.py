@@ -1,0 +1,204 @@
+"""The pivot: a round marker found by its symmetry, the centre of rotation of the mouth's path, or both together.
+
+Round marks, disc or rings, bright or dark, have edges whose gradients all point to or from one centre. Edge pixels
+vote for the centres they point at (Loy & Zelinsky 2003); then the centre is the point nearest to all gradient lines
+by weighted least squares (Parthasarathy 2012), which needs neither the marker's size nor its colour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.vision.circle import Circle
+
+Image = NDArray[np.uint8]
+Floats = NDArray[np.float64]
+
+_RADII_PX = np.arange(3, 25)
+_LEAST_COVERAGE = 0.6
+"""Share of a circle's circumference that must point at its centre."""
+_LINE_PX = 1.5
+"""A gradient line that passes the centre farther off than this belongs to something else."""
+_FLOOR_PX = 0.05
+"""Standard uncertainty of a marker's centre that no number of edge pixels improves: shading, chroma, codec."""
+_CORRELATED = 6.0
+"""Neighbouring gradients share their noise: the smoothing's area in pixels, by which the covariance is larger."""
+_SURE_RADIUS = 0.2
+"""Relative uncertainty of the path's radius above which its centre says nothing."""
+_DISAGREE = 9.21
+"""99 % point of χ² with two degrees of freedom."""
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A round mark."""
+
+    centre_px: Floats
+    """(2,) px."""
+    covariance_px2: Floats
+    """(2, 2) px²."""
+    radius_px: float
+    """Of its most complete edge, px."""
+
+
+@dataclass(frozen=True)
+class Pivot:
+    """Where the mechanism turns."""
+
+    centre_px: Floats
+    """(2,) px."""
+    covariance_px2: Floats
+    """(2, 2) px²."""
+    source: str
+    """``marker``, ``centre of rotation`` or ``marker and centre of rotation``."""
+
+
+def find_marker(image: Image, about_px: Floats | None, reach_px: float) -> Marker | None:
+    """Find the round mark nearest to where it is expected.
+
+    Parameters
+    ----------
+    image : ndarray
+        (h, w, 3) blue, green, red; the median of several frames shows what stands still.
+    about_px : ndarray, optional
+        (2,) where to look, px; without it the whole image is searched.
+    reach_px : float
+        Standard uncertainty of ``about_px``, px; marks beyond three times this are not considered.
+
+    Returns
+    -------
+    Marker or None
+        ``None`` where no circle is complete enough.
+    """
+    height, width = image.shape[:2]
+    x0, y0, x1, y1 = 0, 0, width, height
+    if about_px is not None:
+        half = 3.0 * reach_px + _RADII_PX[-1] + 4
+        x0, y0 = (max(int(v - half), 0) for v in about_px)
+        x1, y1 = min(int(about_px[0] + half), width), min(int(about_px[1] + half), height)
+        if x1 - x0 < 12 or y1 - y0 < 12:
+            return None
+    part = image[y0:y1, x0:x1]
+    gx, gy = _gradients(part)
+    prior = np.ones(gx.shape)
+    if about_px is not None:
+        yy, xx = np.mgrid[y0:y1, x0:x1]
+        away = ((xx - about_px[0]) ** 2 + (yy - about_px[1]) ** 2) / reach_px**2
+        prior = np.where(away <= 9.0, np.exp(-away / 8.0), 0.0)
+    best, radius, place = 0.0, 0.0, (0, 0)
+    for r, coverage in _coverages(part, gx, gy):
+        # A larger circle is a longer chance to fail, so of two equally complete ones it is the better found.
+        worth = np.where(coverage < _LEAST_COVERAGE, 0.0, (coverage - 0.5) * np.sqrt(r) * prior)
+        top = int(np.argmax(worth))
+        if worth.flat[top] > best:
+            row, column = np.unravel_index(top, worth.shape)
+            best, radius, place = float(worth.flat[top]), float(r), (int(column), int(row))
+    if best == 0.0:
+        return None
+    refined = _refine(gx, gy, np.array(place, float), radius)
+    if refined is None:
+        return None
+    centre, covariance = refined
+    return Marker(centre + [x0, y0], covariance, radius)
+
+
+def choose_pivot(marker: Marker | None, circle: Circle | None) -> tuple[Pivot | None, str | None]:
+    """Join marker and centre of rotation, each by its certainty, or take the motion's word where they disagree.
+
+    Parameters
+    ----------
+    marker : Marker, optional
+        The round mark, if one was found.
+    circle : Circle, optional
+        The mouth's path, if it moved.
+
+    Returns
+    -------
+    pivot : Pivot or None
+        ``None`` where there is neither.
+    note : str or None
+        What to report where they disagree by more than their uncertainties: then the centre of rotation is taken,
+        because about it the mouth keeps its distance.
+    """
+    if circle is not None and np.sqrt(circle.covariance_px2[2, 2]) > _SURE_RADIUS * circle.radius_px:
+        circle = None
+    if circle is None:
+        return (None if marker is None else Pivot(marker.centre_px, marker.covariance_px2, "marker")), None
+    turned = Pivot(circle.centre_px, circle.centre_covariance_px2, "centre of rotation")
+    if marker is None:
+        return turned, None
+    apart = marker.centre_px - circle.centre_px
+    spread = marker.covariance_px2 + circle.centre_covariance_px2
+    if apart @ np.linalg.solve(spread, apart) > _DISAGREE:
+        distance, sigma = float(np.hypot(*apart)), float(np.sqrt(np.trace(spread) / 2.0))
+        return turned, (
+            f"marker and centre of rotation are {distance:.2f} px apart (uncertainty {sigma:.2f} px);"
+            " the centre of rotation is used"
+        )
+    information = np.linalg.inv(marker.covariance_px2) + np.linalg.inv(circle.centre_covariance_px2)
+    covariance = np.linalg.inv(information)
+    centre = marker.centre_px - marker.covariance_px2 @ np.linalg.solve(spread, apart)
+    return Pivot(centre, covariance, "marker and centre of rotation"), None
+
+
+def _gradients(image: Image) -> tuple[Floats, Floats]:
+    """Return the gradient of whichever colour plane has the steepest one at each pixel, grey levels per px."""
+    smooth = cv2.GaussianBlur(image, (0, 0), 1.0).astype(np.float64)
+    gx = cv2.Scharr(smooth, cv2.CV_64F, 1, 0, scale=1 / 32)
+    gy = cv2.Scharr(smooth, cv2.CV_64F, 0, 1, scale=1 / 32)
+    steepest = np.argmax(gx**2 + gy**2, axis=2)[..., None]
+    return tuple(np.take_along_axis(g, steepest, axis=2)[..., 0] for g in (gx, gy))  # type: ignore[return-value]
+
+
+def _coverages(image: Image, gx: Floats, gy: Floats) -> Iterator[tuple[int, Floats]]:
+    """Yield, per radius, each centre's share of the circumference whose edge pixels point there with one sign."""
+    height, width = gx.shape
+    edges = np.maximum.reduce([cv2.Canny(p, 40, 80) for p in cv2.split(cv2.GaussianBlur(image, (0, 0), 1.0))])
+    y, x = np.nonzero(edges)
+    size = np.hypot(gx[y, x], gy[y, x]) + 1e-9
+    ux, uy = gx[y, x] / size, gy[y, x] / size
+    for r in _RADII_PX:
+        share = np.zeros((height, width))
+        for sign in (-1.0, 1.0):
+            cx, cy = np.round(x + sign * r * ux).astype(int), np.round(y + sign * r * uy).astype(int)
+            inside = (cx >= 0) & (cy >= 0) & (cx < width) & (cy < height)
+            count = np.bincount(cy[inside] * width + cx[inside], minlength=height * width)
+            # Directions are good to about a pixel at the centre, and Canny gives about one pixel per px of edge.
+            near = cv2.boxFilter(count.reshape(height, width).astype(np.float64), -1, (3, 3), normalize=False)
+            share = np.maximum(share, np.minimum(near / (2.0 * np.pi * r), 1.0))
+        yield int(r), share
+
+
+def _refine(gx: Floats, gy: Floats, centre: Floats, radius: float) -> tuple[Floats, Floats] | None:
+    """Solve for the point nearest to the gradient lines: minimise Σ |g|² (n·(c − p))², n ⟂ g."""
+    height, width = gx.shape
+    yy, xx = np.mgrid[0:height, 0:width]
+    strong = np.hypot(gx, gy)
+    covariance = None
+    for _ in range(10):
+        near = np.hypot(xx - centre[0], yy - centre[1])
+        pick = (near <= radius + 3.0) & (near >= 1.5) & (strong > 2.0)
+        p = np.column_stack([xx[pick], yy[pick]]).astype(float)
+        size = strong[pick]
+        normal = np.column_stack([-gy[pick], gx[pick]]) / size[:, None]
+        miss = ((centre - p) * normal).sum(axis=1)
+        keep = np.abs(miss) < _LINE_PX
+        if keep.sum() < 12:
+            return None
+        p, normal, weight = p[keep], normal[keep], size[keep] ** 2
+        N = (normal * weight[:, None]).T @ normal
+        target = (normal * (weight * (normal * p).sum(axis=1))[:, None]).sum(axis=0)
+        now = np.linalg.solve(N, target)
+        miss = ((now - p) * normal).sum(axis=1)
+        told = normal * (weight * miss)[:, None]
+        inverse = np.linalg.inv(N)
+        covariance = _CORRELATED * inverse @ (told.T @ told) @ inverse + _FLOOR_PX**2 * np.eye(2)
+        moved, centre = np.hypot(*(now - centre)), now
+        if moved < 1e-3:
+            break
+    return (centre, covariance) if covariance is not None else None

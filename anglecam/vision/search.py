@@ -1,0 +1,277 @@
+"""Find the mouth in a few frames of a clip: the patch of the right hue that travels on a circle.
+
+Nothing is known yet but a hue, so patches are cut out at several levels of it. A mug on the table has the mouth's
+colour but stays; a toy that swings by moves but keeps no distance from the pivot; a face moves with the mouth but
+is less red. What is left is told by how often it is seen, how constant it is in size, and how it stands out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.vision.circle import circle_through
+from anglecam.vision.colour import ColourModel, chroma_of, hue_contrast, learn_colour
+
+Image = NDArray[np.uint8]
+Floats = NDArray[np.float64]
+
+LEVELS = (0.3, 0.4, 0.5, 0.6, 0.7)
+"""Shares of the way from the picture's usual hue to its most mouth-like one at which patches are cut out."""
+SMALLEST_PX2 = 12.0
+"""A smaller patch has no centroid worth the name."""
+_LARGEST_SHARE = 0.04
+"""Of the picture; a mouth is smaller."""
+_LEAST_CONTRAST = 8.0
+"""Units of a*, b* by which the mouth's hue must stand out; JPEG's own chroma errors reach 3 or 4."""
+_TOLERANCE_PX = 2.0
+"""Coarse patches are placed this well."""
+_MOVED_PX = 4.0
+"""A path with a smaller extent counts as rest."""
+_HINT_PX = 30.0
+"""A hint at the pivot may be off by this much."""
+_PER_FRAME = 12
+_TRIALS = 600
+_HUE_TOLERANCE = np.radians(25.0)
+
+
+@dataclass(frozen=True)
+class Found:
+    """The mouth as the search found it."""
+
+    model: ColourModel
+    """Its colour, learnt from the clip."""
+    area_px2: float
+    """Its typical area in pixels, coarse."""
+    place_px: Floats
+    """(2,) its median place, px."""
+    circle: tuple[Floats, float] | None
+    """Coarse centre and radius of its path, px; ``None`` where it does not move."""
+
+
+@dataclass(frozen=True)
+class _Patches:
+    frame: NDArray[np.int64]
+    place: Floats
+    area: Floats
+    contrast: Floats
+    label: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class _Track:
+    score: float
+    level: float
+    members: NDArray[np.int64]
+    patches: _Patches
+    circle: tuple[Floats, float] | None
+
+
+def find_mouth(
+    images: Sequence[Image], rgb: tuple[int, int, int] | None, near_px: tuple[float, float] | None
+) -> Found | None:
+    """Find the mouth and learn its colour from frames spread over a clip.
+
+    Parameters
+    ----------
+    images : sequence of ndarray
+        (h, w, 3) frames, blue, green, red.
+    rgb : tuple of int, optional
+        The declared colour, good to some tens of grey levels; without it the mouth is the reddest thing, as
+        against skin, that moves.
+    near_px : tuple of float, optional
+        A hint at the pivot.
+
+    Returns
+    -------
+    Found or None
+        ``None`` where nothing stands out in hue, or what does stand still while other things move.
+    """
+    maps = [cv2.GaussianBlur(hue_contrast(image, rgb), (0, 0), 1.0) for image in images]
+    usual, top = _hue_range(maps)
+    if top - usual < _LEAST_CONTRAST:
+        return None
+    best: _Track | None = None
+    for share in LEVELS:
+        level = usual + share * (top - usual)
+        if level - usual < _LEAST_CONTRAST / 2.0:
+            continue
+        patches = _cut_out(maps, level, usual)
+        for track in (_moving_track(patches, maps, level, near_px), _resting_track(patches, images, level)):
+            if track is not None and (best is None or track.score > best.score):
+                best = track
+    if best is None:
+        return None
+    model = _learn(images, maps, best)
+    if model is None or (rgb is not None and not _same_hue(model.chroma, chroma_of(rgb))):
+        return None
+    area, place = best.patches.area[best.members], best.patches.place[best.members]
+    return Found(model, float(np.median(area)), np.median(place, axis=0), best.circle)
+
+
+def _hue_range(maps: Sequence[NDArray[np.float32]]) -> tuple[float, float]:
+    """Return the usual hue contrast of the picture, and the top one: of what changes, if enough does."""
+    stack_max = np.maximum.reduce(list(maps))
+    change = stack_max - np.minimum.reduce(list(maps))
+    usual = float(np.median(maps[0]))
+    moving = stack_max[change > _LEAST_CONTRAST]
+    tops = [np.partition(p.ravel(), -40)[-40] for p in (stack_max, moving) if p.size >= 40]
+    # What moves sets the scale, for a static thing may be far redder than the mouth.
+    return usual, float(tops[-1])
+
+
+def _cut_out(maps: Sequence[NDArray[np.float32]], level: float, usual: float) -> _Patches:
+    frame, place, area, contrast, label = [], [], [], [], []
+    for t, hue in enumerate(maps):
+        _, _, stats, centres = cv2.connectedComponentsWithStats((hue > level).astype(np.uint8), connectivity=8)
+        sizes = stats[:, cv2.CC_STAT_AREA]
+        largest = _LARGEST_SHARE * hue.size
+        fit = [k for k in np.argsort(-sizes) if k and SMALLEST_PX2 <= sizes[k] <= largest][:_PER_FRAME]
+        for k in fit:
+            x, y, w, h = stats[k, :4]
+            part = hue[y : y + h, x : x + w]
+            frame.append(t)
+            place.append(centres[k])
+            area.append(sizes[k])
+            contrast.append(np.percentile(part[part > level], 75) - usual)
+            label.append(k)
+    return _Patches(
+        np.array(frame, np.int64),
+        np.array(place, float).reshape(-1, 2),
+        np.array(area, float),
+        np.array(contrast, float),
+        np.array(label, np.int64),
+    )
+
+
+def _moving_track(
+    patches: _Patches, maps: Sequence[NDArray[np.float32]], level: float, near_px: tuple[float, float] | None
+) -> _Track | None:
+    """Find the circle on which one patch of constant size and colour travels, by random triples of patches."""
+    n = len(patches.frame)
+    frames = len(maps)
+    if n < 3 or frames < 3:
+        return None
+    diagonal = float(np.hypot(*maps[0].shape))
+    rng = np.random.default_rng(0)
+    hint = None if near_px is None else np.array(near_px)
+    best: _Track | None = None
+    seen: set[tuple[int, ...]] = set()
+    for _ in range(_TRIALS):
+        trio = rng.integers(0, n, 3)
+        key = tuple(sorted(trio))
+        if key in seen or len(set(patches.frame[trio])) < 3:
+            continue
+        seen.add(key)
+        size, tint = patches.area[trio], patches.contrast[trio]
+        if size.max() > 1.6 * size.min() or tint.max() > 1.5 * tint.min():
+            continue
+        p = patches.place[trio]
+        if min(np.hypot(*(p[i] - p[j])) for i, j in ((0, 1), (1, 2), (0, 2))) < _MOVED_PX / 2.0:
+            continue
+        centre, radius = circle_through(p)
+        if not np.isfinite(radius) or not 20.0 < radius < 1.5 * diagonal:
+            continue
+        if hint is not None and np.hypot(*(centre - hint)) > _HINT_PX:
+            # Three patches on a short arc leave the radius open: hold the centre at the hint instead.
+            centre, radius = hint, float(np.median(np.hypot(*(p - hint).T)))
+            if np.ptp(np.hypot(*(p - hint).T)) > 2.0 * _TOLERANCE_PX:
+                continue
+        track = _follow(patches, frames, level, centre, radius, float(np.median(size)), float(np.median(tint)))
+        if track is not None and (best is None or track.score > best.score):
+            best = track
+    return best
+
+
+def _follow(
+    patches: _Patches, frames: int, level: float, centre: Floats, radius: float, size: float, tint: float
+) -> _Track | None:
+    """Take from each frame the patch that lies on the circle and is most like the trio; score what comes out."""
+    off = np.abs(np.hypot(*(patches.place - centre).T) - radius)
+    unlike = np.abs(np.log(patches.area / size)) + np.abs(np.log(np.maximum(patches.contrast, 1e-3) / tint))
+    fit = np.flatnonzero((off < _TOLERANCE_PX) & (unlike < 0.6))
+    if len(fit) < 3:
+        return None
+    # the most alike of each frame: sort by likeness, keep the first of each frame
+    fit = fit[np.argsort(unlike[fit] + off[fit] / _TOLERANCE_PX)]
+    _, first = np.unique(patches.frame[fit], return_index=True)
+    members = fit[first]
+    place = patches.place[members]
+    extent = float(np.hypot(*np.ptp(place, axis=0)))
+    if extent < _MOVED_PX or len(members) < 3:
+        return None
+    return _Track(
+        _score(patches, members, frames, extent) * np.exp(-np.mean((off[members] / _TOLERANCE_PX) ** 2)),
+        level,
+        members,
+        patches,
+        (centre, radius),
+    )
+
+
+def _score(patches: _Patches, members: NDArray[np.int64], frames: int, extent: float) -> float:
+    """Seen in every frame, standing out in hue, constant in size, not tiny, and travelling."""
+    size = patches.area[members]
+    steady = np.exp(-4.0 * float(np.std(np.log(size))))
+    seen = len(set(patches.frame[members])) / frames
+    travel = 1.0 - np.exp(-extent / 10.0)
+    return float(seen**2 * np.median(patches.contrast[members]) * steady * np.median(size) ** 0.25 * (0.1 + travel))
+
+
+def _resting_track(patches: _Patches, images: Sequence[Image], level: float) -> _Track | None:
+    """Take the patch that stands out most in a clip in which nothing moves."""
+    if not len(patches.frame) or _something_moves(images):
+        return None
+    best: _Track | None = None
+    for seed in np.flatnonzero(patches.frame == patches.frame[0]):
+        near = np.hypot(*(patches.place - patches.place[seed]).T) < _MOVED_PX
+        alike = np.abs(np.log(patches.area / patches.area[seed])) < 0.4
+        members = np.flatnonzero(near & alike)
+        score = _score(patches, members, len(images), 0.0)
+        if best is None or score > best.score:
+            best = _Track(score, level, members, patches, None)
+    return best
+
+
+def _something_moves(images: Sequence[Image]) -> bool:
+    """Tell whether more than a mouth's worth of pixels changes, flicker of the light left out."""
+    small = [cv2.GaussianBlur(cv2.cvtColor(i, cv2.COLOR_BGR2GRAY), (0, 0), 2.0)[::2, ::2].astype(float) for i in images]
+    median = np.median(small, axis=0)
+    for picture in small:
+        gain = np.median((picture + 1.0) / (median + 1.0))
+        if (np.abs(picture - gain * median) > 12.0).mean() > 1e-3:
+            return True
+    return False
+
+
+def _learn(images: Sequence[Image], maps: Sequence[NDArray[np.float32]], track: _Track) -> ColourModel | None:
+    inside, around, elsewhere = [], [], []
+    for m in track.members:
+        t = int(track.patches.frame[m])
+        red = (maps[t] > track.level).astype(np.uint8)
+        _, labels = cv2.connectedComponents(red, connectivity=8)
+        own = (labels == track.patches.label[m]).astype(np.uint8)
+        core = cv2.erode(own, np.ones((3, 3), np.uint8))
+        core = core if core.sum() >= 6 else own
+        # Edge pixels are neither; then a collar as wide as the mouth, without other patches of the colour.
+        grown = cv2.dilate(own, np.ones((9, 9), np.uint8))
+        wide = 2 * max(8, round(float(np.sqrt(own.sum())) / 2.0)) + 1
+        collar = cv2.dilate(grown, np.ones((wide, wide), np.uint8)) - grown
+        collar &= 1 - cv2.dilate(red, np.ones((9, 9), np.uint8))
+        inside.append(images[t][core > 0])
+        around.append(images[t][collar > 0])
+        rest = np.s_[::8, ::8]
+        elsewhere.append(images[t][rest][cv2.dilate(red, np.ones((9, 9), np.uint8))[rest] == 0])
+    parts = [np.concatenate(p).astype(float) for p in (inside, around, elsewhere)]
+    return learn_colour(*parts) if all(len(p) >= 20 for p in parts) else None
+
+
+def _same_hue(chroma: Floats, declared: Floats) -> bool:
+    """Tell whether a colour is the declared one but for shading, which moves a*, b* along the hue."""
+    here, there = np.hypot(*chroma), np.hypot(*declared)
+    angle = np.arctan2(chroma[1], chroma[0]) - np.arctan2(declared[1], declared[0])
+    return bool(abs((angle + np.pi) % (2.0 * np.pi) - np.pi) < _HUE_TOLERANCE and 0.4 * there < here < 1.8 * there)

@@ -1,0 +1,157 @@
+"""One image to the regions that have the mouth's colour: the paper's threshold, Canny, fill, contour (Fig. 8 c–f).
+
+The contour says which pixels belong together; the place is then read from the grey levels: the centroid of the
+fraction of mouth in each pixel, which knows the edge to a small part of a pixel where a filled outline does not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.vision.colour import FULL, NONE, ColourModel
+
+Image = NDArray[np.uint8]
+Floats = NDArray[np.float64]
+
+_MARGIN_PX = 12
+"""Room around a region for the foot of its edges."""
+_FOOT_PX = 3
+"""Edges of a film reach this far from the half level: optics, chroma at half resolution, a codec's ringing."""
+_LOCAL_PX = 4.0
+"""Scale on which the values inside and outside of an edge are taken to be constant."""
+_PRIOR = np.float32(1e-3)
+"""Weight of the clip's own values (0 outside, 1 inside) where no pixel is near."""
+_MOST = 12
+"""Regions of one frame that are looked at, largest first."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """One connected patch of the mouth's colour in one frame."""
+
+    centre_px: Floats
+    """(2,) centroid of the fraction of mouth, px."""
+    area_px2: float
+    """Sum of that fraction, px²."""
+    moments_px2: Floats
+    """(2, 2) second central moments of that fraction, px²."""
+    noise_gain_px: float
+    """Standard deviation of the centroid (mean of x and y) for pixel noise of one grey level, px."""
+    contour_px: NDArray[np.int32]
+    """(k, 2) outline after threshold, Canny and fill."""
+    whole: bool
+    """False where the region touches the picture's edge or another region."""
+
+
+def find_regions(image: Image, model: ColourModel, smallest_px2: float) -> list[Region]:
+    """Find the regions of the mouth's colour in an image.
+
+    Parameters
+    ----------
+    image : ndarray
+        (h, w, 3) blue, green, red.
+    model : ColourModel
+        Which colour.
+    smallest_px2 : float
+        Regions with a smaller area above the half level are left out.
+
+    Returns
+    -------
+    list of Region
+        Largest first, at most 12.
+    """
+    fraction = model.fraction_map(image)
+    smooth = cv2.GaussianBlur(fraction, (3, 3), 0)
+    half = (NONE + FULL) / 2.0
+    core = (smooth >= half).astype(np.uint8)
+    n, labels, stats, _ = cv2.connectedComponentsWithStats(core, connectivity=8)
+    order = [k for k in np.argsort(-stats[:, cv2.CC_STAT_AREA]) if k and stats[k, cv2.CC_STAT_AREA] >= smallest_px2]
+    return [_measure(fraction, smooth, labels, stats[k], int(k), model) for k in order[:_MOST]]
+
+
+def _measure(
+    fraction: Image, smooth: Image, labels: NDArray[np.int32], stat: NDArray[np.int32], k: int, model: ColourModel
+) -> Region:
+    height, width = fraction.shape
+    left, top = stat[cv2.CC_STAT_LEFT], stat[cv2.CC_STAT_TOP]
+    right, bottom = left + stat[cv2.CC_STAT_WIDTH], top + stat[cv2.CC_STAT_HEIGHT]
+    cut = left <= 0 or top <= 0 or right >= width or bottom >= height
+    x0, y0 = max(left - _MARGIN_PX, 0), max(top - _MARGIN_PX, 0)
+    box = np.s_[y0 : min(bottom + _MARGIN_PX, height), x0 : min(right + _MARGIN_PX, width)]
+    own = (labels[box] == k).astype(np.uint8)
+    others = ((labels[box] != k) & (labels[box] > 0)).astype(np.uint8)
+    outline = _outline(smooth[box], own)
+    filled = cv2.drawContours(np.zeros_like(own), [outline], -1, 1, cv2.FILLED)
+    reach = _reach(smooth[box], filled, model)
+    near_others = cv2.dilate(others, _disc(_FOOT_PX))
+    touched = bool((reach & near_others).any())
+    reach &= 1 - near_others
+
+    low = min(0.4, max(0.1, 3.0 * model.noise))
+    cover = _cover(fraction[box], filled, reach | near_others)
+    weight = np.clip((cover - low) / (1.0 - 2.0 * low), 0.0, 1.0) * reach
+    # A highlight or the teeth inside the outline belong to the mouth: fill, away from the edge.
+    weight[cv2.erode(filled, _disc(_FOOT_PX)) > 0] = 1.0
+
+    y, x = np.mgrid[0 : own.shape[0], 0 : own.shape[1]].astype(np.float64)
+    area = float(weight.sum())
+    cx, cy = float((weight * x).sum() / area), float((weight * y).sum() / area)
+    dx, dy = x - cx, y - cy
+    xx, yy, xy = ((weight * m).sum() / area for m in (dx * dx, dy * dy, dx * dy))
+    soft = (weight > 0.0) & (weight < 1.0)
+    slope = float(np.linalg.norm(model.weights)) / (1.0 - 2.0 * low)
+    gain = slope / area * float(np.sqrt((dx[soft] ** 2 + dy[soft] ** 2).sum() / 2.0))
+    return Region(
+        centre_px=np.array([cx + x0, cy + y0]),
+        area_px2=area,
+        moments_px2=np.array([[xx, xy], [xy, yy]]),
+        noise_gain_px=gain,
+        contour_px=(outline.reshape(-1, 2) + [x0, y0]).astype(np.int32),
+        whole=not (cut or touched),
+    )
+
+
+def _outline(smooth: Image, own: Image) -> NDArray[np.int32]:
+    """Join the thresholded patch with the Canny edges that run along it, and take the outer contour."""
+    step = (FULL - NONE) / 2.0
+    edges = cv2.Canny(smooth, step, 2.0 * step) // 255
+    edges &= cv2.dilate(own, _disc(1))
+    contours, _ = cv2.findContours(own | edges, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    return max(contours, key=len)
+
+
+def _reach(smooth: Image, filled: Image, model: ColourModel) -> Image:
+    """Return the pixels that may hold some of the region: its foot, and the tail that motion blur draws from it."""
+    low = NONE + max(0.25, 4.0 * model.noise) * (FULL - NONE)
+    tail = ((smooth >= low) | (filled > 0)).astype(np.uint8)
+    _, labels = cv2.connectedComponents(tail, connectivity=8)
+    own = np.unique(labels[filled > 0])
+    connected = np.isin(labels, own[own > 0]).astype(np.uint8)
+    return cv2.dilate(connected, _disc(_FOOT_PX))
+
+
+def _cover(fraction: Image, filled: Image, reach: Image) -> NDArray[np.float32]:
+    """Return how much of each pixel is mouth, measured between the values just inside and just outside of there.
+
+    One scale for the whole picture would let the edge wander as bright and dark wallpaper pass behind it.
+    """
+    value = (fraction.astype(np.float32) - NONE) / (FULL - NONE)
+    inside = cv2.erode(filled, _disc(2)).astype(np.float32)
+    outside = (1 - reach).astype(np.float32)
+    within = _spread(value * inside + _PRIOR, _PRIOR + inside)
+    without = _spread(value * outside, _PRIOR + outside)
+    return (value - without) / np.maximum(within - without, 0.3)
+
+
+def _spread(value: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Smooth known values into where none is known (normalised convolution, Knutsson & Westin 1993)."""
+    return cv2.GaussianBlur(value, (0, 0), _LOCAL_PX) / cv2.GaussianBlur(weight, (0, 0), _LOCAL_PX)
+
+
+def _disc(radius_px: int) -> Image:
+    size = 2 * radius_px + 1
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))

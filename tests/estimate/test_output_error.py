@@ -1,0 +1,61 @@
+"""Output error against plants whose parameters are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anglecam.estimate.output_error import fit_output_error, predict_output_error
+from anglecam.estimate.start import start_parameters
+from anglecam.identify import identify_records
+from anglecam.rig import Rig
+from anglecam.simulate.plant import Plant
+from support.motion import Plant as TruePlant
+from support.motion import Recording
+from support.series import record, session
+
+TRUE = np.array([26.0, 524.0, 508.0])
+
+
+def test_a_b_c_lie_within_their_stated_uncertainty():
+    normalised = []
+    for seed in range(20):
+        records = session(TruePlant(), seed, sigma_deg=0.2)
+        fit = fit_output_error(Plant(), records, start_parameters(records))
+        normalised.append((fit.parameters - TRUE) / fit.sigma)
+    spread = np.std(normalised, axis=0)
+    assert np.all((spread > 0.6) & (spread < 1.45)), spread  # 99 % limits of a standard deviation over 20 draws
+
+
+@pytest.mark.parametrize(
+    "plant", [TruePlant(2.0, 40.0, 38.0), TruePlant(8.0, 150.0, 300.0), TruePlant(60.0, 900.0, 880.0)]
+)
+def test_no_guess_is_needed_to_find_another_plant(plant):
+    records = session(plant, 1)
+    fit = fit_output_error(Plant(), records, start_parameters(records))
+    assert fit.parameters == pytest.approx([plant.a, plant.b, plant.c], rel=0.01)
+
+
+def test_coloured_noise_is_counted_as_fewer_observations():
+    normalised = []
+    for seed in range(20):
+        records = session(TruePlant(), seed, sigma_deg=0.2, phi=0.6)
+        model = identify_records(records, Rig(), "oe2")
+        normalised.append((model.values - TRUE) / model.sigmas)
+    spread = np.std(normalised, axis=0)
+    assert np.all((spread > 0.6) & (spread < 1.45)), spread
+
+
+def test_a_free_swing_is_fitted_from_an_unknown_state():
+    swing = Recording("release", "release", amplitude_deg=15.0, rest_s=0.0)
+    true = TruePlant(a=0.4, b=30.0)
+    records = [record(true, swing, np.random.default_rng(0), sigma_deg=0.1)]
+    model = identify_records(records, Rig(), "oe2")
+    assert model.values == pytest.approx([0.4, 30.0], rel=0.02)
+    assert model.as_dict()["parameters"].keys() >= {"a_per_s", "b_per_s2", "c_per_s2"}
+
+
+def test_prediction_of_a_held_out_recording_leaves_the_noise():
+    *fitted, held_out = session(TruePlant(), 3, sigma_deg=0.1)
+    fit = fit_output_error(Plant(), fitted, start_parameters(fitted))
+    assert np.degrees(predict_output_error(fit, [held_out]).rmse) == pytest.approx(0.1, rel=0.1)
