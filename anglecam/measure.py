@@ -31,6 +31,8 @@ Floats = NDArray[np.float64]
 _SAMPLE_BYTES = 100_000_000
 """Memory for the frames of the first pass."""
 _SAMPLES = 32
+_STILL = 9
+"""Frames whose median shows what does not move."""
 _SMALLEST_SHARE = 0.25
 """Of the mouth's area; a smaller region is no mouth even if partly hidden."""
 _HINT_PX = 10.0
@@ -155,7 +157,8 @@ def _read_regions(
 def _find_pivot_marker(images: Sequence[NDArray[np.uint8]], rig: Rig, circle: Circle | None) -> Marker | None:
     if rig.pivot.marker == "none":
         return None
-    still = np.median(np.stack(images), axis=0).astype(np.uint8)
+    few = images[:: max(1, len(images) // _STILL)]
+    still = np.median(np.stack(few), axis=0).astype(np.uint8)
     if rig.pivot.near is not None:
         return find_marker(still, np.array(rig.pivot.near), _HINT_PX)
     if circle is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -24,7 +25,7 @@ from anglecam.series import AngleSeries
 Floats = NDArray[np.float64]
 
 MEASURED, BEFORE, AFTER, COMMAND, FAINT = "#1b1f24", "#c4432b", "#1f6f8b", "#9aa3ad", "#d9dee3"
-STYLE = {
+STYLE: Any = {
     "font.size": 9,
     "font.family": "DejaVu Sans",
     "axes.spines.top": False,

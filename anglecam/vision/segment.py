@@ -25,6 +25,8 @@ _LOCAL_PX = 4.0
 """Scale on which the values inside and outside of an edge are taken to be constant."""
 _PRIOR = np.float32(1e-3)
 """Weight of the clip's own values (0 outside, 1 inside) where no pixel is near."""
+_FEWEST_EDGE_PX = 8
+"""A patch with a shorter outline is a speck."""
 _MOST = 12
 """Regions of one frame that are looked at, largest first."""
 
@@ -57,7 +59,7 @@ def find_regions(image: Image, model: ColourModel, smallest_px2: float) -> list[
     model : ColourModel
         Which colour.
     smallest_px2 : float
-        Regions with a smaller area above the half level are left out.
+        Regions with a smaller area within the half level's contour are left out.
 
     Returns
     -------
@@ -68,29 +70,28 @@ def find_regions(image: Image, model: ColourModel, smallest_px2: float) -> list[
     smooth = cv2.GaussianBlur(fraction, (3, 3), 0)
     half = (NONE + FULL) / 2.0
     core = (smooth >= half).astype(np.uint8)
-    n, labels, stats, _ = cv2.connectedComponentsWithStats(core, connectivity=8)
-    order = [k for k in np.argsort(-stats[:, cv2.CC_STAT_AREA]) if k and stats[k, cv2.CC_STAT_AREA] >= smallest_px2]
-    return [_measure(fraction, smooth, labels, stats[k], int(k), model) for k in order[:_MOST]]
+    patches, _ = cv2.findContours(core, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    sized = sorted(((cv2.contourArea(p), k) for k, p in enumerate(patches) if len(p) >= _FEWEST_EDGE_PX), reverse=True)
+    large = [patches[k] for area, k in sized[:_MOST] if area >= smallest_px2]
+    return [_measure(fraction, smooth, core, patch, model) for patch in large]
 
 
-def _measure(
-    fraction: Image, smooth: Image, labels: NDArray[np.int32], stat: NDArray[np.int32], k: int, model: ColourModel
-) -> Region:
+def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[np.int32], model: ColourModel) -> Region:
     height, width = fraction.shape
-    left, top = stat[cv2.CC_STAT_LEFT], stat[cv2.CC_STAT_TOP]
-    right, bottom = left + stat[cv2.CC_STAT_WIDTH], top + stat[cv2.CC_STAT_HEIGHT]
+    left, top, across, down = cv2.boundingRect(patch)
+    right, bottom = left + across, top + down
     cut = left <= 0 or top <= 0 or right >= width or bottom >= height
     x0, y0 = max(left - _MARGIN_PX, 0), max(top - _MARGIN_PX, 0)
     box = np.s_[y0 : min(bottom + _MARGIN_PX, height), x0 : min(right + _MARGIN_PX, width)]
-    own = (labels[box] == k).astype(np.uint8)
-    others = ((labels[box] != k) & (labels[box] > 0)).astype(np.uint8)
+    own = np.zeros_like(core[box])
+    cv2.drawContours(own, [patch], -1, 1, cv2.FILLED, offset=(-x0, -y0))
+    others = core[box] & (1 - own)
     outline = _outline(smooth[box], own)
     filled = cv2.drawContours(np.zeros_like(own), [outline], -1, 1, cv2.FILLED)
     reach = _reach(smooth[box], filled, model)
     near_others = cv2.dilate(others, _disc(_FOOT_PX))
     touched = bool((reach & near_others).any())
     reach &= 1 - near_others
-
     low = min(0.4, max(0.1, 3.0 * model.noise))
     cover = _cover(fraction[box], filled, reach | near_others)
     weight = np.clip((cover - low) / (1.0 - 2.0 * low), 0.0, 1.0) * reach
@@ -129,8 +130,10 @@ def _reach(smooth: Image, filled: Image, model: ColourModel) -> Image:
     low = NONE + max(0.25, 4.0 * model.noise) * (FULL - NONE)
     tail = ((smooth >= low) | (filled > 0)).astype(np.uint8)
     _, labels = cv2.connectedComponents(tail, connectivity=8)
-    own = np.unique(labels[filled > 0])
-    connected = np.isin(labels, own[own > 0]).astype(np.uint8)
+    is_own = np.zeros(labels.max() + 1, np.uint8)
+    is_own[labels[filled > 0]] = 1
+    is_own[0] = 0
+    connected = is_own[labels]
     return cv2.dilate(connected, _disc(_FOOT_PX))
 
 

@@ -1,0 +1,48 @@
+"""The command ``synth``: render a session, score what was found in it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from synth.render import RenderError
+from synth.score import score
+from synth.session import render
+from synth.spec import SpecError
+
+app = typer.Typer(add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False)
+
+
+@app.command("render")
+def render_command(
+    spec: Annotated[Path, typer.Argument(help="what is to be filmed, YAML")],
+    out: Annotated[Path, typer.Option(help="folder for the session")],
+    truth: Annotated[Path, typer.Option(help="folder for the truth, apart from --out")],
+) -> None:
+    """Render a session of clips whose truth is known and kept apart."""
+    render(spec, out, truth)
+
+
+@app.command("score")
+def score_command(
+    result: Annotated[Path, typer.Argument(help="folder that anglecam wrote")],
+    truth: Annotated[Path, typer.Option(help="folder of the truth")],
+) -> None:
+    """Hold what anglecam found against the truth."""
+    score(result, truth, Console())
+
+
+def main() -> None:
+    """Run the command; one line on stderr and exit status 2 for a wrong spec, 1 for a machine that cannot draw."""
+    try:
+        app()
+    except SpecError as error:
+        print(error, file=sys.stderr)
+        sys.exit(2)
+    except (RenderError, OSError) as error:
+        print(error, file=sys.stderr)
+        sys.exit(1)

@@ -1,0 +1,69 @@
+"""Command rows, exactly as they are written to the command file: what the file says is what the plant gets."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synth.spec import Chirp, Free, RandomSteps, Recording, Release, Stairs, Step, Triangle
+
+Floats = NDArray[np.float64]
+
+UPDATE_S = 0.02
+"""A servo takes a new position 50 times a second: smooth commands are stairs of this tread."""
+
+
+def command_rows(recording: Recording, seed: np.random.SeedSequence) -> Floats | None:
+    """Work out the command of one recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Its kind and numbers.
+    seed : numpy.random.SeedSequence
+        Where random steps come from.
+
+    Returns
+    -------
+    ndarray or None
+        Rows (time_s, command_deg), each held until the next; ``None`` where nothing is commanded.
+    """
+    command, end = recording.command, recording.duration_s
+    start = command.rest_s
+    match command:
+        case Free():
+            return None
+        case Step():
+            changes = [(start, command.amplitude_deg)]
+        case Release():
+            changes = [(start, command.amplitude_deg), (start + command.hold_s, 0.0)]
+        case Stairs():
+            changes = [(start + k * command.tread_s, level) for k, level in enumerate(command.levels_deg)]
+        case RandomSteps():
+            changes = _random_steps(command, end, np.random.default_rng(seed))
+        case Triangle() | Chirp():
+            since = np.arange(0.0, max(end - start, 0.0), UPDATE_S)
+            # The level of the middle of each tread, so that the stairs neither lead nor lag the smooth curve.
+            levels = _smooth(command, since + UPDATE_S / 2, end - start)
+            changes = list(zip(start + since, levels, strict=True))
+    rows = np.array([(0.0, 0.0), *changes])
+    # Rounded here, once: the file and the plant must not differ by a digit.
+    return np.round(rows[rows[:, 0] < end], 6)
+
+
+def _random_steps(command: RandomSteps, end: float, rng: np.random.Generator) -> list[tuple[float, float]]:
+    changes, time = [], command.rest_s
+    while time < end:
+        changes.append((time, rng.uniform(-1.0, 1.0) * command.amplitude_deg))
+        time += rng.uniform(command.shortest_s, command.longest_s)
+    return changes
+
+
+def _smooth(command: Triangle | Chirp, since: Floats, span: float) -> Floats:
+    if isinstance(command, Triangle):
+        phase = 2 * math.pi * since / command.period_s
+        return np.asarray(command.amplitude_deg * (2 / math.pi) * np.arcsin(np.sin(phase)))
+    growth = (command.to_hz - command.from_hz) / span
+    return np.asarray(command.amplitude_deg * np.sin(2 * math.pi * (command.from_hz + growth * since / 2) * since))

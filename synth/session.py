@@ -1,0 +1,100 @@
+"""A spec into a session that anyone may see, and a truth that stays apart from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from synth.clip import UNFINISHED, clip_writer, file_name
+from synth.render import Shot, Studio, workers
+from synth.spec import SpecError, read_spec
+from synth.truth import Take, perform, view, write_truth
+
+
+def render(path: Path, out: Path, truth: Path) -> None:
+    """Render a session.
+
+    Parameters
+    ----------
+    path : Path
+        The spec.
+    out : Path
+        Folder for clips, commands and ``rig.yaml``; gets nothing of the truth.
+    truth : Path
+        Folder for the truth, neither the same nor inside one another.
+
+    Raises
+    ------
+    SpecError
+        If the spec is wrong, the folders are not apart or not free, or a motion is beyond the mechanism.
+    RenderError
+        If this machine cannot draw off-screen.
+    """
+    spec = read_spec(path)
+    seen = view(spec)
+    try:
+        takes = perform(spec, seen)
+    except SpecError as error:
+        raise SpecError(f"{path}: {error}") from error
+    session = {"rig.yaml"} | {file_name(take.recording.name, spec.camera) for take in takes}
+    session |= {f"{take.recording.name}.command.csv" for take in takes if take.command is not None}
+    secret = {"truth.json"} | {f"{take.recording.name}.truth.csv" for take in takes}
+    _apart(out, truth)
+    for folder, ours in ((out, session), (truth, secret)):
+        _free(folder, ours)
+
+    write_truth(truth, spec, seen, takes)
+    (out / "rig.yaml").write_text(yaml.safe_dump(spec.declare, sort_keys=False), encoding="utf-8")
+    for take in takes:
+        if take.command is not None:
+            _write_command(out / f"{take.recording.name}.command.csv", take)
+
+    shot = Shot(spec.rig, seen.pinhole, spec.camera.noise_grey, spec.seed)
+    total = sum(len(take.angles) for take in takes)
+    with _progress() as progress, Studio(shot, min(workers(), total)) as studio:
+        bar = progress.add_task("render", total=total)
+        for number, take in enumerate(takes):
+            progress.update(bar, description=f"render {take.recording.name}")
+            with clip_writer(out / file_name(take.recording.name, spec.camera), spec.camera) as write:
+                for frame in studio.film(number, take.angles.tolist()):
+                    write(frame)
+                    progress.advance(bar)
+
+
+def _write_command(path: Path, take: Take) -> None:
+    assert take.command is not None
+    lines = [f"{time:.6f},{level:.6f}" for time, level in np.asarray(take.command)]
+    path.write_text("\n".join(["time_s,command_deg", *lines]) + "\n", encoding="utf-8")
+
+
+def _apart(out: Path, truth: Path) -> None:
+    here, there = out.resolve(), truth.resolve()
+    if here == there or here in there.parents or there in here.parents:
+        raise SpecError(f"--truth {truth}: must be neither --out nor inside it nor around it, or the truth leaks")
+
+
+def _free(folder: Path, ours: set[str]) -> None:
+    """Make a folder; refuse one in which older files would mix with ours."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        there = {path.name for path in folder.iterdir() if not path.name.startswith(UNFINISHED)}
+    except OSError as error:
+        raise SpecError(f"{folder}: cannot be used ({error.strerror})") from error
+    if foreign := sorted(there - ours):
+        raise SpecError(f"{folder}: holds {foreign[0]}, which is not of this session; give an empty folder")
+
+
+def _progress() -> Progress:
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("frames"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+    )

@@ -1,0 +1,74 @@
+from pathlib import Path
+
+import pytest
+import yaml
+
+from synth.spec import SpecError, read_spec
+
+GOOD = {"recordings": [{"name": "a", "duration_s": 1.0, "command": {"kind": "step"}}]}
+
+
+def written(folder: Path, **changes) -> Path:
+    path = folder / "spec.yaml"
+    path.write_text(yaml.safe_dump({**GOOD, **changes}))
+    return path
+
+
+@pytest.mark.parametrize("path", sorted(Path(__file__).parents[2].glob("configs/*.yaml")), ids=lambda path: path.name)
+def test_every_spec_that_we_ship_is_valid(path):
+    read_spec(path)
+
+
+def test_defaults_are_the_papers_neck(tmp_path):
+    spec = read_spec(written(tmp_path))
+    assert (spec.plant.a, spec.plant.b, spec.plant.c) == (26.0, 524.0, 508.0)
+    assert (spec.rig.linkage.ground, spec.rig.linkage.coupler) == (0.055, 0.041)
+    assert spec.seed == 0
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"effect": {}}, "unknown key effect"),
+        ({"camera": {"fps": 0}}, "camera.fps"),
+        ({"camera": {"size": [641, 480]}}, "even width"),
+        ({"plant": {"b": -1}}, "plant.b"),
+        ({"plant": {"mass": 1}}, "unknown key plant.mass"),
+        ({"effects": {"gremlins": {}}}, "unknown key effects.gremlins"),
+        ({"effects": {"coulomb_friction": {"torque": 2.0, "breakaway": 1.0}}}, "effects.coulomb_friction: breakaway"),
+        ({"effects": {"dead_time": {}}}, "effects.dead_time.tau_s"),
+        ({"effects": {"dead_time": {"tau_s": float("nan")}}}, "effects.dead_time.tau_s"),
+        ({"rig": {"linkage": {"crank": 0.2}}}, "rig: linkage: the four links cannot close"),
+        ({"rig": {"linkage": {"lever": 0.2}}}, "unknown key rig.linkage.lever"),
+        ({"recordings": []}, "recordings"),
+        ({"recordings": 2 * GOOD["recordings"]}, "the name a stands twice"),
+        (
+            {"recordings": [{"name": "a", "duration_s": 1, "command": {"kind": "step", "hz": 3}}]},
+            "unknown key recordings.0.command.hz",
+        ),
+        (
+            {"recordings": [{"name": "../a", "duration_s": 1, "command": {"kind": "step"}}]},
+            "recordings.0.name",
+        ),
+        (
+            {"recordings": [{"name": "a", "duration_s": 1, "command": {"kind": "step", "rest_s": 0.1}}]},
+            "recordings.0.command.rest_s",
+        ),
+    ],
+)
+def test_a_bad_spec_is_one_line_with_file_and_key(tmp_path, changes, key):
+    path = written(tmp_path, **changes)
+    with pytest.raises(SpecError) as caught:
+        read_spec(path)
+    line = str(caught.value)
+    assert line.startswith(f"{path}: ")
+    assert key in line
+    assert "\n" not in line
+
+
+@pytest.mark.parametrize("content", [b"recordings: [", b"- 1\n", b"\xff\xfe\x00", b"", b"a: 2020-13-45\n"])
+def test_what_is_no_spec_at_all_is_one_line_too(tmp_path, content):
+    path = tmp_path / "spec.yaml"
+    path.write_bytes(content)
+    with pytest.raises(SpecError, match=r"spec\.yaml: "):
+        read_spec(path)

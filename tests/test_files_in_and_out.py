@@ -1,0 +1,138 @@
+"""Series, commands and rig files: what is written can be read back, and what is wrong is said in one line."""
+
+from __future__ import annotations
+
+import csv
+
+import numpy as np
+import pytest
+
+from anglecam.errors import InputError, RigError
+from anglecam.rig import read_rig
+from anglecam.series import COLUMNS, AngleSeries, read_series, write_series
+from anglecam.session import Command, read_command, read_session
+from support import broken
+
+
+def _series(n: int = 30) -> AngleSeries:
+    time = np.arange(n) / 30.0
+    angle = np.radians(10.0 * np.sin(time))
+    angle[4] = np.nan
+    status = tuple("occluded" if i == 4 else "ok" for i in range(n))
+    mouth = np.column_stack([400.0 + time, 200.0 - time])
+    mouth[4] = np.nan
+    pivot = np.where(np.isnan(mouth), np.nan, [200.0, 300.0])
+    bounds = {r: np.where(np.isnan(angle), np.nan, np.arcsin(r / 220.0)) for r in (6.0, 8.0, 10.0)}
+    sigma = np.where(np.isnan(angle), np.nan, np.radians(0.01))
+    return AngleSeries("clip", time, angle, sigma, status, angle + 0.1, mouth, pivot, bounds)
+
+
+def test_a_series_reads_back_as_it_was_written(tmp_path):
+    series = _series()
+    path = tmp_path / "clip.angles.csv"
+    write_series(series, path)
+    back = read_series(path)
+    assert back.name == "clip"
+    assert back.status == series.status
+    np.testing.assert_allclose(back.time, series.time, rtol=1e-8)
+    np.testing.assert_allclose(back.angle, series.angle, atol=np.radians(1e-6))
+    np.testing.assert_allclose(back.mouth_px, series.mouth_px, atol=1e-4)
+
+
+def test_columns_are_the_contracts_and_an_unmeasured_row_is_empty(tmp_path):
+    path = tmp_path / "clip.angles.csv"
+    write_series(_series(), path)
+    header, *rows = list(csv.reader(path.open()))
+    assert tuple(header[: len(COLUMNS)]) == COLUMNS
+    assert header[len(COLUMNS) :] == ["bound_8px_deg"]
+    assert rows[4][0] == "4"
+    assert rows[4][2:11] == [""] * 9
+    assert rows[4][11] == "occluded"
+    assert float(rows[5][4]) == pytest.approx(np.degrees(np.arcsin(6 / 220)), abs=1e-4)
+
+
+def test_a_bare_series_from_elsewhere_is_enough(tmp_path):
+    path = tmp_path / "encoder.angles.csv"
+    path.write_text("time_s,angle_deg,note\n0,1.5,a\n0.5,2.5,b\n1.0,,c\n1.5,3,d\n")
+    series = read_series(path)
+    assert list(series.ok) == [True, True, False, True]
+    assert np.degrees(series.angle[1]) == pytest.approx(2.5)
+    assert np.isnan(series.sigma).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "empty file"),
+        ("time_s,angle\n0,1\n", "no column angle_deg"),
+        ("time_s,angle_deg\n", "no rows"),
+        ("time_s,angle_deg\n0,1\n1,two\n2,3\n", "line 3: angle_deg is 'two'"),
+        ("time_s,angle_deg\n0,1\n2,1\n1,3\n", "times must increase"),
+        ("time_s,angle_deg\n0,1\n2\n", "line 3 has 1 cells"),
+        ("time_s,angle_deg\n0,inf\n1,1\n2,2\n", "not a number"),
+    ],
+)
+def test_a_bad_series_is_one_line_with_file_and_cause(tmp_path, text, says):
+    path = tmp_path / "bad.angles.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as error:
+        read_series(path)
+    message = str(error.value)
+    assert str(path) in message
+    assert says in message
+    assert "\n" not in message
+
+
+def test_a_command_is_held_until_its_next_row():
+    command = Command(np.array([0.0, 1.0, 2.0]), np.array([0.0, 0.0, 0.3]))
+    assert command.first_change() == 2.0
+    assert list(command.at(np.array([-1.0, 1.999, 2.0, 9.0]))) == [0.0, 0.0, 0.3, 0.3]
+    assert Command(np.array([0.0, 1.0]), np.array([0.1, 0.1])).first_change() is None
+
+
+def test_bad_commands_are_one_line(tmp_path):
+    for path in (broken.command_with_unreadable_rows(tmp_path, "a"), broken.command_backwards(tmp_path, "b")):
+        with pytest.raises(InputError) as error:
+            read_command(path)
+        assert str(path) in str(error.value)
+        assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("moth: auto", "unknown key moth"),
+        ("pivot: {near: [1, 2], marker: auto, radius: 3}", "unknown key pivot.radius"),
+        ("mouth: {rgb: [1, 2, 300]}", "mouth.rgb"),
+        ("facing: up", "facing"),
+        ("pixel_error_px: [6, -1]", "pixel_error_px"),
+        ("- a\n- b", "expected keys and values"),
+        ("a: [1, 2", "not YAML"),
+        ("neutral: .nan", "neutral"),
+    ],
+)
+def test_a_bad_rig_file_names_its_key(tmp_path, text, says):
+    path = tmp_path / "rig.yaml"
+    path.write_text(text)
+    with pytest.raises(RigError) as error:
+        read_rig(path)
+    assert str(path) in str(error.value)
+    assert says in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_one_bad_command_costs_its_recording_only(tmp_path):
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.angles.csv").write_text("time_s,angle_deg\n0,1\n1,2\n2,3\n")
+    broken.command_backwards(tmp_path, "b")
+    session = read_session(tmp_path)
+    assert [r.name for r in session.recordings] == ["a"]
+    assert len(session.problems) == 1
+    assert "b.command.csv" in str(session.problems[0])
+
+
+def test_a_held_out_name_that_is_no_recording_is_the_rigs_fault(tmp_path):
+    (tmp_path / "a.angles.csv").write_text("time_s,angle_deg\n0,1\n1,2\n2,3\n")
+    (tmp_path / "rig.yaml").write_text("held_out: [nowhere]")
+    with pytest.raises(RigError, match="held_out names nowhere"):
+        read_session(tmp_path)
