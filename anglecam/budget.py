@@ -16,6 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+_FAR = 4.0
+"""Standard deviations beyond which a place's distance from the circle is told for that frame alone."""
+
 
 def worst_case(radius_px: float, lever_px: ArrayLike) -> NDArray[np.float64]:
     """Return the largest angle error of a lever whose one end lies anywhere within a circle: asin(r/R).
@@ -60,13 +63,16 @@ class PlaceErrors:
     """How wrong the mouth's place is, in two parts."""
 
     noise_px: NDArray[np.float64]
-    """(n,) standard deviation, along any one direction, that differs from frame to frame even at rest, px."""
+    """(n,) standard deviation along the path of what differs from frame to frame even at rest, px."""
     pose_px: float
     """Standard deviation of what depends on the pose alone, the same whenever the mouth is in that place, px."""
 
 
 def place_errors(
-    mouth_px: NDArray[np.float64], off_px: NDArray[np.float64], predicted_px: NDArray[np.float64]
+    mouth_px: NDArray[np.float64],
+    off_px: NDArray[np.float64],
+    across_px: NDArray[np.float64],
+    along_px: NDArray[np.float64],
 ) -> PlaceErrors:
     """Tell how well the mouth is placed from its distance to the pivot, which motion does not change.
 
@@ -79,8 +85,9 @@ def place_errors(
         (n, 2) places, px.
     off_px : ndarray
         (n,) distance from the pivot less the fitted radius, px.
-    predicted_px : ndarray
-        (n,) standard deviation that the noise of the pixels alone would give, px; sets the share of each frame.
+    across_px, along_px : ndarray
+        (n,) standard deviations that the noise of the pixels alone would give, px, along the lever and along the
+        path; they set the share of each frame, and how much less or more the noise is along the path.
 
     Returns
     -------
@@ -90,16 +97,23 @@ def place_errors(
     _, pose, count = np.unique(np.round(mouth_px).astype(int), axis=0, return_inverse=True, return_counts=True)
     pose = pose.reshape(-1)
     mean = np.bincount(pose, off_px) / count
-    freedom = len(off_px) - len(count)
-    share = (predicted_px / np.median(predicted_px)) ** 2
-    noise2 = float(np.median(predicted_px)) ** 2
-    if freedom >= 10:
-        noise2 = float((((off_px - mean[pose]) ** 2) / share).sum()) / freedom
+    share = (across_px / np.median(across_px)) ** 2
+    noise2 = float(np.median(across_px)) ** 2
+    repeats = (off_px - mean[pose])[count[pose] > 1] / np.sqrt(share * (1.0 - 1.0 / count[pose]))[count[pose] > 1]
+    if len(repeats) >= 20:
+        noise2 = (1.4826 * float(np.median(np.abs(repeats)))) ** 2
     fitted = 3  # centre and radius have taken their part of the scatter
-    if len(count) <= 2 * fitted:
-        return PlaceErrors(np.sqrt(noise2 * share), 0.0)
-    between = float((mean**2).sum()) / (len(count) - fitted)
-    return PlaceErrors(np.sqrt(noise2 * share), float(np.sqrt(max(between - noise2 * float((1 / count).mean()), 0.0))))
+    pose2 = 0.0
+    if len(count) > 2 * fitted:
+        robust = 1.4826 * float(np.median(np.abs(mean - np.median(mean))))
+        inlying = np.abs(mean - np.median(mean)) <= _FAR * max(robust, np.sqrt(noise2))
+        between = float((mean[inlying] ** 2).sum()) / max(int(inlying.sum()) - fitted, 1)
+        pose2 = max(between - noise2 * float((1 / count[inlying]).mean()), 0.0)
+    # A place far off the circle is wrong by that much in one direction, and may be in the other.
+    usual = np.sqrt(noise2 * share + pose2)
+    far = np.where(np.abs(off_px) > _FAR * usual, np.abs(off_px), 0.0)
+    noise = np.sqrt(noise2 * share) * along_px / across_px
+    return PlaceErrors(np.hypot(noise, far), float(np.sqrt(pose2)))
 
 
 def angle_sigma(

@@ -6,6 +6,7 @@ pivot's marker are learnt; the second finds the mouth in every frame.
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from anglecam.errors import InputError
 from anglecam.rig import Rig
 from anglecam.series import CONTRACT_RADII_PX, OK, AngleSeries
 from anglecam.session import Command, recording_name
-from anglecam.video.frames import Sample, inspect_clip, read_frames, sample_frames
+from anglecam.video.frames import Image, Sample, inspect_clip, read_frames, sample_frames
 from anglecam.vision.circle import Circle
 from anglecam.vision.pivot import Marker, Pivot, choose_pivot, find_marker
 from anglecam.vision.search import Found, find_mouth
@@ -154,7 +155,7 @@ def _read_regions(
     return np.array(time), candidates, decoded, np.array(repeated)
 
 
-def _find_pivot_marker(images: Sequence[NDArray[np.uint8]], rig: Rig, circle: Circle | None) -> Marker | None:
+def _find_pivot_marker(images: Sequence[Image], rig: Rig, circle: Circle | None) -> Marker | None:
     if rig.pivot.marker == "none":
         return None
     few = images[:: max(1, len(images) // _STILL)]
@@ -230,7 +231,7 @@ def _neutral(rig: Rig, command: Command | None, time: Floats, line: Floats) -> t
 
 def _duplicates(line: Floats, sigma: Floats, repeated: NDArray[np.bool_]) -> list[int]:
     """List the frames that repeat the one before while the mechanism moves before and after them."""
-    rows = []
+    rows: list[int] = []
     starts = np.flatnonzero(repeated & ~np.insert(repeated[:-1], 0, False))
     for i in starts:
         j = int(i)
@@ -244,11 +245,11 @@ def _duplicates(line: Floats, sigma: Floats, repeated: NDArray[np.bool_]) -> lis
     return rows
 
 
-def _pixel_noise(images: Sequence[NDArray[np.uint8]]) -> float:
+def _pixel_noise(images: Sequence[Image]) -> float:
     """Estimate the pixels' standard deviation, grey levels, from what differs between frames where nothing moves."""
     if len(images) < 2:
         return 1.0
-    pairs = [a[::4, ::4].astype(float) - b[::4, ::4] for a, b in zip(images[:-1], images[1:], strict=True)]
+    pairs = [a[::4, ::4].astype(float) - b[::4, ::4] for a, b in itertools.pairwise(images)]
     quantised = 1.0 / np.sqrt(12.0)
     return max(quantised, 1.4826 * float(np.median(np.abs(pairs))) / np.sqrt(2.0))
 

@@ -146,7 +146,8 @@ def _head(rig: Rig, seed: int) -> list[Part]:
     bumps = [(x * MM, y * MM, rx * MM, ry * MM, gain) for x, y, rx, ry, gain in _BUMPS_MM]
     body = inflate(head_profile(), HALF_WIDTH, 3 * MM, bumps)
     mottling = _mottling(body, np.random.default_rng(seed))
-    colours = {**_COLOURS, "lips": rig.lips_rgb, "skin": rig.skin_rgb, "ear": rig.skin_rgb}
+    ear = tuple(round(0.92 * level) for level in rig.skin_rgb)
+    colours = {**_COLOURS, "lips": rig.lips_rgb, "skin": rig.skin_rgb, "ear": ear}
     parts = []
     for name in np.unique(body.labels):
         used, faces = np.unique(body.faces[body.labels == name], return_inverse=True)

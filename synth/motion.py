@@ -109,7 +109,7 @@ def move(
     Motion
         θ(t), to about 1e-9 rad.
     """
-    load = _Load(plant, effects)
+    load = _load(plant, effects)
     starts, pieces = [0.0], [_constant(start_angle)]
     state = np.array([start_angle, 0.0])
     v = 0.0
@@ -129,26 +129,44 @@ def move(
     return Motion(np.array(starts), tuple(pieces))
 
 
+@dataclass(frozen=True)
 class _Load:
     """The numbers of the right-hand side, with every absent effect at its null."""
 
-    def __init__(self, plant: Plant, effects: Effects) -> None:
-        self.a, self.b, self.c = plant.a, plant.b, plant.c
-        self.lag = effects.actuator_lag.tau_s if effects.actuator_lag else 0.0
-        self.q = effects.quadratic_drag.q if effects.quadratic_drag else 0.0
-        self.k3 = effects.stiffening_spring.k3 if effects.stiffening_spring else 0.0
-        dry = effects.coulomb_friction
-        self.friction = dry.torque if dry else 0.0
-        self.breakaway = 0.0 if dry is None else dry.torque if dry.breakaway is None else dry.breakaway
-        shake = effects.periodic_disturbance
-        self.shake = shake.amplitude if shake else 0.0
-        self.shake_rate = 2 * math.pi * shake.frequency_hz if shake else 0.0
-        self.shake_phase = shake.phase if shake else 0.0
+    a: float
+    b: float
+    c: float
+    lag: float
+    q: float
+    k3: float
+    friction: float
+    breakaway: float
+    shake: float
+    shake_rate: float
+    shake_phase: float
 
     def pull(self, t: float, theta: float, arriving: Callable[[float], float]) -> float:
-        """Angular acceleration at rest and without friction, rad/s²."""
+        """Angular acceleration at rest and without friction, p(t, θ), rad/s²."""
         steady = self.c * arriving(t) - self.b * theta - self.k3 * theta**3
         return steady + self.shake * math.sin(self.shake_rate * t + self.shake_phase)
+
+
+def _load(plant: Plant, effects: Effects) -> _Load:
+    dry, shake = effects.coulomb_friction, effects.periodic_disturbance
+    friction = dry.torque if dry else 0.0
+    return _Load(
+        a=plant.a,
+        b=plant.b,
+        c=plant.c,
+        lag=effects.actuator_lag.tau_s if effects.actuator_lag else 0.0,
+        q=effects.quadratic_drag.q if effects.quadratic_drag else 0.0,
+        k3=effects.stiffening_spring.k3 if effects.stiffening_spring else 0.0,
+        friction=friction,
+        breakaway=dry.breakaway if dry and dry.breakaway is not None else friction,
+        shake=shake.amplitude if shake else 0.0,
+        shake_rate=2 * math.pi * shake.frequency_hz if shake else 0.0,
+        shake_phase=shake.phase if shake else 0.0,
+    )
 
 
 def _slide(

@@ -28,6 +28,8 @@ Frames = NDArray[np.uint8]
 
 CHUNK = 8
 """Frames a worker draws at a time."""
+REPLACEMENTS = 2
+"""How often dead workers are replaced before we give up."""
 
 
 _NEEDED = "Mesa's EGL is needed: apt-get install libegl1 libgl1 libgl1-mesa-dri"
@@ -57,10 +59,10 @@ class Studio:
     """Workers at the ready; use it in a ``with`` block."""
 
     def __init__(self, shot: Shot, count: int) -> None:
+        self._shot = shot
         self._count = count
-        self._pool = ProcessPoolExecutor(
-            count, mp_context=multiprocessing.get_context("spawn"), initializer=_set_up, initargs=(shot,)
-        )
+        self._replacements = REPLACEMENTS
+        self._pool = self._hire()
 
     def __enter__(self) -> Studio:
         return self
@@ -88,7 +90,29 @@ class Studio:
         RenderError
             If the machine cannot draw off-screen.
         """
-        starts = iter(range(0, len(angles), CHUNK))
+        done = 0
+        while done < len(angles):
+            try:
+                for drawn in self._draw_ahead(recording, angles, done):
+                    done += len(drawn)
+                    yield from drawn
+            except BrokenProcessPool as error:
+                # Short of memory or killed from outside. A frame depends on no other, so new workers just go on.
+                if self._replacements == 0:
+                    raise RenderError(
+                        f"the drawing processes died {REPLACEMENTS + 1} times; is memory short?"
+                    ) from error
+                self._replacements -= 1
+                self._pool.shutdown(cancel_futures=True)
+                self._pool = self._hire()
+
+    def _hire(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(
+            self._count, mp_context=multiprocessing.get_context("spawn"), initializer=_set_up, initargs=(self._shot,)
+        )
+
+    def _draw_ahead(self, recording: int, angles: Sequence[float], first: int) -> Iterator[Frames]:
+        starts = iter(range(first, len(angles), CHUNK))
         waiting: collections.deque[Future[Frames]] = collections.deque()
         while True:
             # enough ahead that no worker idles, not so much that pictures pile up
@@ -96,11 +120,7 @@ class Studio:
                 waiting.append(self._pool.submit(_draw, recording, start, angles[start : start + CHUNK]))
             if not waiting:
                 return
-            try:
-                drawn = waiting.popleft().result()
-            except BrokenProcessPool as error:
-                raise RenderError(f"a worker died while drawing recording {recording}; {_NEEDED}") from error
-            yield from drawn
+            yield waiting.popleft().result()
 
 
 _shot: Shot

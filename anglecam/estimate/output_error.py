@@ -17,11 +17,15 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from threadpoolctl import ThreadpoolController
 
 from anglecam.estimate.record import Record
 from anglecam.session import Command
 
 Floats = NDArray[np.float64]
+
+_BLAS = ThreadpoolController()
+"""The matrices here have some twenty columns: threads that wait for each other made a fit ten times slower."""
 
 
 class Model(Protocol):
@@ -153,14 +157,9 @@ def fit_output_error(
         The best of the starts.
     """
     own = [_first_state(model, record) for record in records] if own is None else list(own)
-    best: Fit | None = None
-    for start in starts:
-        fit = _fit_once(model, records, np.clip(start, model.lower, model.upper), own, phi, fixed)
-        if best is None or fit.cost < best.cost:
-            best = fit
-    if best is None:
-        raise ValueError("no start was given")
-    return best
+    with _BLAS.limit(limits=1, user_api="blas"):
+        fits = [_fit_once(model, records, np.clip(s, model.lower, model.upper), own, phi, fixed) for s in starts]
+    return min(fits, key=lambda fit: fit.cost)
 
 
 def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:

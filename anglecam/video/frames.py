@@ -10,15 +10,16 @@ import heapq
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import av
-import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import InputError
 from anglecam.video.container import is_cut_short
 
-Image = NDArray[np.uint8]
+Image = NDArray[Any]
+"""Bytes, but cv2's type hints do not know it."""
 
 
 @dataclass(frozen=True)
@@ -173,9 +174,11 @@ def _decode(path: Path) -> Iterator[tuple[float, av.VideoFrame | None]]:
         stream = container.streams.video[0]
         stream.codec_context.thread_type = "SLICE"
         base = float(stream.time_base or 0.0)
+        is_avi = container.format.name == "avi"
         pending: list[int] = []
         broken: set[int] = set()
         last: int | None = None
+        delay: int | None = None
         some = False
 
         def row(pts: int, picture: av.VideoFrame | None) -> tuple[float, av.VideoFrame | None]:
@@ -183,10 +186,14 @@ def _decode(path: Path) -> Iterator[tuple[float, av.VideoFrame | None]]:
             if last is not None and pts <= last:
                 raise InputError(f"{path}: timestamps do not increase at {pts * base:g} s")
             last, some = pts, True
-            return pts * base, picture
+            return (pts - (delay or 0)) * base, picture
 
         for packet, pictures in _packets(path, container, stream):
             stamp = packet.pts if packet.pts is not None else packet.dts
+            if delay is None and stamp is not None:
+                # AVI holds no presentation times: the frames follow each other from its start. libav makes them
+                # up from the order of decoding, late by the decoder's delay.
+                delay = stamp - (packet.dts if packet.dts is not None else stamp) if is_avi else 0
             if packet.pts is not None:
                 heapq.heappush(pending, packet.pts)
             if stamp is not None and (packet.is_corrupt or pictures is None):

@@ -16,10 +16,10 @@ _GATE = 4.0
 _FLOOR_PX = 0.02
 """No film places a mark better than this; keeps the gate open on exact data."""
 _SLOW_PX = 0.02
-"""Standard deviation of a centroid's error that changes slowly along the path, px: what passes behind the mark's edge,
-and chroma at half resolution, shift it by that and more (0.02 to 0.08 px in drawn films, MJPG); what the fit leaves is added to it."""
-_SLOW_LENGTH_PX = 16.0
-"""Way along the path over which that error changes: a codec's macroblock."""
+"""Least standard deviation of a centroid's error that changes slowly along the path, px: what passes behind the
+mark's edge, and chroma at half resolution, shift it by 0.02 to 0.08 px in MJPG films."""
+_SLOW_LENGTHS_PX = (4.0, 16.0)
+"""Ways along the path over which that error changes: what passes behind the edge, a codec's blocks."""
 
 
 @dataclass(frozen=True)
@@ -152,16 +152,17 @@ def _solve(points: Floats, centre: Floats, radius: float, loss: str = "linear") 
 def _slow_error(points: Floats, pose: NDArray[np.int64], J: Floats, scatter: float) -> Floats:
     """Return Jᵀ·K·J for an error that changes slowly along the path and is at least as large as what the fit left."""
     n_poses = pose.max() + 1
-    place = np.column_stack([np.bincount(pose, points[:, axis]) for axis in (0, 1)])
-    place /= np.bincount(pose)[:, None]
+    count = np.bincount(pose)
+    place = np.column_stack([np.bincount(pose, points[:, axis]) / count for axis in (0, 1)])
     slope = np.zeros((n_poses, 3))
     np.add.at(slope, pose, J)
     apart2 = ((place[:, None, :] - place[None, :, :]) ** 2).sum(axis=2)
-    K = (_SLOW_PX**2 + scatter**2) * np.exp(-apart2 / (2.0 * _SLOW_LENGTH_PX**2))
+    alike = np.mean([np.exp(-apart2 / (2.0 * length**2)) for length in _SLOW_LENGTHS_PX], axis=0)
+    K = (_SLOW_PX**2 + scatter**2) * alike
     return slope.T @ K @ slope
 
 
 def _poses(points: Floats) -> NDArray[np.int64]:
-    """Number the distinct poses of a path: points in the same square pixel share a number."""
+    """Give each pose of a path its number: points in the same square pixel share a number."""
     _, pose = np.unique(np.round(points).astype(np.int64), axis=0, return_inverse=True)
     return pose.reshape(-1)

@@ -8,12 +8,14 @@ and its surroundings, which at once ignores what varies there (light and shade, 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Image = NDArray[np.uint8]
+Image = NDArray[Any]
+"""Bytes, but cv2's type hints do not know it."""
 Floats = NDArray[np.float64]
 
 NONE, FULL = 40.0, 215.0
@@ -55,7 +57,7 @@ class ColourModel:
         return cv2.transform(image, matrix)
 
 
-def hue_contrast(image: Image, rgb: tuple[int, int, int] | None) -> NDArray[np.float32]:
+def hue_contrast(image: Image, rgb: tuple[int, int, int] | None) -> NDArray[Any]:
     """Map an image to how much each pixel has the mouth's hue, blind to skin and little moved by shading.
 
     Parameters
@@ -113,5 +115,5 @@ def learn_colour(inside: Floats, around: Floats, elsewhere: Floats) -> ColourMod
     offset = -float(w @ mean_around)
     value = around @ w + offset
     noise = 1.4826 * float(np.median(np.abs(value - np.median(value))))
-    chroma = chroma_of(tuple(round(v) for v in np.clip(mean_in[::-1], 0, 255)))  # type: ignore[arg-type]
+    chroma = chroma_of(tuple(round(v) for v in np.clip(mean_in[::-1], 0, 255)))
     return ColourModel(w, offset, noise, mean_in, chroma)

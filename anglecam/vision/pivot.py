@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,7 +17,8 @@ from numpy.typing import NDArray
 
 from anglecam.vision.circle import Circle
 
-Image = NDArray[np.uint8]
+Image = NDArray[Any]
+"""Bytes, but cv2's type hints do not know it."""
 Floats = NDArray[np.float64]
 
 _RADII_PX = np.arange(3, 25)
@@ -24,9 +26,9 @@ _LEAST_COVERAGE = 0.6
 """Share of a circle's circumference that must point at its centre."""
 _LINE_PX = 1.5
 """A gradient line that passes the centre farther off than this belongs to something else."""
-_FLOOR_PX = 0.05
+_FLOOR_PX = 0.03
 """Standard uncertainty of a marker's centre that no number of edge pixels improves: shading, chroma, codec."""
-_CORRELATED = 6.0
+_CORRELATED = 2.0
 """Neighbouring gradients share their noise: the smoothing's area in pixels, by which the covariance is larger."""
 _SURE_RADIUS = 0.2
 """Relative uncertainty of the path's radius above which its centre says nothing."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,7 +18,8 @@ from numpy.typing import NDArray
 from anglecam.vision.circle import circle_through
 from anglecam.vision.colour import ColourModel, chroma_of, hue_contrast, learn_colour
 
-Image = NDArray[np.uint8]
+Image = NDArray[Any]
+"""Bytes, but cv2's type hints do not know it."""
 Floats = NDArray[np.float64]
 
 LEVELS = (0.3, 0.4, 0.5, 0.6, 0.7)
@@ -113,7 +115,7 @@ def find_mouth(
     return Found(model, float(np.median(area)), np.median(place, axis=0), best.circle)
 
 
-def _hue_range(maps: Sequence[NDArray[np.float32]]) -> tuple[float, float]:
+def _hue_range(maps: Sequence[NDArray[Any]]) -> tuple[float, float]:
     """Return the usual hue contrast of the picture, and the top one: of what changes, if enough does."""
     stack_max = np.maximum.reduce(list(maps))
     change = stack_max - np.minimum.reduce(list(maps))
@@ -124,7 +126,7 @@ def _hue_range(maps: Sequence[NDArray[np.float32]]) -> tuple[float, float]:
     return usual, float(tops[-1])
 
 
-def _cut_out(maps: Sequence[NDArray[np.float32]], level: float, usual: float) -> _Patches:
+def _cut_out(maps: Sequence[NDArray[Any]], level: float, usual: float) -> _Patches:
     frame, place, area, contrast, label = [], [], [], [], []
     for t, hue in enumerate(maps):
         _, _, stats, centres = cv2.connectedComponentsWithStats((hue > level).astype(np.uint8), connectivity=8)
@@ -149,42 +151,63 @@ def _cut_out(maps: Sequence[NDArray[np.float32]], level: float, usual: float) ->
 
 
 def _moving_track(
-    patches: _Patches, maps: Sequence[NDArray[np.float32]], level: float, near_px: tuple[float, float] | None
+    patches: _Patches, maps: Sequence[NDArray[Any]], level: float, near_px: tuple[float, float] | None
 ) -> _Track | None:
-    """Find the circle on which one patch of constant size and colour travels, by random triples of patches."""
-    n = len(patches.frame)
+    """Find the circle on which one patch of constant size and colour travels, by random triples of poses."""
     frames = len(maps)
-    if n < 3 or frames < 3:
+    poses = _poses(patches)
+    if len(poses) < 2 or frames < 2:
         return None
-    diagonal = float(np.hypot(*maps[0].shape))
+    longest = 1.5 * float(np.hypot(*maps[0].shape))
     rng = np.random.default_rng(0)
     hint = None if near_px is None else np.array(near_px)
     best: _Track | None = None
     seen: set[tuple[int, ...]] = set()
-    for _ in range(_TRIALS):
-        trio = rng.integers(0, n, 3)
-        key = tuple(sorted(trio))
-        if key in seen or len(set(patches.frame[trio])) < 3:
+    for trial in range(_TRIALS):
+        # In a clip that hardly moves there are but two poses to be had.
+        some = rng.choice(poses, size=min(2 + (trial % 4 > 0), len(poses)), replace=False)
+        key = tuple(sorted(some))
+        if key in seen or len(set(patches.frame[some])) < len(some):
             continue
         seen.add(key)
-        size, tint = patches.area[trio], patches.contrast[trio]
+        size, tint = patches.area[some], patches.contrast[some]
         if size.max() > 1.6 * size.min() or tint.max() > 1.5 * tint.min():
             continue
-        p = patches.place[trio]
-        if min(np.hypot(*(p[i] - p[j])) for i, j in ((0, 1), (1, 2), (0, 2))) < _MOVED_PX / 2.0:
+        circle = _circle_of(patches.place[some], hint, longest)
+        if circle is None:
             continue
-        centre, radius = circle_through(p)
-        if not np.isfinite(radius) or not 20.0 < radius < 1.5 * diagonal:
-            continue
-        if hint is not None and np.hypot(*(centre - hint)) > _HINT_PX:
-            # Three patches on a short arc leave the radius open: hold the centre at the hint instead.
-            centre, radius = hint, float(np.median(np.hypot(*(p - hint).T)))
-            if np.ptp(np.hypot(*(p - hint).T)) > 2.0 * _TOLERANCE_PX:
-                continue
-        track = _follow(patches, frames, level, centre, radius, float(np.median(size)), float(np.median(tint)))
+        track = _follow(patches, frames, level, *circle, float(np.median(size)), float(np.median(tint)))
         if track is not None and (best is None or track.score > best.score):
             best = track
     return best
+
+
+def _poses(patches: _Patches) -> NDArray[np.int64]:
+    """Pick one patch of each place and size, so that a long rest does not drown a short motion."""
+    key = np.column_stack([np.round(patches.place / _MOVED_PX), np.round(np.log(patches.area) / 0.3)])
+    _, first = np.unique(key, axis=0, return_index=True)
+    return first
+
+
+def _circle_of(p: Floats, hint: Floats | None, longest: float) -> tuple[Floats, float] | None:
+    """Lay a circle through two or three places; where they leave the radius open, about the hint."""
+    chord = p[:, None, :] - p[None, :, :]
+    if np.hypot(chord[..., 0], chord[..., 1])[~np.eye(len(p), dtype=bool)].min() < _MOVED_PX / 2.0:
+        return None
+    if len(p) == 3:
+        centre, radius = circle_through(p)
+        if hint is None or np.hypot(*(centre - hint)) <= _HINT_PX:
+            return (centre, radius) if 20.0 < radius < longest else None
+    if hint is not None:
+        distance = np.hypot(*(p - hint).T)
+        # A hint that is off by e changes the distance by up to e times the angle between the places.
+        open_px = _TOLERANCE_PX + _HINT_PX * float(np.hypot(*np.ptp(p, axis=0))) / max(float(distance.min()), 1.0)
+        return (hint, float(np.median(distance))) if np.ptp(distance) < open_px else None
+    if len(p) == 3:
+        return None
+    # Two places and no hint: on so short a way any circle will do to look along.
+    way = p[1] - p[0]
+    return p.mean(axis=0) + 5.0 * np.array([-way[1], way[0]]), 5.0 * float(np.hypot(*way))
 
 
 def _follow(
@@ -248,7 +271,7 @@ def _something_moves(images: Sequence[Image]) -> bool:
     return False
 
 
-def _learn(images: Sequence[Image], maps: Sequence[NDArray[np.float32]], track: _Track) -> ColourModel | None:
+def _learn(images: Sequence[Image], maps: Sequence[NDArray[Any]], track: _Track) -> ColourModel | None:
     inside, around, elsewhere = [], [], []
     for m in track.members:
         t = int(track.patches.frame[m])
@@ -260,12 +283,13 @@ def _learn(images: Sequence[Image], maps: Sequence[NDArray[np.float32]], track: 
         # Edge pixels are neither; then a collar as wide as the mouth, without other patches of the colour.
         grown = cv2.dilate(own, np.ones((9, 9), np.uint8))
         wide = 2 * max(8, round(float(np.sqrt(own.sum())) / 2.0)) + 1
-        collar = cv2.dilate(grown, np.ones((wide, wide), np.uint8)) - grown
-        collar &= 1 - cv2.dilate(red, np.ones((9, 9), np.uint8))
+        collar: Image = cv2.dilate(grown, np.ones((wide, wide), np.uint8)) - grown
+        red_too: Image = cv2.dilate(red, np.ones((9, 9), np.uint8))
+        collar = collar & (1 - red_too)
         inside.append(images[t][core > 0])
         around.append(images[t][collar > 0])
         rest = np.s_[::8, ::8]
-        elsewhere.append(images[t][rest][cv2.dilate(red, np.ones((9, 9), np.uint8))[rest] == 0])
+        elsewhere.append(images[t][rest][red_too[rest] == 0])
     parts = [np.concatenate(p).astype(float) for p in (inside, around, elsewhere)]
     return learn_colour(*parts) if all(len(p) >= 20 for p in parts) else None
 

@@ -7,6 +7,7 @@ fraction of mouth in each pixel, which knows the edge to a small part of a pixel
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 
 from anglecam.vision.colour import FULL, NONE, ColourModel
 
-Image = NDArray[np.uint8]
+Image = NDArray[Any]
+"""Bytes, but cv2's type hints do not know it."""
 Floats = NDArray[np.float64]
 
 _MARGIN_PX = 12
@@ -27,6 +29,8 @@ _PRIOR = np.float32(1e-3)
 """Weight of the clip's own values (0 outside, 1 inside) where no pixel is near."""
 _FEWEST_EDGE_PX = 8
 """A patch with a shorter outline is a speck."""
+_SPECK_SHARE = 0.03
+"""Of a region's area: other patches that lie against it and are smaller together do not count."""
 _MOST = 12
 """Regions of one frame that are looked at, largest first."""
 
@@ -41,9 +45,9 @@ class Region:
     """Sum of that fraction, px²."""
     moments_px2: Floats
     """(2, 2) second central moments of that fraction, px²."""
-    noise_gain_px: float
-    """Standard deviation of the centroid (mean of x and y) for pixel noise of one grey level, px."""
-    contour_px: NDArray[np.int32]
+    noise_px2: Floats
+    """(2, 2) covariance of the centroid for pixel noise of one grey level, px²."""
+    contour_px: NDArray[Any]
     """(k, 2) outline after threshold, Canny and fill."""
     whole: bool
     """False where the region touches the picture's edge or another region."""
@@ -76,7 +80,7 @@ def find_regions(image: Image, model: ColourModel, smallest_px2: float) -> list[
     return [_measure(fraction, smooth, core, patch, model) for patch in large]
 
 
-def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[np.int32], model: ColourModel) -> Region:
+def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], model: ColourModel) -> Region:
     height, width = fraction.shape
     left, top, across, down = cv2.boundingRect(patch)
     right, bottom = left + across, top + down
@@ -90,7 +94,8 @@ def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[np.int3
     filled = cv2.drawContours(np.zeros_like(own), [outline], -1, 1, cv2.FILLED)
     reach = _reach(smooth[box], filled, model)
     near_others = cv2.dilate(others, _disc(_FOOT_PX))
-    touched = bool((reach & near_others).any())
+    # Specks of the colour do no harm; they come and go with the noise.
+    touched = bool((others & cv2.dilate(reach, _disc(_FOOT_PX))).sum() > _SPECK_SHARE * own.sum())
     reach &= 1 - near_others
     low = min(0.4, max(0.1, 3.0 * model.noise))
     cover = _cover(fraction[box], filled, reach | near_others)
@@ -105,23 +110,23 @@ def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[np.int3
     xx, yy, xy = ((weight * m).sum() / area for m in (dx * dx, dy * dy, dx * dy))
     soft = (weight > 0.0) & (weight < 1.0)
     slope = float(np.linalg.norm(model.weights)) / (1.0 - 2.0 * low)
-    gain = slope / area * float(np.sqrt((dx[soft] ** 2 + dy[soft] ** 2).sum() / 2.0))
+    d = np.column_stack([dx[soft], dy[soft]])
     return Region(
         centre_px=np.array([cx + x0, cy + y0]),
         area_px2=area,
         moments_px2=np.array([[xx, xy], [xy, yy]]),
-        noise_gain_px=gain,
+        noise_px2=(slope / area) ** 2 * d.T @ d,
         contour_px=(outline.reshape(-1, 2) + [x0, y0]).astype(np.int32),
         whole=not (cut or touched),
     )
 
 
-def _outline(smooth: Image, own: Image) -> NDArray[np.int32]:
+def _outline(smooth: Image, own: Image) -> NDArray[Any]:
     """Join the thresholded patch with the Canny edges that run along it, and take the outer contour."""
     step = (FULL - NONE) / 2.0
     edges = cv2.Canny(smooth, step, 2.0 * step) // 255
-    edges &= cv2.dilate(own, _disc(1))
-    contours, _ = cv2.findContours(own | edges, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    along: Image = cv2.dilate(own, _disc(1))
+    contours, _ = cv2.findContours(own | (edges & along), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return max(contours, key=len)
 
 
@@ -137,7 +142,7 @@ def _reach(smooth: Image, filled: Image, model: ColourModel) -> Image:
     return cv2.dilate(connected, _disc(_FOOT_PX))
 
 
-def _cover(fraction: Image, filled: Image, reach: Image) -> NDArray[np.float32]:
+def _cover(fraction: Image, filled: Image, reach: Image) -> NDArray[Any]:
     """Return how much of each pixel is mouth, measured between the values just inside and just outside of there.
 
     One scale for the whole picture would let the edge wander as bright and dark wallpaper pass behind it.
@@ -150,7 +155,7 @@ def _cover(fraction: Image, filled: Image, reach: Image) -> NDArray[np.float32]:
     return (value - without) / np.maximum(within - without, 0.3)
 
 
-def _spread(value: NDArray[np.float32], weight: NDArray[np.float32]) -> NDArray[np.float32]:
+def _spread(value: NDArray[Any], weight: NDArray[Any]) -> NDArray[Any]:
     """Smooth known values into where none is known (normalised convolution, Knutsson & Westin 1993)."""
     return cv2.GaussianBlur(value, (0, 0), _LOCAL_PX) / cv2.GaussianBlur(weight, (0, 0), _LOCAL_PX)
 

@@ -83,6 +83,7 @@ def follow_mouth(candidates: Sequence[Sequence[Region]], time: Floats, found: Fo
             if circle is not None:
                 centre, radius = circle.centre_px, circle.radius_px
         _mark_hidden(chosen, status, time, centre, radius, circle)
+    _join_hidden(status)
     return Track(tuple(chosen), tuple(status), circle)
 
 
@@ -199,10 +200,21 @@ def _mark_hidden(
         t = _tolerance(d, 2.0 * _LEAST_SHARE * float(np.median(width)))
         off |= (d < -t) | (d - drawn > t)
     if circle is not None:
-        d = np.hypot(*arm.T) - radius
-        off |= np.abs(d) > max(_ROBUST * circle.scatter_px, _LEAST_OFF_PX)
+        # A mouth that really leaves the circle (a loose thread, a shaking rig) keeps its size; one that only seems
+        # to has lost or gained an area that can have moved its centroid so far.
+        d = np.abs(np.hypot(*arm.T) - radius)
+        moved = np.abs(_departure(area, pose)) / typical * 2.0 * np.sqrt(np.maximum(radial, tangential))
+        off |= (d > max(_ROBUST * circle.scatter_px, _LEAST_OFF_PX)) & (moved > 0.5 * d)
     for i, bad in zip(rows, off | ~whole, strict=True):
         status[i] = HIDDEN if bad else SEEN
+
+
+def _join_hidden(status: list[str]) -> None:
+    """Call a mouth that is partly hidden before or after it is gone hidden in between."""
+    for order in (range(1, len(status)), range(len(status) - 2, -1, -1)):
+        for i in order:
+            if status[i] == ABSENT and status[i - order.step] == HIDDEN:
+                status[i] = HIDDEN
 
 
 def _departure(value: Floats, pose: Floats) -> Floats:

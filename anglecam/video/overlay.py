@@ -1,0 +1,137 @@
+"""The clip again with what was measured drawn into it, so that an eye can judge."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+from pathlib import Path
+from typing import Protocol
+
+import av
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.series import OK, AngleSeries
+from anglecam.video.frames import Frame, Image, read_frames
+
+Floats = NDArray[np.float64]
+
+RADII_PX = (6.0, 10.0)
+"""Circles of the paper's pixel errors about the mouth."""
+_TICKS = 90_000
+"""Per second; holds 24, 25, 30, 29.97, 60 Hz and milliseconds exactly."""
+_SHIFT = 4
+"""Fractional bits of cv2's drawing coordinates."""
+_LINE, _CONTOUR, _CIRCLES, _BAD = (255, 220, 0), (0, 255, 0), (0, 220, 255), (60, 60, 255)
+
+
+class Measured(Protocol):
+    """What an overlay shows: an angle series, and the outline from which each place was read."""
+
+    @property
+    def series(self) -> AngleSeries:
+        """A row a frame of the clip."""
+
+    @property
+    def contours_px(self) -> Sequence[NDArray[np.int32] | None]:
+        """Each frame's (k, 2) outline of the mouth, where one was found."""
+
+
+def write_overlay(clip: Path, measured: Measured, path: Path) -> None:
+    """Write ``NAME.overlay.mp4``: the clip in H.264, each frame at its own time, with what was measured in it.
+
+    Parameters
+    ----------
+    clip : Path
+        The film that was measured.
+    measured : Measured
+        What was found in it.
+    path : Path
+        The film to be; it appears whole or not at all. Its folder is made if missing.
+
+    Raises
+    ------
+    InputError
+        As `read_frames`.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}.") as folder:
+        unfinished = Path(folder) / path.name
+        with av.open(str(unfinished), mode="w") as container:
+            _encode(container, read_frames(clip), measured)
+        unfinished.replace(path)
+
+
+def draw_frame(image: Image, measured: Measured, index: int) -> Image:
+    """Draw one frame's line pivot→mouth, outline, 6 px and 10 px circles, angle ± sigma, or why there is none.
+
+    Parameters
+    ----------
+    image : ndarray
+        (h, w, 3) blue, green, red; it is not changed.
+    measured : Measured
+        What was found in the clip.
+    index : int
+        The frame's number.
+
+    Returns
+    -------
+    ndarray
+        (h, w, 3).
+    """
+    drawn: Image = image.copy()
+    series = measured.series
+    good = series.status[index] == OK
+    contour = measured.contours_px[index]
+    if contour is not None:
+        cv2.polylines(drawn, [contour], True, _CONTOUR if good else _BAD, 1, cv2.LINE_AA)
+    text = f"{series.time[index]:.3f} s  "
+    if good and series.mouth_px is not None and series.pivot_px is not None:
+        pivot, mouth = _fixed(series.pivot_px[index]), _fixed(series.mouth_px[index])
+        cv2.line(drawn, pivot, mouth, _LINE, 1, cv2.LINE_AA, _SHIFT)
+        cv2.circle(drawn, pivot, 3 << _SHIFT, _LINE, 1, cv2.LINE_AA, _SHIFT)
+        for radius in RADII_PX:
+            cv2.circle(drawn, mouth, round(radius * 2**_SHIFT), _CIRCLES, 1, cv2.LINE_AA, _SHIFT)
+        angle, sigma = np.degrees((series.angle[index], series.sigma[index]))
+        text += f"{angle:+.3f} +- {sigma:.3f} deg"
+    else:
+        text += series.status[index]
+    font, scale, at = cv2.FONT_HERSHEY_SIMPLEX, 0.6, (10, drawn.shape[0] - 12)
+    (width, height), below = cv2.getTextSize(text, font, scale, 1)
+    cv2.rectangle(drawn, (at[0] - 4, at[1] - height - 4), (at[0] + width + 4, at[1] + below), (0, 0, 0), cv2.FILLED)
+    cv2.putText(drawn, text, at, font, scale, (255, 255, 255) if good else _BAD, 1, cv2.LINE_AA)
+    return drawn
+
+
+def _encode(container: av.container.OutputContainer, frames: Iterable[Frame], measured: Measured) -> None:
+    stream: av.VideoStream | None = None
+    shown: Image | None = None
+    for frame in frames:
+        # Where there is no picture the one before stays, and the text says why.
+        shown = shown if frame.image is None else frame.image
+        if shown is None:
+            continue
+        height, width = shown.shape[:2]
+        if stream is None:
+            # No reordering: with it, decoders' delays would shift the time stamps.
+            stream = container.add_stream("libx264", options={"crf": "20", "preset": "veryfast", "bf": "0"})
+            stream.width, stream.height = width + width % 2, height + height % 2
+            stream.pix_fmt = "yuv420p"
+            stream.time_base = stream.codec_context.time_base = Fraction(1, _TICKS)
+        # H.264 at 4:2:0 has even sides only.
+        drawn = cv2.copyMakeBorder(
+            draw_frame(shown, measured, frame.index), 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE
+        )
+        picture = av.VideoFrame.from_ndarray(drawn, format="bgr24")
+        picture.pts = round(frame.time * _TICKS)
+        picture.time_base = Fraction(1, _TICKS)
+        container.mux(stream.encode(picture))
+    if stream is not None:
+        container.mux(stream.encode())
+
+
+def _fixed(point_px: Floats) -> tuple[int, int]:
+    x, y = np.round(point_px * 2**_SHIFT).astype(int)
+    return int(x), int(y)

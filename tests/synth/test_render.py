@@ -1,0 +1,213 @@
+"""Small films, looked at closely: 320 × 240, a few frames."""
+
+import json
+import multiprocessing
+import subprocess
+import sys
+from contextlib import closing
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+import yaml
+
+from synth.mesh import Part, build, poses
+from synth.render import Shot, Studio
+from synth.session import render
+from synth.spec import Spec, SpecError
+from synth.truth import marks, view
+
+SPEC = {
+    "seed": 5,
+    "effects": {"dead_time": {"tau_s": 0.0412}, "coulomb_friction": {"torque": 2.5}},
+    "camera": {"size": [320, 240], "codec": "ffv1"},
+    "rig": {"lever_px": 100, "pivot_px": [120.3, 149.6]},
+    "declare": {"mouth": {"rgb": [190, 35, 40]}, "held_out": ["two"]},
+    "recordings": [
+        {"name": "one", "duration_s": 1.0, "command": {"kind": "step", "amplitude_deg": 15, "rest_s": 0.51}},
+        {"name": "two", "duration_s": 0.7, "command": {"kind": "free", "initial_angle_deg": -10, "rest_s": 0.5}},
+    ],
+}
+
+
+def write_spec(folder: Path, **changes) -> Path:
+    path = folder / "spec.yaml"
+    path.write_text(yaml.safe_dump({**SPEC, **changes}))
+    return path
+
+
+def read_clip(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        frames = list(container.decode(stream))
+        times = [float(frame.pts * frame.time_base) for frame in frames]
+        return np.array(times), np.stack([frame.to_ndarray(format="rgb24") for frame in frames])
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rendered")
+    render(write_spec(folder), folder / "session", folder / "truth")
+    return folder
+
+
+def test_the_session_holds_what_the_contract_says_and_the_truth_what_it_says(rendered):
+    assert {path.name for path in (rendered / "session").iterdir()} == {
+        "rig.yaml", "one.avi", "one.command.csv", "two.avi",
+    }  # fmt: skip
+    assert {path.name for path in (rendered / "truth").iterdir()} == {
+        "truth.json", "one.truth.csv", "two.truth.csv",
+    }  # fmt: skip
+    header = (rendered / "truth" / "one.truth.csv").read_text().splitlines()[0]
+    assert header == "frame,time_s,true_time_s,angle_deg,mouth_x_px,mouth_y_px,pivot_x_px,pivot_y_px"
+    assert (rendered / "session" / "one.command.csv").read_text().splitlines()[0] == "time_s,command_deg"
+    assert yaml.safe_load((rendered / "session" / "rig.yaml").read_text()) == SPEC["declare"]
+    facts = json.loads((rendered / "truth" / "truth.json").read_text())
+    assert facts["seed"] == 5
+    assert facts["effects"]["dead_time"] == {"tau_s": 0.0412}
+
+
+def test_nothing_of_the_truth_reaches_the_session(rendered):
+    for path in (rendered / "session").iterdir():
+        content = path.read_bytes().lower()
+        for secret in (b"dead_time", b"coulomb", b"torque", b"0.0412", b"seed", b"truth", b"effect", b"lavc", b"lavf"):
+            # compressed pixels may spell short words by chance; the headers stand before the first frame
+            assert secret not in (content.split(b"movi")[0] if path.suffix == ".avi" else content)
+    with av.open(str(rendered / "session" / "one.avi")) as container:
+        assert container.metadata == {}
+        assert container.streams.video[0].metadata == {}
+
+
+def test_every_frame_is_there_at_its_time(rendered):
+    for name, count in (("one", 30), ("two", 21)):
+        times, frames = read_clip(rendered / "session" / f"{name}.avi")
+        truth = np.genfromtxt(rendered / "truth" / f"{name}.truth.csv", delimiter=",", names=True)
+        assert len(frames) == len(truth) == count
+        np.testing.assert_allclose(times, truth["time_s"], atol=1e-8)
+        np.testing.assert_allclose(times, np.arange(count) / 30, atol=1e-8)
+
+
+def test_the_command_acts_late_by_the_hidden_delay_and_the_release_at_once(rendered):
+    one = np.genfromtxt(rendered / "truth" / "one.truth.csv", delimiter=",", names=True)
+    assert (one["angle_deg"][one["time_s"] < 0.51 + 0.0412] == 0).all()
+    assert (one["angle_deg"][one["time_s"] > 0.51 + 0.0412] > 0).all()
+    two = np.genfromtxt(rendered / "truth" / "two.truth.csv", delimiter=",", names=True)
+    np.testing.assert_allclose(two["angle_deg"][:15], -10.0)
+    assert two["angle_deg"][-1] > -10.0
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_noise(rendered, tmp_path):
+    short = [{"name": "one", "duration_s": 0.3, "command": {"kind": "step", "amplitude_deg": 15, "rest_s": 0.51}}]
+    frames = {}
+    for name, seed in (("same", 5), ("other", 6)):
+        (tmp_path / name).mkdir()
+        path = write_spec(tmp_path / name, recordings=short, seed=seed)
+        render(path, tmp_path / name / "session", tmp_path / name / "truth")
+        frames[name] = read_clip(tmp_path / name / "session" / "one.avi")[1]
+    first = read_clip(rendered / "session" / "one.avi")[1][: len(frames["same"])]
+    np.testing.assert_array_equal(frames["same"], first)
+    assert (frames["other"] != first).mean() > 0.5
+    # a still head: what changes from frame to frame is the noise, and nothing else
+    assert np.std(first[1].astype(float) - first[0]) == pytest.approx(2.0 * np.sqrt(2), rel=0.03)
+
+
+@pytest.mark.parametrize(("facing", "marker"), [("right", "disc"), ("left", "ring")])
+def test_projected_truth_is_where_the_picture_has_it(facing, marker):
+    """Lips and marker at full brightness on black: grey levels are then areas, and their centroids exact."""
+    from synth.offscreen import Stage
+
+    pivot = [150.3, 170.6] if facing == "right" else [168.7, 170.6]
+    rig = {"lever_px": 150, "pivot_px": pivot, "facing": facing, "marker": marker}
+    spec = Spec.model_validate({"camera": {"size": [320, 300]}, "rig": rig, "recordings": SPEC["recordings"]})
+    seen = view(spec)
+    shown = {"lips": [900.0, 0.0, 0.0], "marker": [0.0, 0.0, 900.0]}
+    parts = [
+        Part(part.name, part.body, part.mesh, np.zeros_like(part.colours) + shown.get(part.name, [0.0, 0.0, 0.0]))
+        for part in build(spec.rig)
+    ]
+    angles = np.radians(np.linspace(-22.0, 28.0, 26))
+    found = []
+    with closing(Stage(seen.pinhole, parts)) as stage:
+        for angle in angles:
+            picture = stage.picture(poses(spec.rig.linkage, float(angle))).astype(float)
+            y, x = np.indices(picture.shape[:2])
+            found.append([np.average(axis, weights=picture[..., colour]) for colour in (0, 2) for axis in (x, y)])
+    errors = np.array(found) - marks(seen, angles)
+    assert np.abs(errors[:, 2:]).max() < 0.05
+    # four samples a pixel: each frame's edges are a little off, at random; over the frames nothing remains
+    assert np.abs(errors[:, :2]).max() < 0.1
+    assert np.abs(errors[:, :2].mean(axis=0)).max() < 0.015
+    measured = np.array(found)
+    across = (measured[:, 0] - measured[:, 2]) * (-1 if facing == "left" else 1)
+    line = np.degrees(np.arctan2(measured[:, 3] - measured[:, 1], across))
+    residual = line - np.degrees(angles)
+    assert np.std(residual) < 0.02
+    expected = np.degrees(np.arctan2(*seen.mouth[::-1]))
+    assert np.mean(residual) == pytest.approx(expected, abs=0.01)
+
+
+def test_a_worker_that_dies_is_replaced_and_no_frame_is_lost():
+    spec = Spec.model_validate(SPEC)
+    shot = Shot(spec.rig, view(spec).pinhole, 2.0, seed=5)
+    angles = np.radians(np.linspace(0.0, 10.0, 60)).tolist()
+    with Studio(shot, 1) as studio:
+        undisturbed = list(studio.film(0, angles))
+        disturbed = []
+        for frame in studio.film(0, angles):
+            disturbed.append(frame)
+            if len(disturbed) == 10:
+                (worker,) = multiprocessing.active_children()
+                worker.kill()
+    np.testing.assert_array_equal(disturbed, undisturbed)
+
+
+def test_the_lips_are_as_red_as_declared(rendered):
+    frame = read_clip(rendered / "session" / "one.avi")[1][0].astype(float)
+    truth = np.genfromtxt(rendered / "truth" / "one.truth.csv", delimiter=",", names=True)[0]
+    x, y = round(truth["mouth_x_px"]), round(truth["mouth_y_px"])
+    np.testing.assert_allclose(frame[y - 3 : y + 4, x - 3 : x + 4].mean(axis=(0, 1)), [190, 35, 40], atol=20)
+
+
+@pytest.mark.parametrize(("codec", "limit"), [("mjpeg", 2.0), ("h264", 8.0)])
+def test_lossy_clips_keep_times_and_nearly_the_picture(rendered, tmp_path, codec, limit):
+    short = [{**SPEC["recordings"][0], "duration_s": 0.4}]
+    camera = {**SPEC["camera"], "codec": codec, "fps": 29.97}
+    render(write_spec(tmp_path, recordings=short, camera=camera), tmp_path / "session", tmp_path / "truth")
+    (clip,) = [path for path in (tmp_path / "session").iterdir() if path.stem == "one"]
+    times, frames = read_clip(clip)
+    np.testing.assert_allclose(times, np.arange(12) * 1001 / 30000, atol=1e-6)
+    lossless = read_clip(rendered / "session" / "one.avi")[1][:12]
+    assert np.abs(frames.astype(float) - lossless).mean() < limit
+
+
+@pytest.mark.parametrize(("out", "truth"), [("same", "same"), ("session", "session/truth"), ("truth/session", "truth")])
+def test_the_truth_may_not_lie_where_the_session_is(tmp_path, out, truth):
+    with pytest.raises(SpecError, match="truth leaks"):
+        render(write_spec(tmp_path), tmp_path / out, tmp_path / truth)
+
+
+def test_a_session_does_not_mix_with_older_files(tmp_path):
+    (tmp_path / "session").mkdir()
+    (tmp_path / "session" / "old.avi").write_bytes(b"")
+    with pytest.raises(SpecError, match=r"old\.avi"):
+        render(write_spec(tmp_path), tmp_path / "session", tmp_path / "truth")
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"camera": {"fps": 0}}, "camera.fps"),
+        ({"recordings": [{**SPEC["recordings"][1], "command": {"kind": "free", "initial_angle_deg": 40}}]},
+         "recordings.0.command: the head would move"),
+        ({"rig": {"lever_px": 400}}, "recordings.0.command: the mouth would leave"),
+    ],
+)  # fmt: skip
+def test_a_bad_spec_ends_with_status_2_and_one_line(tmp_path, changes, key):
+    path = write_spec(tmp_path, **changes)
+    call = [str(Path(sys.executable).with_name("synth")), "render", str(path), "--out", "o", "--truth", "t"]
+    ended = subprocess.run(call, capture_output=True, text=True, cwd=tmp_path, check=False)
+    assert ended.returncode == 2
+    assert key in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1
+    assert {path.name for path in tmp_path.iterdir()} == {"spec.yaml"}

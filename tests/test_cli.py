@@ -1,0 +1,168 @@
+"""The commands as a user calls them: files, keys, exit statuses, one line for each thing that is wrong."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from anglecam.series import COLUMNS, AngleSeries, write_series
+from support import broken
+from support.drawn import Look, Plant, Recording, draw_session
+from support.series import session as make_records
+
+ANGLECAM = Path(sys.executable).parent / "anglecam"
+
+
+def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([ANGLECAM, *map(str, arguments)], capture_output=True, text=True, timeout=300, check=False)
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    """Five clips drawn by another program, of a plant that answers 40 ms late, and what is true of them."""
+    folder = tmp_path_factory.mktemp("film")
+    recordings = [
+        Recording("a-steps", "steps", duration_s=6.0),
+        Recording("b-stairs", "stairs", duration_s=7.0, amplitude_deg=15.0),
+        Recording("c-chirp", "chirp", duration_s=6.0),
+        Recording("d-random", "random", duration_s=6.0, held_out=True),
+    ]
+    truth = draw_session(folder, look=Look(marker="ring"), plant=Plant(dead_time_s=0.04), recordings=recordings, seed=5)
+    return folder, truth
+
+
+@pytest.fixture
+def series_session(tmp_path):
+    """Return a session of angle series, without a film."""
+    folder = tmp_path / "session"
+    folder.mkdir()
+    for record in make_records(Plant(dead_time_s=0.04), 4):
+        n = len(record.time)
+        series = AngleSeries(record.name, record.time, record.angle, np.full(n, np.radians(0.05)), ("ok",) * n)
+        write_series(series, folder / f"{record.name}.angles.csv")
+        rows = np.column_stack([record.command.time, np.degrees(record.command.angle)])
+        text = "\n".join(f"{t:.6f},{u:.6f}" for t, u in rows)
+        (folder / f"{record.name}.command.csv").write_text(f"time_s,command_deg\n{text}\n")
+    (folder / "rig.yaml").write_text("held_out: [random]\n")
+    return folder
+
+
+def test_from_film_to_verdict(film, tmp_path):
+    folder, truth = film
+    done = run("close", folder, "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    for name, true in truth.items():
+        header, *rows = list(csv.reader((tmp_path / f"{name}.angles.csv").open()))
+        assert tuple(header[: len(COLUMNS)]) == COLUMNS
+        assert len(rows) == len(true.time_s)
+        angle = np.array([float(row[2]) for row in rows])
+        assert np.sqrt(np.mean((angle - true.angle_deg) ** 2)) < 0.1
+    loop = json.loads((tmp_path / "loop.json").read_text())
+    assert loop["verdict"] == "attributed"
+    assert [e["id"] for e in loop["effects"]] == ["dead_time"]
+    assert loop["effects"][0]["parameters"]["tau_s"]["value"] == pytest.approx(0.040, abs=0.005)
+    assert {name: value["value"] for name, value in loop["model"].items()} == pytest.approx(
+        {"a_per_s": 26.0, "b_per_s2": 524.0, "c_per_s2": 508.0}, rel=0.05
+    )
+    assert loop["rmse_deg"]["after"]["held_out"] < 0.1 * loop["rmse_deg"]["before"]["held_out"]
+    page = (tmp_path / "report.html").read_text()
+    assert "dead_time" in page
+    assert "http://" not in page.replace("http://www.w3.org", "")
+
+
+def test_loop_json_has_every_key_of_the_contract(series_session, tmp_path):
+    assert run("close", series_session, "--out", tmp_path).returncode == 0
+    loop = json.loads((tmp_path / "loop.json").read_text())
+    assert loop.keys() >= {
+        "verdict", "effects", "rmse_deg", "held_out_gain", "p_value", "model", "detectable", "candidates",
+    }  # fmt: skip
+    effect = loop["effects"][0]
+    assert effect.keys() >= {"id", "parameters", "relaxes", "alias_set", "separating_experiment"}
+    assert effect["parameters"]["tau_s"].keys() >= {"value", "sigma", "null"}
+    assert loop["rmse_deg"].keys() == {"before", "after", "noise_floor"}
+    assert loop["held_out_gain"].keys() == {"ratio", "interval_95"}
+    assert loop["detectable"][0].keys() == {"id", "smallest", "unit"}
+    assert loop["candidates"][0].keys() == {"id", "log_likelihood_gain", "held_out_rmse_deg"}
+    assert (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize("estimator", ["ekf", "oe2", "oe3"])
+def test_identify_writes_a_model(series_session, tmp_path, estimator):
+    done = run("identify", series_session, "--estimator", estimator, "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    model = json.loads((tmp_path / "model.json").read_text())
+    assert model["estimator"] == estimator
+    assert model.keys() >= {"parameters", "rmse_deg", "step"}
+    assert all(p.keys() == {"value", "sigma"} for p in model["parameters"].values())
+    assert model["rmse_deg"]["held_out"] > 0.0
+    assert model["step"].keys() >= {"rise_time_s", "overshoot", "settling_time_s", "steady_state_deg"}
+    assert model["step"]["steady_state_deg"] == pytest.approx(508 / 524, rel=0.02)
+
+
+def test_bad_clips_cost_themselves_one_line_each_and_the_good_one_is_measured(film, tmp_path):
+    good, _ = film
+    clip = good / "a-steps.avi"
+    folder = tmp_path / "clips"
+    folder.mkdir()
+    bad = [
+        broken.empty_clip(folder),
+        broken.text_clip(folder),
+        broken.truncated_clip(folder, clip),
+        broken.clip_without_mouth(folder),
+        broken.zero_frame_clip(folder),
+        folder / "not_there.avi",
+    ]
+    done = run("measure", *bad, clip, "--rig", good / "rig.yaml", "--out", tmp_path / "out")
+    assert done.returncode == 1
+    lines = done.stderr.splitlines()
+    assert len(lines) == len(bad), done.stderr
+    for path in bad:
+        assert sum(path.name in line for line in lines) == 1, done.stderr
+    assert (tmp_path / "out" / "a-steps.angles.csv").exists()
+    assert (tmp_path / "out" / "truncated.angles.csv").exists()  # what could be read is measured
+    assert "Traceback" not in done.stderr
+
+
+def test_a_bad_command_file_costs_its_recording_only(series_session, tmp_path):
+    broken.command_backwards(series_session, "steps")
+    done = run("close", series_session, "--out", tmp_path)
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
+    assert "steps.command.csv" in done.stderr
+    assert json.loads((tmp_path / "loop.json").read_text())["verdict"] == "attributed"
+
+
+@pytest.mark.parametrize("verb", ["measure", "identify", "close"])
+def test_a_bad_rig_file_is_exit_status_2_and_one_line(series_session, film, tmp_path, verb):
+    broken.rig_with_unknown_key(series_session)
+    if verb == "measure":
+        done = run(verb, film[0] / "a-steps.avi", "--rig", series_session / "rig.yaml", "--out", tmp_path)
+    else:
+        done = run(verb, series_session, "--out", tmp_path)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1, done.stderr
+    assert "rig.yaml" in done.stderr
+    assert "unknown key" in done.stderr
+
+
+def test_wrong_calls_are_exit_status_2(series_session, tmp_path):
+    assert run("close", tmp_path / "nowhere", "--out", tmp_path / "o").returncode == 2
+    assert run("close", series_session, "--hold-out", "nobody", "--out", tmp_path / "o").returncode == 2
+    assert run("identify", series_session, "--estimator", "oe9", "--out", tmp_path / "o").returncode == 2
+    assert run("measure", "--out", tmp_path / "o").returncode == 2
+    assert run("nonsense").returncode == 2
+
+
+def test_a_session_where_nothing_can_be_used_is_exit_status_1(tmp_path):
+    broken.empty_clip(tmp_path)
+    done = run("close", tmp_path, "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert "empty" in done.stderr
+    assert "Traceback" not in done.stderr
