@@ -16,7 +16,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from anglecam.errors import AnglecamError, InputError, RigError
+from anglecam.errors import AnglecamError, InputError, RigError, blame
 from anglecam.files import write_json
 from anglecam.identify import ESTIMATORS, Estimator, declared_start, identify_records
 from anglecam.loop.close import close_records
@@ -71,12 +71,13 @@ def measure(
                 bar = bars.add_task(clip.name, total=None)
                 used = declared if declared is not None else rig_beside(clip)
                 _say_what_is_not_applied(used, clip)
-                measurement = measure_clip(
-                    clip,
-                    used,
-                    command_beside(clip),
-                    progress=lambda n, total, bar=bar: bars.update(bar, completed=n, total=total or None),  # type: ignore[misc]
-                )
+                with blame(clip):
+                    measurement = measure_clip(
+                        clip,
+                        used,
+                        command_beside(clip),
+                        progress=lambda n, total, bar=bar: bars.update(bar, completed=n, total=total or None),  # type: ignore[misc]
+                    )
                 write_series(measurement.series, out / f"{clip.stem}{SERIES_ENDING}")
                 plot_series(measurement.series, out / f"{clip.stem}.png")
                 if overlay:
@@ -152,15 +153,16 @@ def close(
 def main() -> None:
     """Run the command line; every failure is one line on standard error and an exit status."""
     try:
-        app()
+        with blame(Path("anglecam")):
+            app()
     except InputError as problem:
         errors.print(str(problem))
         sys.exit(1)
     except RigError as problem:
         errors.print(str(problem))
         sys.exit(2)
-    except OSError as problem:
-        errors.print(f"{problem.filename or 'anglecam'}: {problem.strerror or problem}")
+    except KeyboardInterrupt:
+        errors.print("anglecam: interrupted")
         sys.exit(1)
 
 

@@ -1,5 +1,11 @@
 """What can go wrong outside our own code, as exceptions whose text is the one line that the user reads."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
 
 class AnglecamError(Exception):
     """Base of every failure that is told to the user in one line: ``what: how much, what next``."""
@@ -11,3 +17,18 @@ class RigError(AnglecamError):
 
 class InputError(AnglecamError):
     """One clip, series or command file cannot be used; the others of the call still can (exit status 1)."""
+
+
+@contextmanager
+def blame(path: Path) -> Iterator[None]:
+    """Turn a fault of our own into an `InputError` that names the file, so that it costs that file alone."""
+    try:
+        yield
+    except AnglecamError:
+        raise
+    except OSError as fault:
+        raise InputError(f"{fault.filename or path}: {fault.strerror or fault}") from fault
+    except Exception as fault:
+        text = str(fault).strip().splitlines()
+        cause = f"{type(fault).__name__}: {text[0] if text else ''}"
+        raise InputError(f"{path}: internal error, please report it ({cause})") from fault

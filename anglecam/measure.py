@@ -187,11 +187,16 @@ def _angles(
     ahead = arm[:, 0] if rig.facing == "right" else -arm[:, 0]
     line = np.unwrap(np.arctan2(-arm[:, 1], ahead))
     line -= 2.0 * np.pi * np.round(np.median(line) / (2.0 * np.pi))
-    neutral, resting = _neutral(rig, command, time[ok], line)
     lever = np.hypot(*arm.T)
+    neutral, resting = _neutral(rig, command, time[ok], line, lever)
     around = track.circle
     off = lever - np.median(lever) if around is None else np.hypot(*(mouth - around.centre_px).T) - around.radius_px
-    errors = place_errors(mouth, off, pixel_noise * np.array([r.noise_gain_px for r in regions]))
+    out = arm / lever[:, None]
+    noise = pixel_noise**2 * np.array([r.noise_px2 for r in regions])
+    across, along = (
+        np.sqrt(np.einsum("ni,nij,nj->n", v, noise, v)) for v in (out, np.column_stack([-out[:, 1], out[:, 0]]))
+    )
+    errors = place_errors(mouth, off, across, along)
     sigma = angle_sigma(mouth, pivot.centre_px, pivot.covariance_px2, errors, resting)
 
     n = len(time)
@@ -218,15 +223,22 @@ def _angles(
     return series, neutral
 
 
-def _neutral(rig: Rig, command: Command | None, time: Floats, line: Floats) -> tuple[float, NDArray[np.bool_] | None]:
-    """Return the line that counts as zero, and the frames it is the mean of, if it is one."""
+def _neutral(
+    rig: Rig, command: Command | None, time: Floats, line: Floats, lever: Floats
+) -> tuple[float, NDArray[np.bool_] | None]:
+    """Return the line that counts as zero, and the frames that it is taken from, if it is.
+
+    A median errs as the frames do that lie within half a pixel of it.
+    """
     if rig.neutral != "auto":
         return float(np.radians(rig.neutral)), None
     change = None if command is None else command.first_change()
     if change is not None and (time < change).any():
         resting = time < change
         return float(line[resting].mean()), resting
-    return float(np.median(line)), np.ones(len(line), bool)
+    middle = float(np.median(line))
+    away = np.abs(line - middle) * lever
+    return middle, away <= max(0.5, float(away.min()))
 
 
 def _duplicates(line: Floats, sigma: Floats, repeated: NDArray[np.bool_]) -> list[int]:

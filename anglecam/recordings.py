@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from anglecam.errors import InputError
+from anglecam.errors import InputError, blame
 from anglecam.estimate.record import Record, record_from_series
 from anglecam.measure import measure_clip
 from anglecam.series import AngleSeries, read_series, write_series
@@ -52,12 +52,13 @@ def measure_session(
         name = recording.name
         try:
             if recording.is_clip:
-                measurement = measure_clip(
-                    recording.source,
-                    session.rig,
-                    recording.command,
-                    progress=lambda done, total, name=name: progress(name, done, total),  # type: ignore[misc]
-                )
+                with blame(recording.source):
+                    measurement = measure_clip(
+                        recording.source,
+                        session.rig,
+                        recording.command,
+                        progress=lambda done, total, name=name: progress(name, done, total),  # type: ignore[misc]
+                    )
                 one = measurement.series
                 if out is not None:
                     write_series(one, out / f"{name}{SERIES_ENDING}")

@@ -14,6 +14,9 @@ from synth.render import Shot, Studio, workers
 from synth.spec import SpecError, read_spec
 from synth.truth import Take, perform, view, write_truth
 
+WORTH_A_WORKER = 60
+"""Frames that take about as long as it takes another worker to start."""
+
 
 def render(path: Path, out: Path, truth: Path) -> None:
     """Render a session.
@@ -55,7 +58,7 @@ def render(path: Path, out: Path, truth: Path) -> None:
 
     shot = Shot(spec.rig, seen.pinhole, spec.camera.noise_grey, spec.seed)
     total = sum(len(take.angles) for take in takes)
-    with _progress() as progress, Studio(shot, min(workers(), total)) as studio:
+    with _progress() as progress, Studio(shot, min(workers(), 1 + total // WORTH_A_WORKER)) as studio:
         bar = progress.add_task("render", total=total)
         for number, take in enumerate(takes):
             progress.update(bar, description=f"render {take.recording.name}")
