@@ -11,6 +11,7 @@ import collections
 import multiprocessing
 import multiprocessing.util
 import os
+import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -131,6 +132,7 @@ _stage: Any
 def _set_up(shot: Shot) -> None:
     """Prepare a worker; the renderer is given back when the process ends, whatever ends it."""
     global _shot, _stage
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
     _shot = shot
     try:
         from synth.offscreen import Stage  # graphics libraries load in the workers only

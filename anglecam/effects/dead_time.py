@@ -31,7 +31,8 @@ EFFECT = Effect(
     parameters=(Parameter("tau_s", null=0.0, lower=0.0, upper=0.5, starts=(0.01, 0.05, 0.15)),),
     aliases=("actuator_lag", "clock_scale"),
     separating_experiment=(
-        "a lamp in the picture that lights at the first command change separates delay from clock offset; "
+        "a lamp in the picture that lights at the first command change separates delay from clock offset (without "
+        "one, what is found is the sum of both); "
         "a chirp up to twice the natural frequency, filmed at 60 Hz or more, separates delay from lag"
     ),
     source="Ljung, System Identification, 2nd ed., 1999, sec. 4.2; the paper's Remarks on Fig. 14",

@@ -78,7 +78,7 @@ def record_from_series(series: AngleSeries, command: Command | None, *, zero_kno
     cross = None
     if series.mouth_px is not None and series.pivot_px is not None:
         lever = np.hypot(*(series.mouth_px - series.pivot_px)[ok].T)
-        cross = lever / np.mean(lever) - 1.0
+        cross = lever / np.mean(lever) - 1.0 if np.all(np.isfinite(lever)) else None
     acts = command is not None and (command.first_change() is not None or (zero_known and command.angle[0] != 0.0))
     record = Record(
         series.name,

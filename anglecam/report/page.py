@@ -106,7 +106,7 @@ def _series_row(series: AngleSeries) -> dict[str, Any]:
     degrees = np.degrees(series.angle[ok])
     lever = None
     if series.mouth_px is not None and series.pivot_px is not None:
-        lever = float(np.nanmedian(np.hypot(*(series.mouth_px - series.pivot_px)[ok].T)))
+        lever = float(np.median(np.hypot(*(series.mouth_px - series.pivot_px)[ok].T)))
     bound = series.bounds.get(6.0)
     return {
         "name": series.name,
@@ -130,4 +130,4 @@ def _model_row(model: Identified) -> dict[str, Any]:
 
 
 def _text(value: float | None, form: str) -> str:
-    return "" if value is None else format(value, form)
+    return "" if value is None or np.isnan(value) else format(value, form)

@@ -121,7 +121,7 @@ def _encode(container: av.container.OutputContainer, frames: Iterable[Frame], me
             stream.pix_fmt = "yuv420p"
             stream.time_base = stream.codec_context.time_base = Fraction(1, _TICKS)
         # H.264 at 4:2:0 has even sides only.
-        drawn = cv2.copyMakeBorder(
+        drawn: Image = cv2.copyMakeBorder(
             draw_frame(shown, measured, frame.index), 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE
         )
         picture = av.VideoFrame.from_ndarray(drawn, format="bgr24")

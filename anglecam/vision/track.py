@@ -191,19 +191,19 @@ def _mark_hidden(
     tangential = np.einsum("ni,nij,nj->n", along, M, along)
     typical = float(np.median(area))
     pose = np.unwrap(turn) if circle is not None else np.zeros(len(turn))
-    # Motion during an exposure, at most the whole frame interval, draws the mouth out along its path.
-    blur = _speed(place, time[rows]) ** 2 / 12.0
-    off = np.abs(_departure(area, pose)) > _tolerance(_departure(area, pose), _LEAST_SHARE * typical)
-    for width, drawn in ((radial, 0.0), (tangential, blur)):
-        d = _departure(width, pose)
-        # The second moment goes with the square of the length.
-        t = _tolerance(d, 2.0 * _LEAST_SHARE * float(np.median(width)))
-        off |= (d < -t) | (d - drawn > t)
+    # Motion during the exposure draws the mouth out along its path by a length that goes with the speed.
+    blur = _speed(place, time[rows]) ** 2
+    off = np.zeros(len(rows), bool)
+    # The second moment goes with the square of the length.
+    for value, least in ((area, _LEAST_SHARE), (radial, 2.0 * _LEAST_SHARE), (tangential, 2.0 * _LEAST_SHARE)):
+        departure = _departure(value, pose, blur)
+        spread = 1.4826 * float(np.median(np.abs(departure - np.median(departure))))
+        off |= np.abs(departure) > max(least * float(np.median(value)), _ROBUST * spread)
     if circle is not None:
         # A mouth that really leaves the circle (a loose thread, a shaking rig) keeps its size; one that only seems
         # to has lost or gained an area that can have moved its centroid so far.
         d = np.abs(np.hypot(*arm.T) - radius)
-        moved = np.abs(_departure(area, pose)) / typical * 2.0 * np.sqrt(np.maximum(radial, tangential))
+        moved = np.abs(_departure(area, pose, blur)) / typical * 2.0 * np.sqrt(np.maximum(radial, tangential))
         off |= (d > max(_ROBUST * circle.scatter_px, _LEAST_OFF_PX)) & (moved > 0.5 * d)
     for i, bad in zip(rows, off | ~whole, strict=True):
         status[i] = HIDDEN if bad else SEEN
@@ -217,23 +217,21 @@ def _join_hidden(status: list[str]) -> None:
                 status[i] = HIDDEN
 
 
-def _departure(value: Floats, pose: Floats) -> Floats:
-    """Return the departure of a value from its robust quadratic trend over the pose (light and perspective)."""
+def _departure(value: Floats, pose: Floats, blur: Floats) -> Floats:
+    """Return the departure of a value from its robust trend: quadratic in pose (light, perspective), linear in blur."""
     x = pose - np.median(pose)
-    degree = 2 if np.ptp(x) > 0.05 and len(x) >= 12 else 0
+    terms = [np.ones_like(x)]
+    if np.ptp(x) > 0.05 and len(x) >= 12:
+        terms += [x, x**2, blur]
+    A = np.column_stack(terms)
     keep = np.ones(len(x), bool)
     rest = value - np.median(value)
     for _ in range(5):
+        keep = np.abs(rest - np.median(rest)) <= 3.0 * max(1.4826 * np.median(np.abs(rest - np.median(rest))), 1e-9)
         if keep.sum() < 6:
             break
-        rest = value - np.polyval(np.polyfit(x[keep], value[keep], degree), x)
-        middle = np.median(rest)
-        keep = np.abs(rest - middle) <= 3.0 * max(1.4826 * np.median(np.abs(rest - middle)), 1e-9)
+        rest = value - A @ np.linalg.lstsq(A[keep], value[keep], rcond=None)[0]
     return rest
-
-
-def _tolerance(departure: Floats, least: float) -> float:
-    return max(least, _ROBUST * 1.4826 * float(np.median(np.abs(departure - np.median(departure)))))
 
 
 def _speed(place: Floats, time: Floats) -> Floats:
