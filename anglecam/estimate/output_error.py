@@ -157,7 +157,8 @@ def fit_output_error(
         The best of the starts.
     """
     own = [_first_state(model, record) for record in records] if own is None else list(own)
-    with _BLAS.limit(limits=1, user_api="blas"):
+    # a trial step may let the plant run away; its cost is then not finite and the step is refused
+    with _BLAS.limit(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         fits = [_fit_once(model, records, np.clip(s, model.lower, model.upper), own, phi, fixed) for s in starts]
     return min(fits, key=lambda fit: fit.cost)
 

@@ -26,6 +26,8 @@ _LEAST_COVERAGE = 0.6
 """Share of a circle's circumference that must point at its centre."""
 _LINE_PX = 1.5
 """A gradient line that passes the centre farther off than this belongs to something else."""
+_EDGE_SHARE = 0.4
+"""Of the steepest gradient; fainter ones are no edge of the marker."""
 _FLOOR_PX = 0.03
 """Standard uncertainty of a marker's centre that no number of edge pixels improves: shading, chroma, codec."""
 _CORRELATED = 2.0
@@ -184,7 +186,9 @@ def _refine(gx: Floats, gy: Floats, centre: Floats, radius: float) -> tuple[Floa
     covariance = None
     for _ in range(10):
         near = np.hypot(xx - centre[0], yy - centre[1])
-        pick = (near <= radius + 3.0) & (near >= 1.5) & (strong > 2.0)
+        pick = (near <= radius + 3.0) & (near >= 1.5)
+        # The marker's edges are the strongest here; the slopes of its ground would drag the centre with them.
+        pick &= strong > _EDGE_SHARE * np.quantile(strong[pick], 0.95)
         p = np.column_stack([xx[pick], yy[pick]]).astype(float)
         size = strong[pick]
         normal = np.column_stack([-gy[pick], gx[pick]]) / size[:, None]

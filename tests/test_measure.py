@@ -1,0 +1,235 @@
+"""From clips to angles: right, as sure as it says, and silent about no frame that it could not measure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from anglecam.budget import angle_sigma, place_errors, worst_case, worst_case_both_ends
+from anglecam.errors import InputError
+from anglecam.measure import measure_clip
+from anglecam.rig import Mouth, Pivot, Rig, read_rig
+from anglecam.session import Command, read_command
+from support import broken
+from support.drawn import Look, Recording, draw_frames, draw_session, write_clip
+
+N = 110
+TIME = np.arange(N) / 30
+SWING = 12.0 * np.sin(2 * np.pi * 0.8 * (TIME - 0.5)) * (TIME > 0.5)
+REST = Command(np.array([0.0, 0.51]), np.array([0.0, 0.1]))
+"""Its first change ends the rest at the start of `SWING`."""
+
+
+def _rig(look: Look, **more) -> Rig:
+    x, y = look.pivot
+    return Rig(**{"facing": look.facing, "pivot": Pivot(near=(x + 8, y - 7))} | more)
+
+
+def _film(folder: Path, look: Look, angle=SWING, edit=None, codec="MJPG") -> Path:
+    path = folder / "clip.avi"
+    frames = list(draw_frames(look, angle, np.arange(len(angle)) / 30, seed=11))
+    if edit is not None:
+        edit(frames, look.mouth(angle))
+    write_clip(path, iter(frames), codec)
+    return path
+
+
+def _errors(series, angle) -> tuple[np.ndarray, np.ndarray]:
+    ok = series.ok
+    return np.degrees(series.angle)[ok] - angle[ok], np.degrees(series.sigma)[ok]
+
+
+SESSIONS = {
+    "ring, mug": (Look(), "auto", 8.0, (0.5, 1.3)),
+    "left, dark skin, red pendulum": (
+        Look(facing="left", lever_px=210.0, skin="dark", marker="ring_white", distractor="pendulum"),
+        "auto",
+        8.0,
+        (0.5, 1.3),
+    ),
+    "disc, book near": (
+        Look(marker="disc_dark", background="gradient", red_object="book", red_place="near"),
+        "declared",
+        8.0,
+        (0.5, 1.3),
+    ),
+    # Without a marker the pivot's uncertainty rules, one draw of it for the clip: only an upper limit can be asked.
+    "no marker, no hint, red lamp": (
+        Look(lever_px=150.0, marker="none", red_place="near", distractor="led"),
+        "auto",
+        None,
+        (0.0, 1.5),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SESSIONS)
+def test_angles_are_right_and_sigma_is_true_beside_a_second_red_object(tmp_path, name):
+    look, mouth, hint, ratio = SESSIONS[name]
+    clips = [Recording("stairs", "stairs", duration_s=5.0, amplitude_deg=14.0)]
+    truth = draw_session(tmp_path, look=look, recordings=clips, mouth=mouth, hint_error_px=hint, seed=4)["stairs"]
+    measured = measure_clip(truth.clip, read_rig(tmp_path / "rig.yaml"), read_command(tmp_path / "stairs.command.csv"))
+    series = measured.series
+    assert series.status == ("ok",) * len(truth.angle_deg)
+    error, sigma = _errors(series, truth.angle_deg)
+    assert np.sqrt((error**2).mean()) < 0.03
+    assert ratio[0] < np.sqrt(((error / sigma) ** 2).mean()) < ratio[1]
+    # Against the centroid's own place: the distractor never won.
+    assert np.hypot(*(series.mouth_px - truth.mouth_px).T).max() < 1.0
+    six = np.degrees(series.bounds[6.0])
+    assert (np.abs(error) < six).all()
+    np.testing.assert_allclose(six, np.degrees(np.arcsin(6.0 / look.lever_px)), rtol=0.02)
+    np.testing.assert_allclose(series.time, truth.time_s, atol=1e-9)
+
+
+def test_a_lever_of_120_px_stays_below_a_tenth_of_a_degree(tmp_path):
+    look = Look(lever_px=120.0, skin="dark")
+    series = measure_clip(_film(tmp_path, look), _rig(look), REST).series
+    error, _ = _errors(series, SWING)
+    assert np.sqrt((error**2).mean()) < 0.1
+    assert series.ok.all()
+
+
+def test_occluded_frames_are_marked_and_no_wrong_row_is_ok(tmp_path):
+    look = Look()
+    hidden = dict(zip(range(60, 73), (5, 9, 14, 25, 60, 60, 60, 60, 60, 25, 14, 9, 5), strict=True))
+
+    def cover(frames, mouths):
+        for i, width in hidden.items():
+            x, y = mouths[i].round().astype(int)
+            cv2.rectangle(frames[i], (x + 24 - width, y - 90), (x + 24, y + 90), (90, 120, 60), -1)
+
+    series = measure_clip(_film(tmp_path, look, edit=cover), _rig(look), REST).series
+    wrong = np.zeros(N, bool)
+    wrong[[i for i, width in hidden.items() if width >= 14]] = True
+    assert all(series.status[i] == "occluded" for i in np.flatnonzero(wrong))
+    assert (np.array(series.status)[[i for i in range(N) if i not in hidden]] == "ok").all()
+    error, _ = _errors(series, SWING)
+    assert np.abs(error).max() < 0.12
+    assert np.isnan(series.angle[~series.ok]).all()
+    assert np.isnan(series.mouth_px[~series.ok]).all()
+
+
+def test_a_repeated_frame_in_motion_is_a_duplicate_and_at_rest_it_is_not(tmp_path):
+    def repeat(frames, _):
+        for i in (30, 31, 50):
+            frames[i] = frames[i - 1]
+
+    look = Look(noise=0.0)
+    series = measure_clip(_film(tmp_path, look, edit=repeat, codec="FFV1"), _rig(look), REST).series
+    assert [i for i, s in enumerate(series.status) if s != "ok"] == [30, 31, 50]
+    assert {series.status[i] for i in (30, 31, 50)} == {"duplicate"}
+
+
+def test_a_clip_at_rest_is_measured_beside_a_larger_red_mug(tmp_path):
+    look = Look(lever_px=200.0)
+    measured = measure_clip(_film(tmp_path, look, np.zeros(40)), _rig(look))
+    assert measured.series.ok.all()
+    assert np.hypot(*(measured.series.mouth_px - look.mouth(np.zeros(40))).T).max() < 1.0
+    assert np.degrees(np.abs(measured.series.angle)).max() < 0.01
+
+
+@pytest.mark.parametrize("rgb", [(225, 62, 70), (150, 20, 20)])
+def test_a_declared_colour_may_be_30_levels_off(tmp_path, rgb):
+    look = Look()
+    measured = measure_clip(_film(tmp_path, look), _rig(look, mouth=Mouth(rgb=rgb)), REST)
+    error, _ = _errors(measured.series, SWING)
+    assert np.sqrt((error**2).mean()) < 0.03
+    assert np.abs(np.array(measured.colour_rgb) - look.lips_rgb).max() < 15
+
+
+def test_flicker_and_pale_lips_do_no_harm(tmp_path):
+    def flicker(frames, _):
+        for i, frame in enumerate(frames):
+            frames[i] = cv2.convertScaleAbs(frame, alpha=1 + 0.1 * np.sin(2.3 * i))
+
+    look = Look(lips_rgb=(168, 92, 92))
+    series = measure_clip(_film(tmp_path, look, edit=flicker), _rig(look), REST).series
+    error, _ = _errors(series, SWING)
+    assert series.ok.mean() > 0.97
+    assert np.sqrt((error**2).mean()) < 0.03
+
+
+def test_neutral_is_what_is_declared_else_the_rest_else_the_median(tmp_path):
+    look = Look(marker="disc_bright", facing="left")
+    clip = _film(tmp_path, look)
+    declared = measure_clip(clip, _rig(look, neutral=look.neutral_deg - 3.0), REST).series
+    rest = measure_clip(clip, _rig(look, pixel_error_px=(4.0,)), REST).series
+    median = measure_clip(clip, _rig(look)).series
+    np.testing.assert_allclose(np.degrees(declared.angle), SWING + 3.0, atol=0.5)  # centroid and centre differ a little
+    np.testing.assert_allclose(np.degrees(rest.angle), SWING, atol=0.1)
+    assert abs(np.median(median.angle)) < 1e-12
+    np.testing.assert_allclose(rest.line, median.line)
+    assert set(rest.bounds) == {4.0, 6.0, 10.0}
+
+
+def test_a_marker_away_from_the_centre_of_rotation_is_reported(tmp_path):
+    look = Look(marker="none")
+
+    def paint(frames, _):
+        x, y = (look.pivot + (0.0, 5.0)).round().astype(int)
+        for frame in frames:
+            cv2.circle(frame, (int(x), int(y)), 9, (20, 20, 20), -1, cv2.LINE_AA)
+
+    measured = measure_clip(_film(tmp_path, look, edit=paint), _rig(look), REST)
+    assert any("px apart" in note for note in measured.notes)
+    error, _ = _errors(measured.series, SWING)
+    assert np.abs(error).max() < 0.15
+
+
+def test_a_clip_without_a_mouth_is_one_line_with_counts_and_colour(tmp_path):
+    clip = broken.clip_without_mouth(tmp_path)
+    for rig, colour in ((Rig(), "auto"), (Rig(mouth=Mouth(rgb=(190, 35, 40))), "190,35,40")):
+        with pytest.raises(InputError) as error:
+            measure_clip(clip, rig)
+        assert str(error.value) == (
+            f"{clip}: no mouth found in 30 of 30 frames (colour {colour}); is it in the picture?"
+        )
+
+
+def test_a_red_mug_that_stands_still_is_no_mouth_of_a_head_that_nods(tmp_path):
+    look = Look(lips_rgb=(216, 182, 160))
+    with pytest.raises(InputError, match="no mouth found"):
+        measure_clip(_film(tmp_path, look, SWING[:60]), _rig(look))
+
+
+def test_what_is_left_of_a_truncated_clip_is_measured_and_the_rest_is_said(tmp_path):
+    look = Look()
+    cut = broken.truncated_clip(tmp_path, _film(tmp_path, look))
+    measured = measure_clip(cut, _rig(look), REST)
+    read = sum(s != "undecodable" for s in measured.series.status)
+    assert 55 < read < 75
+    assert measured.truncated == f"truncated: {read} of {N} frames could be read"
+    error, _ = _errors(measured.series, SWING[: measured.frames])
+    assert np.sqrt((error**2).mean()) < 0.03
+    assert measure_clip(tmp_path / "clip.avi", _rig(look), REST).truncated is None
+
+
+def test_worst_cases_at_the_papers_arms():
+    np.testing.assert_allclose(np.degrees(worst_case(6.0, [1228.0, 842.5])), [0.28, 0.408], atol=5e-4)
+    assert np.degrees(worst_case(10.0, 842.5)) == pytest.approx(0.68, abs=5e-4)
+    assert worst_case_both_ends(5.0, 842.5) == worst_case(10.0, 842.5)
+    np.testing.assert_allclose(worst_case(6.0, [6.0, 3.0, 0.0]), np.pi)
+    assert np.isnan(worst_case(6.0, np.nan))
+
+
+def test_sigma_propagates_noise_pose_and_pivot():
+    rng = np.random.default_rng(0)
+    pivot, R, n = np.array([200.0, 300.0]), 170.0, 400
+    covariance = np.diag([0.3, 0.1]) ** 2
+    angle = np.where(np.arange(n) < 100, 0.0, np.radians(15 * np.sin(np.arange(n) / 20)))
+    pulls = []
+    for _ in range(60):
+        mouth = pivot + R * np.column_stack([np.cos(angle), -np.sin(angle)]) + 0.03 * rng.standard_normal((n, 2))
+        used = pivot + np.sqrt(np.diag(covariance)) * rng.standard_normal(2)
+        off = np.hypot(*(mouth - pivot).T) - R
+        errors = place_errors(mouth, off, np.full(n, 0.01), np.full(n, 0.01))
+        resting = np.arange(n) < 100
+        sigma = angle_sigma(mouth, used, covariance, errors, resting)
+        arm = mouth - used
+        line = np.arctan2(-arm[:, 1], arm[:, 0])
+        pulls.append((line - line[resting].mean() - angle) / sigma)
+    assert 0.85 < np.std(pulls) < 1.15

@@ -1,0 +1,54 @@
+"""A real film: the ball is followed, and the turning points are the film-maker's own to one frame."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from anglecam.measure import measure_clip
+from anglecam.rig import Mouth, Pivot, Rig
+
+FOLDER = Path(__file__).parents[2] / "shared" / "real" / "pendulum-red-ball"
+FRAME_S = 1 / 24
+
+pytestmark = pytest.mark.skipif(not (FOLDER / "esempio.avi").exists(), reason="the real film is not here")
+
+
+@pytest.fixture(scope="module", params=["auto", "declared"])
+def measured(request):
+    mouth = "auto" if request.param == "auto" else Mouth(rgb=(215, 50, 25))
+    return measure_clip(FOLDER / "esempio.avi", Rig(mouth=mouth, pivot=Pivot(marker="none")))
+
+
+def test_the_ball_is_found_once_the_hand_is_off_it(measured):
+    ok = measured.series.ok
+    assert measured.frames == 480
+    assert ok[30:].mean() > 0.98
+    np.testing.assert_allclose(measured.series.time, np.arange(480) * FRAME_S, atol=1e-6)
+
+
+def test_its_path_is_a_circle_about_a_pivot_above_the_picture(measured):
+    series, circle = measured.series, measured.circle
+    off = np.hypot(*(series.mouth_px - circle.centre_px).T)[30:] - circle.radius_px
+    assert np.sqrt(np.nanmean(off**2)) < 1.3
+    assert abs(measured.pivot.centre_px[0] - 650) < 4
+    assert abs(measured.pivot.centre_px[1] + 709) < 25
+
+
+def test_turning_points_agree_with_the_film_makers_to_one_frame(measured):
+    series = measured.series
+    x = series.mouth_px[:, 0]
+    with (FOLDER / "log.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 17
+    for row in rows:
+        said = float(row["Istante (ms)"]) / 1e3
+        sign = 1.0 if row["Lato"] == "DX" else -1.0
+        near = np.flatnonzero((np.abs(series.time - said) < 0.4) & np.isfinite(x))
+        turned = near[np.argmax(sign * x[near])]
+        # the log is in whole milliseconds
+        assert abs(series.time[turned] - said) <= FRAME_S + 0.0015
+        assert abs(x[turned] - float(row["X (pixel)"])) < 8

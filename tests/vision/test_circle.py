@@ -1,0 +1,48 @@
+"""The centre of rotation from a path: right, robust, and as sure as it says."""
+
+import numpy as np
+import pytest
+
+from anglecam.vision.circle import circle_through, fit_circle
+
+
+def _arc(half_deg, n, rng, noise=0.03, centre=(214.5, 301.3), radius=170.0):
+    at = np.radians(rng.uniform(-half_deg, half_deg, n))
+    return np.array(centre) + radius * np.column_stack([np.cos(at), np.sin(at)]) + noise * rng.standard_normal((n, 2))
+
+
+def test_three_points_give_their_circle():
+    centre, radius = circle_through(np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]) * 50 + 7)
+    np.testing.assert_allclose([*centre, radius], [7, 7, 50], atol=1e-9)
+
+
+def test_points_on_a_line_have_no_circle():
+    points = np.column_stack([np.arange(9.0), 2.0 * np.arange(9.0)])
+    assert not np.isfinite(circle_through(points)[1]) or circle_through(points)[1] > 1e6
+
+
+def test_a_tenth_of_wrong_points_does_not_move_the_centre():
+    rng = np.random.default_rng(1)
+    points = _arc(20, 200, rng)
+    points[::10] += rng.uniform(3, 30, (20, 2))
+    found = fit_circle(points)
+    assert np.hypot(*(found.centre_px - [214.5, 301.3])) < 0.5
+    assert not found.fits[::10].any()
+    assert found.scatter_px == pytest.approx(0.03, rel=0.3)
+
+
+@pytest.mark.parametrize("half_deg", [8, 12, 25])
+def test_the_covariance_is_not_too_small(half_deg):
+    rng = np.random.default_rng(half_deg)
+    pulls = []
+    for _ in range(40):
+        found = fit_circle(_arc(half_deg, 120, rng))
+        off = found.centre_px - [214.5, 301.3]
+        pulls.append(off @ np.linalg.solve(found.centre_covariance_px2, off) / 2)
+    # White noise alone: the allowance for slow errors makes the stated uncertainty larger, never smaller.
+    assert np.mean(pulls) < 1.2
+
+
+def test_a_mark_at_rest_has_no_circle():
+    rng = np.random.default_rng(0)
+    assert fit_circle(np.array([100.0, 100.0]) + 0.02 * rng.standard_normal((100, 2))) is None
