@@ -7,7 +7,7 @@ LIBRARIES := libegl1 libgl1 libgl1-mesa-dri
 DEMO := build/demo
 
 .DEFAULT_GOAL := help
-.PHONY: help setup system demo test check bench lock clean
+.PHONY: help setup system demo test check lock clean
 
 help: ## list what there is
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-8s %s\n", $$1, $$2}'

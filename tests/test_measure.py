@@ -16,7 +16,7 @@ from anglecam.session import Command, read_command
 from support import broken
 from support.drawn import Look, Recording, draw_frames, draw_session, write_clip
 
-N = 110
+N = 66
 TIME = np.arange(N) / 30
 SWING = 12.0 * np.sin(2 * np.pi * 0.8 * (TIME - 0.5)) * (TIME > 0.5)
 REST = Command(np.array([0.0, 0.51]), np.array([0.0, 0.1]))
@@ -43,17 +43,19 @@ def _errors(series, angle) -> tuple[np.ndarray, np.ndarray]:
 
 
 SESSIONS = {
-    "ring, mug": (Look(), "auto", 8.0, (0.5, 1.3)),
+    "ring, mug": (Look(), "auto", 8.0, 0.03, (0.5, 1.3)),
     "left, dark skin, red pendulum": (
         Look(facing="left", lever_px=210.0, skin="dark", marker="ring_white", distractor="pendulum"),
         "auto",
         8.0,
+        0.03,
         (0.5, 1.3),
     ),
     "disc, book near": (
         Look(marker="disc_dark", background="gradient", red_object="book", red_place="near"),
         "declared",
         8.0,
+        0.03,
         (0.5, 1.3),
     ),
     # Without a marker the pivot's uncertainty rules, one draw of it for the clip: only an upper limit can be asked.
@@ -61,6 +63,7 @@ SESSIONS = {
         Look(lever_px=150.0, marker="none", red_place="near", distractor="led"),
         "auto",
         None,
+        0.06,
         (0.0, 1.5),
     ),
 }
@@ -68,14 +71,14 @@ SESSIONS = {
 
 @pytest.mark.parametrize("name", SESSIONS)
 def test_angles_are_right_and_sigma_is_true_beside_a_second_red_object(tmp_path, name):
-    look, mouth, hint, ratio = SESSIONS[name]
-    clips = [Recording("stairs", "stairs", duration_s=5.0, amplitude_deg=14.0)]
+    look, mouth, hint, limit, ratio = SESSIONS[name]
+    clips = [Recording("stairs", "stairs", duration_s=4.0, amplitude_deg=14.0)]
     truth = draw_session(tmp_path, look=look, recordings=clips, mouth=mouth, hint_error_px=hint, seed=4)["stairs"]
     measured = measure_clip(truth.clip, read_rig(tmp_path / "rig.yaml"), read_command(tmp_path / "stairs.command.csv"))
     series = measured.series
     assert series.status == ("ok",) * len(truth.angle_deg)
     error, sigma = _errors(series, truth.angle_deg)
-    assert np.sqrt((error**2).mean()) < 0.03
+    assert np.sqrt((error**2).mean()) < limit
     assert ratio[0] < np.sqrt(((error / sigma) ** 2).mean()) < ratio[1]
     # Against the centroid's own place: the distractor never won.
     assert np.hypot(*(series.mouth_px - truth.mouth_px).T).max() < 1.0
@@ -95,7 +98,7 @@ def test_a_lever_of_120_px_stays_below_a_tenth_of_a_degree(tmp_path):
 
 def test_occluded_frames_are_marked_and_no_wrong_row_is_ok(tmp_path):
     look = Look()
-    hidden = dict(zip(range(60, 73), (5, 9, 14, 25, 60, 60, 60, 60, 60, 25, 14, 9, 5), strict=True))
+    hidden = dict(zip(range(45, 58), (5, 9, 14, 25, 60, 60, 60, 60, 60, 25, 14, 9, 5), strict=True))
 
     def cover(frames, mouths):
         for i, width in hidden.items():
@@ -115,13 +118,13 @@ def test_occluded_frames_are_marked_and_no_wrong_row_is_ok(tmp_path):
 
 def test_a_repeated_frame_in_motion_is_a_duplicate_and_at_rest_it_is_not(tmp_path):
     def repeat(frames, _):
-        for i in (30, 31, 50):
+        for i in (30, 31, 48):
             frames[i] = frames[i - 1]
 
     look = Look(noise=0.0)
     series = measure_clip(_film(tmp_path, look, edit=repeat, codec="FFV1"), _rig(look), REST).series
-    assert [i for i, s in enumerate(series.status) if s != "ok"] == [30, 31, 50]
-    assert {series.status[i] for i in (30, 31, 50)} == {"duplicate"}
+    assert [i for i, s in enumerate(series.status) if s != "ok"] == [30, 31, 48]
+    assert {series.status[i] for i in (30, 31, 48)} == {"duplicate"}
 
 
 def test_a_clip_at_rest_is_measured_beside_a_larger_red_mug(tmp_path):
@@ -193,7 +196,7 @@ def test_a_clip_without_a_mouth_is_one_line_with_counts_and_colour(tmp_path):
 def test_a_red_mug_that_stands_still_is_no_mouth_of_a_head_that_nods(tmp_path):
     look = Look(lips_rgb=(216, 182, 160))
     with pytest.raises(InputError, match="no mouth found"):
-        measure_clip(_film(tmp_path, look, SWING[:60]), _rig(look))
+        measure_clip(_film(tmp_path, look, SWING[:50]), _rig(look))
 
 
 def test_what_is_left_of_a_truncated_clip_is_measured_and_the_rest_is_said(tmp_path):
@@ -201,7 +204,7 @@ def test_what_is_left_of_a_truncated_clip_is_measured_and_the_rest_is_said(tmp_p
     cut = broken.truncated_clip(tmp_path, _film(tmp_path, look))
     measured = measure_clip(cut, _rig(look), REST)
     read = sum(s != "undecodable" for s in measured.series.status)
-    assert 55 < read < 75
+    assert 33 < read < 48
     assert measured.truncated == f"truncated: {read} of {N} frames could be read"
     error, _ = _errors(measured.series, SWING[: measured.frames])
     assert np.sqrt((error**2).mean()) < 0.03

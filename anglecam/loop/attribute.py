@@ -114,4 +114,7 @@ def alias_set(best: Candidate, base: Fit, records: Sequence[Record], others: Seq
 
 
 def _gain(before: Fit, after: Fit) -> float:
-    return 0.5 * len(before.white) * math.log(before.cost / after.cost)
+    if not math.isfinite(after.cost):
+        return -math.inf
+    finest = len(before.white) * 1e-9**2  # rad², so that data without any noise do not divide by nothing
+    return 0.5 * len(before.white) * math.log((before.cost + finest) / (after.cost + finest))

@@ -8,6 +8,7 @@ interval above zero. What remains after that, and would still be seen, is ``unex
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -27,6 +28,8 @@ MOST_EFFECTS = 3
 NEGLIGIBLE = 0.5
 """In a film, structure smaller than this share of the noise is neither traced nor called unexplained: the pixel grid
 leaves that much along the path, the same wherever the mouth passes, which it does not leave across it."""
+FINEST = math.radians(1e-3)
+"""No structure smaller than this is traced: forward models and files are not much finer."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,8 @@ def close_records(
     plant = Plant(driven=driven)
     ledger = [e for e in LEDGER if driven or e.shift_command is None]
     witness = witness_noise(fitted)
-    negligible = NEGLIGIBLE * witness.sigma if witness and witness.source == DISTANCE else 0.0
+    camera = witness.sigma if witness and witness.source == DISTANCE else 0.0
+    negligible = max(FINEST, NEGLIGIBLE * camera)
 
     progress("base model")
     own_starts = [s[: plant.base_count] for s in starts]
@@ -129,7 +133,7 @@ def close_records(
     before = _recolour(before, fitted, fit.phi)
     before_held_out, after_held_out = (predict_output_error(f, predicted) for f in (before, fit))
     noise = witness or stated_noise(fitted) or _left_over(fit)
-    remains = not gate.passed and (negligible == 0.0 or fit.rmse**2 > noise.sigma**2 + negligible**2)
+    remains = not gate.passed and fit.rmse**2 > camera**2 + negligible**2
     if remains:  # nothing is named, so nothing is added
         fit, after_held_out = before, before_held_out
     verdict = "unexplained" if remains else "attributed" if accepted else "nothing_missing"

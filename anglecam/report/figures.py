@@ -145,7 +145,8 @@ def _panels(records: Sequence[Record], draw: Callable[[Axes, int], None], height
         for i, ax in enumerate(axes[:, 0]):
             draw(ax, i)
             ax.set_title(records[i].name, loc="left", fontsize=9)
-        axes[0, 0].legend(loc="upper right", ncols=3, fontsize=8)
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper right", ncols=3, fontsize=8)
         axes[-1, 0].set_xlabel("time, s")
         return _svg(figure)
 

@@ -36,6 +36,12 @@ _MOVED_PX = 4.0
 """A path with a smaller extent counts as rest."""
 _HINT_PX = 30.0
 """A hint at the pivot may be off by this much."""
+_SKIN_A = (4.0, 24.0)
+"""a* of skin of every complexion; its b* is one to three times that."""
+_TOP_PX = 40
+"""The most mouth-like hue is that of the 40th pixel, past the codec's outliers."""
+_MOST_NOISE = 0.15
+"""Standard deviation of the surroundings' fraction of mouth above which they and the mouth are one."""
 _PER_FRAME = 12
 _TRIALS = 600
 _HUE_TOLERANCE = np.radians(25.0)
@@ -94,36 +100,38 @@ def find_mouth(
         ``None`` where nothing stands out in hue, or what does stand still while other things move.
     """
     maps = [cv2.GaussianBlur(hue_contrast(image, rgb), (0, 0), 1.0) for image in images]
-    usual, top = _hue_range(maps)
+    at_rest = not _something_moves(images)
+    usual, top = _hue_range(maps, at_rest)
     if top - usual < _LEAST_CONTRAST:
         return None
-    best: _Track | None = None
+    tracks: list[_Track] = []
     for share in LEVELS:
         level = usual + share * (top - usual)
         if level - usual < _LEAST_CONTRAST / 2.0:
             continue
         patches = _cut_out(maps, level, usual)
-        for track in (_moving_track(patches, maps, level, near_px), _resting_track(patches, images, level)):
-            if track is not None and (best is None or track.score > best.score):
-                best = track
-    if best is None:
-        return None
-    model = _learn(images, maps, best)
-    if model is None or (rgb is not None and not _same_hue(model.chroma, chroma_of(rgb))):
-        return None
-    area, place = best.patches.area[best.members], best.patches.place[best.members]
-    return Found(model, float(np.median(area)), np.median(place, axis=0), best.circle)
+        found = [_moving_track(patches, maps, level, near_px)]
+        if at_rest:
+            found.append(_resting_track(patches, images, level))
+        tracks += [track for track in found if track is not None]
+    for track in sorted(tracks, key=lambda t: -t.score):
+        model = _learn(images, maps, track)
+        if model is None or (rgb is not None and not _same_hue(model.chroma, chroma_of(rgb))):
+            continue
+        area, place = track.patches.area[track.members], track.patches.place[track.members]
+        return Found(model, float(np.median(area)), np.median(place, axis=0), track.circle)
+    return None
 
 
-def _hue_range(maps: Sequence[NDArray[Any]]) -> tuple[float, float]:
+def _hue_range(maps: Sequence[NDArray[Any]], at_rest: bool) -> tuple[float, float]:
     """Return the usual hue contrast of the picture, and the top one: of what changes, if enough does."""
     stack_max = np.maximum.reduce(list(maps))
     change = stack_max - np.minimum.reduce(list(maps))
     usual = float(np.median(maps[0]))
-    moving = stack_max[change > _LEAST_CONTRAST]
-    tops = [np.partition(p.ravel(), -40)[-40] for p in (stack_max, moving) if p.size >= 40]
     # What moves sets the scale, for a static thing may be far redder than the mouth.
-    return usual, float(tops[-1])
+    moving = stack_max[change > _LEAST_CONTRAST]
+    top = moving if moving.size >= _TOP_PX and not at_rest else stack_max.ravel()
+    return usual, float(np.partition(top, -_TOP_PX)[-_TOP_PX])
 
 
 def _cut_out(maps: Sequence[NDArray[Any]], level: float, usual: float) -> _Patches:
@@ -247,17 +255,26 @@ def _score(patches: _Patches, members: NDArray[np.int64], frames: int, extent: f
 
 def _resting_track(patches: _Patches, images: Sequence[Image], level: float) -> _Track | None:
     """Take the patch that stands out most in a clip in which nothing moves."""
-    if not len(patches.frame) or _something_moves(images):
+    if not len(patches.frame):
         return None
     best: _Track | None = None
     for seed in np.flatnonzero(patches.frame == patches.frame[0]):
         near = np.hypot(*(patches.place - patches.place[seed]).T) < _MOVED_PX
         alike = np.abs(np.log(patches.area / patches.area[seed])) < 0.4
         members = np.flatnonzero(near & alike)
-        score = _score(patches, members, len(images), 0.0)
+        score = _score(patches, members, len(images), 0.0) * (0.2 + _skin_around(images[0], patches, int(seed)))
         if best is None or score > best.score:
             best = _Track(score, level, members, patches, None)
     return best
+
+
+def _skin_around(image: Image, patches: _Patches, seed: int) -> float:
+    """Return the share of the pixels around a patch that have a skin's hue; lips at rest have nothing else to show."""
+    reach = round(float(np.sqrt(patches.area[seed])))
+    x, y = np.round(patches.place[seed]).astype(int)
+    box = image[max(y - reach, 0) : y + reach + 1, max(x - reach, 0) : x + reach + 1]
+    a, b = (cv2.cvtColor(box, cv2.COLOR_BGR2LAB)[..., k].astype(float) - 128.0 for k in (1, 2))
+    return float(((a > _SKIN_A[0]) & (a < _SKIN_A[1]) & (b > a) & (b < 3.0 * a)).mean())
 
 
 def _something_moves(images: Sequence[Image]) -> bool:
@@ -272,7 +289,8 @@ def _something_moves(images: Sequence[Image]) -> bool:
 
 
 def _learn(images: Sequence[Image], maps: Sequence[NDArray[Any]], track: _Track) -> ColourModel | None:
-    inside, around, elsewhere = [], [], []
+    """Learn the colour from a track's patches; ``None`` where they do not stand out from what is next to them."""
+    inside, around, elsewhere, contrast = [], [], [], []
     for m in track.members:
         t = int(track.patches.frame[m])
         red = (maps[t] > track.level).astype(np.uint8)
@@ -288,10 +306,16 @@ def _learn(images: Sequence[Image], maps: Sequence[NDArray[Any]], track: _Track)
         collar = collar & (1 - red_too)
         inside.append(images[t][core > 0])
         around.append(images[t][collar > 0])
+        if collar.any():
+            contrast.append(float(np.median(maps[t][core > 0]) - np.median(maps[t][collar > 0])))
         rest = np.s_[::8, ::8]
         elsewhere.append(images[t][rest][red_too[rest] == 0])
     parts = [np.concatenate(p).astype(float) for p in (inside, around, elsewhere)]
-    return learn_colour(*parts) if all(len(p) >= 20 for p in parts) else None
+    # A blush stands out from the wall, but not from the face.
+    if min(map(len, parts)) < 20 or np.median(contrast) < _LEAST_CONTRAST:
+        return None
+    model = learn_colour(*parts)
+    return model if model.noise < _MOST_NOISE else None
 
 
 def _same_hue(chroma: Floats, declared: Floats) -> bool:
