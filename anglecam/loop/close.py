@@ -20,7 +20,7 @@ from anglecam.estimate.output_error import Fit, fit_output_error, predict_output
 from anglecam.estimate.record import Record
 from anglecam.estimate.start import start_parameters
 from anglecam.loop.attribute import Candidate, alias_set, fit_candidates, fit_with
-from anglecam.loop.gate import Gate, test_residual
+from anglecam.loop.gate import LEVEL, Gate, test_residual
 from anglecam.loop.holdout import Gain, held_out_gain, split_records
 from anglecam.simulate.plant import Plant
 
@@ -28,6 +28,8 @@ MOST_EFFECTS = 3
 NEGLIGIBLE = 0.5
 """In a film, structure smaller than this share of the noise is neither traced nor called unexplained: the pixel grid
 leaves that much along the path, the same wherever the mouth passes, which it does not leave across it."""
+SURE = 0.01
+"""After an effect has proven itself, what remains must be this improbable as noise to take the verdict back."""
 FINEST = math.radians(1e-3)
 """No structure smaller than this is traced: forward models and files are not much finer."""
 
@@ -133,7 +135,8 @@ def close_records(
     before = _recolour(before, fitted, fit.phi)
     before_held_out, after_held_out = (predict_output_error(f, predicted) for f in (before, fit))
     noise = witness or stated_noise(fitted) or _left_over(fit)
-    remains = not gate.passed and fit.rmse**2 > camera**2 + negligible**2
+    level = SURE if accepted else LEVEL
+    remains = gate.p_value < level and fit.rmse**2 > camera**2 + negligible**2
     if remains:  # nothing is named, so nothing is added
         fit, after_held_out = before, before_held_out
     verdict = "unexplained" if remains else "attributed" if accepted else "nothing_missing"

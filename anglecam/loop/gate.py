@@ -2,10 +2,10 @@
 
 Several tests look at the whitened residual of a fitted model: along the sensitivity of each effect that could be
 added, along functions of angle, velocity, command and time, and at its autocorrelation. Every statistic is a share
-of the residual's own energy, so none of them needs the noise's size. Their null distribution comes from a
-parametric bootstrap: white noise, from which what the fit absorbs (the space of its Jacobian) is taken out as the
-fit takes it out. The smallest of the tests' p-values is calibrated by the same draws, so the number of tests is paid
-for. Davison and Hinkley, Bootstrap Methods and their Application, 1997, sec. 4.2 and 4.4.
+of the residual's own energy, so none of them needs the noise's size. The smallest of the tests' p-values is the
+gate's statistic; its null distribution comes from a parametric bootstrap: white noise, from which what the fit
+absorbs (the space of its Jacobian) is taken out as the fit takes it out. So neither the number of tests nor what
+they share has to be known. Davison and Hinkley, Bootstrap Methods and their Application, 1997, sec. 4.2 and 4.4.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import beta, chi2, norm
 
 from anglecam.effects import Effect
 from anglecam.estimate.output_error import Fit, whiten
@@ -80,28 +81,26 @@ def test_residual(fit: Fit, records: Sequence[Record], candidates: Sequence[Effe
     both = np.column_stack([fit.white - absorbed @ (absorbed.T @ fit.white), draws])
     energy = np.sum(both**2, axis=0)
 
+    free = n - absorbed.shape[1]
     bases = {f"effect:{e.id}": sensitivity(fit, records, e) for e in candidates} | _shapes(fit, records)
-    statistics, strength = {}, {}
+    p_each, strength = {}, {}
     for name, basis in bases.items():
         left = basis - absorbed @ (absorbed.T @ basis)
-        statistics[name] = _share(left, basis, both, one_sided=name.startswith("effect:")) / energy
+        p_each[name] = _p_of_share(left, basis, both, energy, free, one_sided=name.startswith("effect:"))
         strength[name] = float(np.linalg.norm(left[:, 0]))
-    statistics["autocorrelation"] = _portmanteau(both, records)
+    p_each["autocorrelation"] = chi2.sf(_portmanteau(both, records), LAGS)
 
-    # under the null the data are one more draw: each is ranked among all, and so is the smallest of its ranks
-    table = np.array(list(statistics.values()))
-    p_each = np.array([np.mean(row[None, :] >= row[:, None], axis=1) for row in table])
-    smallest = p_each.min(axis=0)
+    # under the null the data are one more draw: the smallest of its p-values is ranked among all draws'
+    smallest = np.min(list(p_each.values()), axis=0)
     p_value = np.mean(smallest <= smallest[0])
     critical = float(np.quantile(smallest[1:], LEVEL))
-    noise = np.sqrt(fit.cost / (n - absorbed.shape[1]))
-    detectable = {}
-    for effect in candidates:
-        name = f"effect:{effect.id}"
-        threshold = np.sqrt(np.quantile(statistics[name][1:], 1.0 - critical) * energy[1:].mean())
-        if strength[name] > 0.0:
-            detectable[effect.id] = float((threshold + 1.645) * noise / strength[name])
-    tests = tuple(Test(name, float(p)) for name, p in zip(statistics, p_each[:, 0], strict=True))
+    noise = np.sqrt(fit.cost / free)
+    detectable = {
+        e.id: float((norm.isf(critical) + norm.isf(0.05)) * noise / strength[f"effect:{e.id}"])
+        for e in candidates
+        if strength[f"effect:{e.id}"] > 0.0
+    }
+    tests = tuple(Test(name, float(p[0])) for name, p in p_each.items())
     return Gate(float(p_value), tests, detectable)
 
 
@@ -150,15 +149,23 @@ def _shapes(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
     return {name: np.concatenate(blocks) for name, blocks in groups.items()}
 
 
-def _share(left: Floats, basis: Floats, residuals: Floats, *, one_sided: bool) -> Floats:
-    """Return the energy of each residual (columns) within the space of ``left``."""
+def _p_of_share(
+    left: Floats, basis: Floats, residuals: Floats, energy: Floats, free: int, *, one_sided: bool
+) -> Floats:
+    """Return, for each residual (columns), the p-value of its share of energy within the space of ``left``.
+
+    Of white noise in n dimensions the share that falls into k of them is Beta(k/2, (n − k)/2).
+    """
     u, size, _ = np.linalg.svd(left, full_matrices=False)
     u = u[:, size > 1e-6 * max(float(np.linalg.norm(basis)), 1e-300)]
+    k = u.shape[1]
+    if k == 0:
+        return np.ones(residuals.shape[1])
     along = u.T @ residuals
-    if one_sided and left.shape[1] == 1 and u.shape[1] == 1:
-        along *= np.sign(u[:, 0] @ left[:, 0])
-        along = np.maximum(along, 0.0)
-    return np.sum(along**2, axis=0)
+    p = beta.sf(np.sum(along**2, axis=0) / energy, 0.5 * k, 0.5 * (free - k))
+    if one_sided and left.shape[1] == 1:  # most effects exist on one side of their null only
+        p = np.where(along[0] * np.sign(u[:, 0] @ left[:, 0]) > 0.0, 0.5 * p, 1.0 - 0.5 * p)
+    return p
 
 
 def _portmanteau(residuals: Floats, records: Sequence[Record]) -> Floats:
