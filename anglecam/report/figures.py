@@ -153,6 +153,6 @@ def _panels(records: Sequence[Record], draw: Callable[[Axes, int], None], height
 
 def _svg(figure: Figure) -> str:
     text = io.StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None})
+    figure.savefig(text, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     plt.close(figure)
     return text.getvalue()[text.getvalue().index("<svg") :]
