@@ -60,6 +60,12 @@ def verdict_as_dict(verdict: Verdict) -> dict[str, Any]:
 def sentence(verdict: Verdict) -> str:
     """Say the verdict so that a student understands it."""
     before, after = np.degrees(verdict.before_held_out.rmse), np.degrees(verdict.after_held_out.rmse)
+    if verdict.verdict == "nothing_missing" and not verdict.first_gate.passed:
+        return (
+            f"Nothing is missing that this camera could show: what θ̈ = c·u − a·θ̇ − b·θ leaves over ({before:.3g}° on "
+            f"recordings that it was not fitted to) is no larger than the camera's noise allows "
+            f"({np.degrees(verdict.noise.sigma):.3g}°)."
+        )
     if verdict.verdict == "nothing_missing":
         return (
             f"Nothing is missing: what θ̈ = c·u − a·θ̇ − b·θ leaves over ({before:.3g}° on recordings that it was not "

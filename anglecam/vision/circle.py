@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from skimage.measure import CircleModel
 
 Floats = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ class Circle:
 
 
 def circle_through(points_px: Floats) -> tuple[Floats, float]:
-    """Fit a circle algebraically (Taubin 1991, in the SVD form of Chernov 2010, section 5.8).
+    """Fit a circle algebraically, with scikit-image.
 
     Parameters
     ----------
@@ -58,22 +59,10 @@ def circle_through(points_px: Floats) -> tuple[Floats, float]:
     radius_px : float
         Infinite there.
     """
-    mean = points_px.mean(axis=0)
-    d = points_px - mean
-    z = (d**2).sum(axis=1)
-    spread = z.mean()
-    if spread < 1e-12:
+    model = CircleModel.from_estimate(points_px)
+    if not model:
         return np.full(2, np.nan), np.inf
-    z0 = (z - spread) / (2.0 * np.sqrt(spread))
-    _, _, V = np.linalg.svd(np.column_stack([z0, d]), full_matrices=False)
-    a = V[-1]
-    a0 = a[0] / (2.0 * np.sqrt(spread))
-    if abs(a0) < 1e-12:
-        return np.full(2, np.nan), np.inf
-    offset = -spread * a0
-    centre = -a[1:] / (2.0 * a0)
-    radius = np.sqrt(max((a[1:] ** 2).sum() / (4.0 * a0**2) - offset / a0, 0.0))
-    return centre + mean, float(radius)
+    return np.asarray(model.center, dtype=float), float(model.radius)
 
 
 def fit_circle(points_px: Floats, *, start: tuple[Floats, float] | None = None) -> Circle | None:
