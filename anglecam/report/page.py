@@ -47,6 +47,7 @@ def write_report(
     """
     # autoescape: names of files and recordings are the user's, and SVG is marked safe where it is put in
     environment = Environment(loader=PackageLoader("anglecam.report", "."), autoescape=True, undefined=StrictUndefined)
+    environment.filters["p"] = lambda value: f"{value:.3f}" if value >= 1e-3 else "< 0.001"
     result = verdict_as_dict(verdict)
     drawings = {
         "prediction": figures.prediction_figure(verdict.fitted, verdict.before, "base model"),
