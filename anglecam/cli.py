@@ -49,7 +49,7 @@ SessionFolder = Annotated[Path, typer.Argument(metavar="SESSION", help="Folder o
 
 @app.command()
 def measure(
-    clips: Annotated[list[Path], typer.Argument(metavar="CLIP…", help="Clips, or folders of clips.")],
+    clips: Annotated[list[Path], typer.Argument(metavar="CLIP", help="Clips, or folders of clips.")],
     out: Out,
     rig: Annotated[
         Path | None, typer.Option("--rig", help="Rig file for all clips; default: rig.yaml beside each clip.")
@@ -99,7 +99,7 @@ def identify(
     estimator: Annotated[str, typer.Option("--estimator", help=f"One of {', '.join(ESTIMATORS)}.")] = "oe2",
 ) -> None:
     """Fit a model to a session: model.json."""
-    if estimator not in ESTIMATORS:
+    if estimator not in ESTIMATORS:  # before any clip is measured
         raise RigError(f"--estimator {estimator}: choose one of {', '.join(ESTIMATORS)}")
     chosen: Estimator = estimator  # type: ignore[assignment]
     opened, measured = _open(session, out)
@@ -171,6 +171,8 @@ def _open(session: Path, out: Path) -> tuple[Session, Measured]:
     opened = read_session(session)
     _make_folder(out)
     _say_what_is_not_applied(opened.rig, session / "rig.yaml")
+    for note in opened.notes:
+        errors.print(note)
     with _progress() as bars:
         tasks = {r.name: bars.add_task(r.source.name, total=None) for r in opened.recordings if r.is_clip}
         measured = measure_session(
@@ -195,10 +197,12 @@ def _expand(paths: list[Path], problems: list[AnglecamError]) -> Iterator[Path]:
 
 
 def _make_folder(out: Path) -> None:
+    if out.is_file():
+        raise RigError(f"--out {out}: is a file; give a folder")
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
-        raise RigError(f"--out {out}: {problem.strerror}") from problem
+        raise RigError(f"--out {out}: this folder cannot be made ({problem.strerror})") from problem
 
 
 def _say_what_is_not_applied(rig: Rig, where: Path) -> None:

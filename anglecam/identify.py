@@ -9,6 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.errors import RigError
 from anglecam.estimate.ekf import fit_ekf, settings_for
 from anglecam.estimate.noise import autoregression, stated_noise, witness_noise
 from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error
@@ -63,7 +64,7 @@ class Identified:
                 "settling_time_s": self.step.settling_time,
                 "steady_state_deg": self.step.steady_state,
             },
-            "noise_correlation": self.fit.phi,
+            "residual_correlation": phi(self.fit),
         }
 
 
@@ -88,19 +89,26 @@ def identify_records(
     -------
     Identified
         The model.
+
+    Raises
+    ------
+    RigError
+        Where there is no such estimator.
     """
+    if estimator not in ESTIMATORS:
+        raise RigError(f"no estimator {estimator!r}; choose one of {', '.join(ESTIMATORS)}")
     driven = any(r.command is not None for r in fitted)
     starts = start_parameters(fitted)
     if "model" in rig.model_fields_set:
         starts.insert(0, declared_start(rig)[: 3 if driven else 2])
     plant = Plant(driven=driven)
-    fit = _coloured(fit_output_error(plant, fitted, starts), fitted)
+    fit = fit_output_error(plant, fitted, starts)
     if estimator == "ekf":
         fit, values, sigmas = _by_filter(fit, fitted, starts[0])
     else:
         if estimator == "oe3":
-            fit = _coloured(_third_order(fit, fitted), fitted)
-        values, sigmas = fit.parameters, fit.sigma
+            fit = _third_order(fit, fitted)
+        values, sigmas = fit.parameters, fit.coloured_sigma(fitted, phi(fit))
     scale = fit.model.to_file
     return Identified(
         estimator,
@@ -113,15 +121,14 @@ def identify_records(
     )
 
 
+def phi(fit: Fit) -> float:
+    """Return the correlation from frame to frame that a fit's residual shows."""
+    return autoregression(fit.residuals, "residual").phi
+
+
 def declared_start(rig: Rig) -> Floats:
     """Return the rig's starting values a (1/s), b (1/s²), c (1/s²)."""
     return np.array([rig.model.a, rig.model.b, rig.model.c])
-
-
-def _coloured(fit: Fit, records: Sequence[Record]) -> Fit:
-    """Fit again with the correlation that the residual itself shows, so that the stated sigma counts it."""
-    phi = autoregression(fit.residuals, "residual").phi
-    return fit_output_error(fit.model, records, [fit.parameters], own=fit.own, phi=phi)
 
 
 def _by_filter(fit: Fit, records: Sequence[Record], start: Floats) -> tuple[Fit, Floats, Floats]:

@@ -273,8 +273,9 @@ def _colour(rig: Rig) -> str:
 def _no_mouth(path: Path, sample: Sample, rig: Rig) -> str:
     if not sample.decoded:
         return f"{path}: none of its {sample.count} frames can be decoded"
+    hint = "" if rig.pivot.near is None else ", turning about the hint at {:g},{:g}".format(*rig.pivot.near)
     return (
-        f"{path}: no mouth found in {sample.count} of {sample.count} frames (colour {_colour(rig)});"
+        f"{path}: no mouth found in {sample.count} of {sample.count} frames (colour {_colour(rig)}{hint});"
         " is it in the picture?"
     )
 

@@ -139,4 +139,5 @@ def _first(error: ValidationError) -> str:
     key = ".".join(str(part) for part in finding["loc"] if part not in ("Mouth", "literal['auto']", "float"))
     if unknown:
         return f"unknown key {key}"
-    return f"{key}: {finding['msg'][0].lower()}{finding['msg'][1:]} (got {str(finding['input'])[:60]})"
+    said = finding["msg"].replace("tuple", "list")
+    return f"{key}: {said[0].lower()}{said[1:]} (got {str(finding['input'])[:60]})"

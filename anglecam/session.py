@@ -6,7 +6,7 @@ that recording alone: `read_session` returns it among ``problems`` and goes on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -66,8 +66,10 @@ class Session:
     rig: Rig
     recordings: tuple[Recording, ...]
     """In the order of their names."""
-    problems: tuple[InputError, ...] = field(default=())
+    problems: tuple[InputError, ...] = ()
     """What made a recording unusable, one for each."""
+    notes: tuple[str, ...] = ()
+    """What the user should know, a line each."""
 
 
 def read_command(path: Path) -> Command:
@@ -134,7 +136,8 @@ def read_session(directory: Path) -> Session:
         Where the folder, its rig file or the names it holds out are wrong, or it has no recording at all.
     """
     if not directory.is_dir():
-        raise RigError(f"{directory}: no such folder")
+        found = "is a file; a session is a folder" if directory.is_file() else "no such folder"
+        raise RigError(f"{directory}: {found}")
     rig = rig_beside(directory)
     sources: dict[str, Path] = {}
     problems: list[InputError] = []
@@ -155,4 +158,7 @@ def read_session(directory: Path) -> Session:
             recordings.append(Recording(name, source, command_beside(source)))
         except InputError as problem:
             problems.append(problem)
-    return Session(directory, rig, tuple(recordings), tuple(problems))
+    commands = sorted(directory.glob(f"*{COMMAND_ENDING}"))
+    orphans = [p for p in commands if p.name.removesuffix(COMMAND_ENDING) not in sources]
+    notes = tuple(f"{p}: not used; there is no recording of that name" for p in orphans)
+    return Session(directory, rig, tuple(recordings), tuple(problems), notes)

@@ -5,7 +5,7 @@
 The paper's command acts at once, Eqs. (5) and (29), though its own Fig. 14 shows "an initial delay in the actual
 response that was not captured". A serial link, a 50 Hz pulse frame and the servo's electronics each hold a command
 back. The camera cannot tell this from a constant offset between its clock and the command's: without a lamp that
-lights at the first command change, what is found is the sum of both.
+lights at the first command change, what is found is the sum of both, which may be below zero.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ def _shift(time: Floats, value: Floats, parameters: Floats) -> tuple[Floats, Flo
 EFFECT = Effect(
     id="dead_time",
     station="command",
-    summary="The head starts to move a fixed time after the command changes.",
+    summary="The head answers the command a fixed time late (early, where the command's clock lags the camera's).",
     equation="θ̈ = c·u(t − τ) − a·θ̇ − b·θ",
     relaxes="Eqs. (5), (29): the command acts at once",
-    parameters=(Parameter("tau_s", null=0.0, lower=0.0, upper=0.5, starts=(0.01, 0.05, 0.15)),),
+    parameters=(Parameter("tau_s", null=0.0, lower=-0.5, upper=0.5, starts=(0.01, 0.05, 0.15, -0.03)),),
     aliases=("actuator_lag", "clock_scale"),
     separating_experiment=(
         "a lamp in the picture that lights at the first command change separates delay from clock offset (without "

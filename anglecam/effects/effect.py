@@ -7,7 +7,7 @@ there through one *port* of the integrator. Its parameters at their null leave t
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -50,11 +50,11 @@ class Effect:
     separating_experiment: str
     """What to record next to tell it from its aliases."""
     source: str
-    shift_command: Callable[[Floats, Floats, Floats], tuple[Floats, Floats]] | None = None
+    shift_command: Callable[[Floats, Floats, Floats], tuple[Floats, Floats]] | None = field(default=None, repr=False)
     """Port *command*: (switch times s, values rad, parameters) → the same as the plant receives them."""
-    load: Any = None
+    load: Any = field(default=None, repr=False)
     """Port *load*: compiled (θ, ω, u, parameters) → angular acceleration added, rad/s²; smooth in all."""
-    dry: Any = None
+    dry: Any = field(default=None, repr=False)
     """Port *dry*: compiled (parameters) → (level while sliding, level to break away), rad/s²; opposes motion."""
 
     @property

@@ -9,9 +9,10 @@ Ljung, System Identification, 2nd ed., 1999, sec. 7.5.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -55,15 +56,15 @@ class Fit:
     model: Model
     parameters: Floats
     """(p,) shared parameters, SI, in the order of ``model.names``."""
-    own: tuple[Floats, ...]
+    own: tuple[Floats, ...] = field(repr=False)
     """Each recording's own unknowns: initial states, then the zero (rad) unless declared."""
-    residuals: tuple[Floats, ...]
+    residuals: tuple[Floats, ...] = field(repr=False)
     """Measured minus predicted angle of each recording, rad."""
-    jacobian: Floats
+    jacobian: Floats = field(repr=False)
     """(N, p + Σ own) derivative of the whitened predictions, 1/σ left out."""
     phi: float
     """Autocorrelation of the noise from frame to frame that the fit was whitened with."""
-    white: Floats
+    white: Floats = field(repr=False)
     """(N,) whitened residuals of all recordings, rad."""
 
     @property
@@ -77,26 +78,37 @@ class Fit:
         return float(self.white @ self.white)
 
     @cached_property
-    def covariance(self) -> Floats:
-        """(p, p) covariance of ``parameters``, SI; a parameter held by its bound has none (NaN)."""
+    def sigma(self) -> Floats:
+        """(p,) standard uncertainties of ``parameters``, SI, of noise that the whitening made white."""
+        return self._sigma(lambda jacobian: jacobian)
+
+    def coloured_sigma(self, records: Sequence[Record], phi: float) -> Floats:
+        """Return the same for a fit without whitening whose noise is nevertheless AR(1) with φ = ``phi``.
+
+        The covariance is the sandwich (JᵀJ)⁻¹ JᵀRJ (JᵀJ)⁻¹, R the correlation of the noise.
+        """
+
+        def correlate(jacobian: Floats) -> Floats:
+            edges = np.cumsum([0, *(len(r.time) for r in records)])
+            parts = zip(records, pairwise(edges), strict=True)
+            return np.concatenate([_correlate(r, phi, jacobian[i:j]) for r, (i, j) in parts])
+
+        return self._sigma(correlate)
+
+    def _sigma(self, correlate: Callable[[Floats], Floats]) -> Floats:
         p = len(self.parameters)
         margin = 1e-6 * self.model.scales
         free = (self.parameters > self.model.lower + margin) & (self.parameters < self.model.upper - margin)
         columns = np.concatenate([free, np.ones(self.jacobian.shape[1] - p, bool)])
-        jacobian = self.jacobian[:, columns]
-        norm = np.linalg.norm(jacobian, axis=0)
+        norm = np.linalg.norm(self.jacobian[:, columns], axis=0)
         norm[norm == 0.0] = 1.0
+        jacobian = self.jacobian[:, columns] / norm
         variance = self.cost / max(1, len(self.white) - jacobian.shape[1])
-        inverse = np.linalg.pinv((jacobian / norm).T @ (jacobian / norm)) / np.outer(norm, norm) * variance
-        covariance = np.full((p, p), np.nan)
-        n = int(free.sum())
-        covariance[np.ix_(free, free)] = inverse[:n, :n]
-        return covariance
-
-    @property
-    def sigma(self) -> Floats:
-        """(p,) standard uncertainties of ``parameters``, SI."""
-        return np.sqrt(np.diag(self.covariance))
+        bread = np.linalg.pinv(jacobian.T @ jacobian)
+        covariance = variance * bread @ (jacobian.T @ correlate(jacobian)) @ bread
+        sigma = np.full(p, np.nan)  # a parameter held by its bound has none
+        sigma[free] = (np.sqrt(np.diag(covariance)) / norm)[: int(free.sum())]
+        return sigma
 
 
 def whiten(record: Record, phi: float, values: Floats) -> Floats:
@@ -123,6 +135,16 @@ def whiten(record: Record, phi: float, values: Floats) -> Floats:
     if values.ndim == 2:
         step, scale = step[:, None], scale[:, None]
     return np.concatenate([values[:1], (values[1:] - step * values[:-1]) * scale])
+
+
+def _correlate(record: Record, phi: float, values: Floats) -> Floats:
+    """Multiply (n, k) values by the correlation matrix of AR(1) noise, by one pass forwards and one backwards."""
+    step = phi ** (np.diff(record.time) / record.interval)
+    forwards, backwards = values.copy(), values.copy()
+    for i in range(1, len(values)):
+        forwards[i] += step[i - 1] * forwards[i - 1]
+        backwards[-1 - i] += step[-i] * backwards[-i]
+    return forwards + backwards - values
 
 
 def fit_output_error(

@@ -15,6 +15,8 @@ Floats = NDArray[np.float64]
 
 STILL = 0.02
 """Share of the whole swing within which the angle counts as not yet released."""
+REST = 10.0
+"""A range below this many median steps from frame to frame is noise about a rest: of white noise it is 5 to 8."""
 LEAST_FRAMES = 20
 """Fewer measured frames than this tell nothing about a model of three parameters and three unknowns of its own."""
 
@@ -94,6 +96,9 @@ def record_from_series(series: AngleSeries, command: Command | None, *, zero_kno
 
 def _from_release(record: Record) -> Record:
     """Leave out the frames in which something still holds what will swing freely; the model knows no hand."""
+    jitter = float(np.median(np.abs(np.diff(record.angle))))
+    if np.ptp(record.angle) < REST * jitter:
+        raise InputError(f"{record.name}: no command, and nothing moves; there is no swing to fit")
     start = np.median(record.angle[:5])
     moved = np.abs(record.angle - start) > STILL * np.ptp(record.angle)
     first = int(np.argmax(moved))

@@ -30,6 +30,8 @@ NEGLIGIBLE = 0.5
 leaves that much along the path, the same wherever the mouth passes, which it does not leave across it."""
 SURE = 0.01
 """After an effect has proven itself, what remains must be this improbable as noise to take the verdict back."""
+CONTRADICTED = 3.0
+"""A model that errs this many times more on what was held out than on what was fitted lacks something there."""
 FINEST = math.radians(1e-3)
 """No structure smaller than this is traced: forward models and files are not much finer."""
 
@@ -136,7 +138,8 @@ def close_records(
     before_held_out, after_held_out = (predict_output_error(f, predicted) for f in (before, fit))
     noise = witness or stated_noise(fitted) or _left_over(fit)
     level = SURE if accepted else LEVEL
-    remains = gate.p_value < level and fit.rmse**2 > camera**2 + negligible**2
+    structured = gate.p_value < level and fit.rmse**2 > camera**2 + negligible**2
+    remains = structured or after_held_out.rmse > CONTRADICTED * max(fit.rmse, FINEST)
     if remains:  # nothing is named, so nothing is added
         fit, after_held_out = before, before_held_out
     verdict = "unexplained" if remains else "attributed" if accepted else "nothing_missing"

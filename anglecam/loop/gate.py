@@ -82,11 +82,15 @@ def test_residual(fit: Fit, records: Sequence[Record], candidates: Sequence[Effe
     energy = np.sum(both**2, axis=0)
 
     free = n - absorbed.shape[1]
+    # most effects exist on one side of their null only
+    one_sided = {
+        f"effect:{e.id}" for e in candidates if e.parameters[0].null in (e.parameters[0].lower, e.parameters[0].upper)
+    }
     bases = {f"effect:{e.id}": sensitivity(fit, records, e) for e in candidates} | _shapes(fit, records)
     p_each, strength = {}, {}
     for name, basis in bases.items():
         left = basis - absorbed @ (absorbed.T @ basis)
-        p_each[name] = _p_of_share(left, basis, both, energy, free, one_sided=name.startswith("effect:"))
+        p_each[name] = _p_of_share(left, basis, both, energy, free, one_sided=name in one_sided)
         strength[name] = float(np.linalg.norm(left[:, 0]))
     p_each["autocorrelation"] = chi2.sf(_portmanteau(both, records), LAGS)
 
@@ -163,7 +167,7 @@ def _p_of_share(
         return np.ones(residuals.shape[1])
     along = u.T @ residuals
     p = beta.sf(np.sum(along**2, axis=0) / energy, 0.5 * k, 0.5 * (free - k))
-    if one_sided and left.shape[1] == 1:  # most effects exist on one side of their null only
+    if one_sided and left.shape[1] == 1:
         p = np.where(along[0] * np.sign(u[:, 0] @ left[:, 0]) > 0.0, 0.5 * p, 1.0 - 0.5 * p)
     return p
 

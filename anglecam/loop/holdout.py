@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +35,8 @@ def split_records(records: Sequence[Record], held_out: Sequence[str]) -> tuple[l
     records : sequence of Record
         All recordings.
     held_out : sequence of str
-        Names to predict only. With none named, the last driven recording by name (the last of all, if none is
-        driven) is held out; a single recording is cut in time, its last third held out.
+        Names to predict only. With none named, the last driven recording by name is held out (the last of all, if
+        none is driven); if it is the only one of its kind it is cut in time, and its last third held out.
 
     Returns
     -------
@@ -55,13 +55,14 @@ def split_records(records: Sequence[Record], held_out: Sequence[str]) -> tuple[l
             raise RigError("every recording is held out; nothing is left to fit")
         if predicted:
             return fitted, predicted
-    if len(records) == 1:
-        record = records[0]
-        cut = float(record.time[2 * len(record.time) // 3])
-        return [record.between(-np.inf, cut)], [record.between(cut, np.inf)]
-    driven = [r for r in records if r.command is not None]
-    last = max(driven or records, key=lambda r: r.name)
-    return [r for r in records if r is not last], [last]
+    kind = [r for r in records if r.command is not None] or list(records)
+    last = max(kind, key=lambda r: r.name)
+    others = [r for r in records if r is not last]
+    if len(kind) > 1:
+        return others, [last]
+    cut = float(last.time[2 * len(last.time) // 3])
+    rest = replace(last.between(cut, np.inf), name=f"{last.name}, last third")
+    return [*others, last.between(-np.inf, cut)], [rest]
 
 
 def held_out_gain(before: Fit, after: Fit, records: Sequence[Record], rng: np.random.Generator) -> Gain:

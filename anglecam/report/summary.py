@@ -16,8 +16,10 @@ from anglecam.measure import Measurement
 def series_table(measurements: Sequence[Measurement]) -> Table:
     """Tabulate measured clips: frames, range, uncertainty, pivot."""
     table = Table("clip", "measured", "angle, °", "median sigma, °", "6 px bound, °", "pivot")
-    for column in table.columns[1:]:
+    for column in table.columns[1:5]:
         column.justify = "right"
+    for column in table.columns[:3]:
+        column.no_wrap = True
     for measurement in measurements:
         series = measurement.series
         ok = series.ok
@@ -58,4 +60,6 @@ def loop_table(verdict: Verdict) -> Table:
     table.add_row("held-out error, ° RMS", f"{before:.4f} before, {after:.4f} after")
     table.add_row("noise floor, ° RMS", f"{np.degrees(verdict.noise.sigma):.4f} ({verdict.noise.source})")
     table.add_row("p of the base model's residual", f"{verdict.first_gate.p_value:.3f}")
+    if verdict.verdict != "unexplained" and not verdict.last_gate.passed:
+        table.add_row("what still shows", "less than half of the noise; not traced")
     return table
