@@ -136,3 +136,11 @@ def test_a_held_out_name_that_is_no_recording_is_the_rigs_fault(tmp_path):
     (tmp_path / "rig.yaml").write_text("held_out: [nowhere]")
     with pytest.raises(RigError, match="held_out names nowhere"):
         read_session(tmp_path)
+
+
+def test_a_command_without_a_recording_is_told(tmp_path):
+    (tmp_path / "a.angles.csv").write_text("time_s,angle_deg\n0,1\n1,2\n2,3\n")
+    (tmp_path / "b.command.csv").write_text("time_s,command_deg\n0,0\n")
+    session = read_session(tmp_path)
+    assert session.problems == ()
+    assert "b.command.csv" in session.notes[0]

@@ -25,14 +25,14 @@ def _shift(time: Floats, value: Floats, parameters: Floats) -> tuple[Floats, Flo
 EFFECT = Effect(
     id="dead_time",
     station="command",
-    summary="The head answers the command a fixed time late (early, where the command's clock lags the camera's).",
+    summary="The head answers the command a fixed time late.",
     equation="θ̈ = c·u(t − τ) − a·θ̇ − b·θ",
     relaxes="Eqs. (5), (29): the command acts at once",
     parameters=(Parameter("tau_s", null=0.0, lower=-0.5, upper=0.5, starts=(0.01, 0.05, 0.15, -0.03)),),
     aliases=("actuator_lag", "clock_scale"),
     separating_experiment=(
         "a lamp in the picture that lights at the first command change separates delay from clock offset (without "
-        "one, what is found is the sum of both); "
+        "one, what is found is the sum of both, and a time below zero says that the command's clock lags); "
         "a chirp up to twice the natural frequency, filmed at 60 Hz or more, separates delay from lag"
     ),
     source="Ljung, System Identification, 2nd ed., 1999, sec. 4.2; the paper's Remarks on Fig. 14",

@@ -64,9 +64,9 @@ def plot_series(series: AngleSeries, path: Path) -> None:
                 top.axvline(t, color=BEFORE, lw=0.6, alpha=0.5)
             top.plot([], [], color=BEFORE, lw=0.6, label=f"no angle: {lost.sum()} of {len(lost)} frames")
         top.set(ylabel="angle from neutral, °", title=series.name)
-        top.legend(loc="upper right", ncols=3, fontsize=8)
-        bottom.semilogy(series.time, np.degrees(series.sigma), color=AFTER, lw=1.0)
-        bottom.set(xlabel="time on the clip's clock, s", ylabel="sigma, °")
+        figure.legend(*top.get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8)
+        bottom.plot(series.time, np.degrees(series.sigma), color=AFTER, lw=1.0)
+        bottom.set(xlabel="time on the clip's clock, s", ylabel="sigma, °", ylim=(0.0, None))
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=110)
         plt.close(figure)
@@ -79,7 +79,10 @@ def prediction_figure(records: Sequence[Record], fit: Fit, label: str) -> str:
     def draw(axes: Axes, i: int) -> None:
         record = records[i]
         if record.command is not None:
-            axes.plot(record.time, np.degrees(record.command.at(record.time)), color=COMMAND, lw=0.8, label="command")
+            inside = (record.command.time > record.time[0]) & (record.command.time < record.time[-1])
+            knots = np.concatenate([record.time[:1], record.command.time[inside], record.time[-1:]])
+            held = np.degrees(record.command.at(knots))
+            axes.step(knots, held, where="post", color=COMMAND, lw=0.8, label="command")
         axes.plot(record.time, np.degrees(record.angle), ".", color=MEASURED, ms=2.5, label="measured")
         axes.plot(record.time, np.degrees(paths[i]), color=BEFORE, lw=1.0, label=label)
         axes.set_ylabel("angle, °")
@@ -87,15 +90,29 @@ def prediction_figure(records: Sequence[Record], fit: Fit, label: str) -> str:
     return _panels(records, draw, 1.7)
 
 
-def residual_figure(records: Sequence[Record], before: Fit, after: Fit, floor: float) -> str:
-    """Draw what each model leaves over, a panel for each recording, with the band of the noise (rad), as SVG."""
+def residual_figure(records: Sequence[Record], fits: dict[str, Fit], floor: float) -> str:
+    """Draw what models leave over, a panel for each recording, with the band of the noise (rad), as SVG.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        What was fitted or predicted.
+    fits : dict of str to Fit
+        By label, ``before`` or ``after``.
+    floor : float
+        Standard deviation of the noise, rad.
+
+    Returns
+    -------
+    str
+        An ``<svg>`` element.
+    """
+    colours = {"before": BEFORE, "after": AFTER}
 
     def draw(axes: Axes, i: int) -> None:
-        time = records[i].time
         axes.axhspan(-2 * np.degrees(floor), 2 * np.degrees(floor), color=FAINT, zorder=0, label="noise, ±2σ")
-        axes.plot(time, np.degrees(before.residuals[i]), color=BEFORE, lw=0.9, label="before")
-        if after is not before:
-            axes.plot(time, np.degrees(after.residuals[i]), color=AFTER, lw=0.9, label="after")
+        for label, fit in fits.items():
+            axes.plot(records[i].time, np.degrees(fit.residuals[i]), color=colours[label], lw=0.9, label=label)
         axes.set_ylabel("residual, °")
 
     return _panels(records, draw, 1.5)
@@ -133,7 +150,8 @@ def candidate_figure(verdict: Verdict) -> str:
         ax.barh(rows + 0.18, gains, 0.34, color=AFTER, label="on fitted recordings")
         ax.barh(rows - 0.18, held, 0.34, color=MEASURED, label="on held-out recordings")
         ax.set_yticks(rows, names)
-        ax.set_xscale("symlog", linthresh=10)
+        if max(gains + held, default=0.0) > 30.0:
+            ax.set_xscale("symlog", linthresh=10)
         ax.set_xlabel("log-likelihood gained over the model without it")
         ax.legend(fontsize=8)
         return _svg(figure)

@@ -49,13 +49,16 @@ def write_report(
     environment = Environment(loader=PackageLoader("anglecam.report", "."), autoescape=True, undefined=StrictUndefined)
     environment.filters["p"] = lambda value: f"{value:.3f}" if value >= 1e-3 else "< 0.001"
     result = verdict_as_dict(verdict)
+    floor = verdict.noise.sigma
+    held_out = {"before": verdict.before_held_out}
+    if verdict.accepted:
+        held_out["after"] = verdict.after_held_out
     drawings = {
         "prediction": figures.prediction_figure(verdict.fitted, verdict.before, "base model"),
-        "residual": figures.residual_figure(verdict.fitted, verdict.before, verdict.after, verdict.noise.sigma),
+        "residual": figures.residual_figure(verdict.fitted, {"before": verdict.before}, floor),
         "candidates": figures.candidate_figure(verdict),
-        "held_out": figures.residual_figure(
-            verdict.held_out, verdict.before_held_out, verdict.after_held_out, verdict.noise.sigma
-        ),
+        "held_out": figures.residual_figure(verdict.held_out, held_out, floor),
+        "held_out_after": figures.residual_figure(verdict.held_out, {"after": verdict.after_held_out}, floor),
         "shape": figures.shape_figure(verdict),
     }
     text = environment.get_template("page.html").render(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from anglecam.loop.close import close_records
+from anglecam.loop.holdout import split_records
 from anglecam.loop.result import sentence, verdict_as_dict
 from support.motion import Plant as TruePlant
 from support.series import session
@@ -63,3 +64,26 @@ def test_one_recording_alone_is_cut_in_time():
     verdict = close_records(session(TruePlant(dead_time_s=0.05), 14)[-1:])
     assert [a.effect.id for a in verdict.accepted] == ["dead_time"]
     assert verdict.held_out[0].time[0] > verdict.fitted[0].time[-1]
+
+
+def test_a_clock_offset_below_zero_is_found_as_a_dead_time_below_zero():
+    def lagging(record):
+        return replace(record, command=replace(record.command, time=record.command.time + 0.02))
+
+    verdict = close_records([lagging(r) for r in session(TruePlant(), 15)], held_out=HELD_OUT)
+    (found,) = verdict_as_dict(verdict)["effects"]
+    assert found["id"] == "dead_time"
+    assert found["parameters"]["tau_s"]["value"] == pytest.approx(-0.02, abs=0.001)
+
+
+def test_a_lone_driven_recording_is_cut_in_time_and_not_held_out_whole():
+    driven, other = session(TruePlant(), 16)[:2]
+    fitted, held_out = split_records([driven, replace(other, command=None)], [])
+    assert any(r.command is not None for r in fitted)
+    assert held_out[0].time[0] > max(r.time[-1] for r in fitted if r.name == driven.name)
+
+
+def test_a_model_that_fails_on_held_out_data_is_not_called_complete():
+    *quiet, loud = session(TruePlant(), 17, sigma_deg=0.01)
+    shaken = replace(loud, angle=loud.angle + np.radians(0.5) * np.sin(9.0 * loud.time))
+    assert close_records([*quiet, shaken], held_out=HELD_OUT).verdict == "unexplained"
