@@ -30,6 +30,7 @@ system:
 	fi
 
 $(STAMP): pyproject.toml requirements/build.lock requirements/anglecam.lock
+	@echo "setup: making $(VENV) (1.1 GB) with the packages of requirements/anglecam.lock; this takes a minute or two"
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements/build.lock
 	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes --no-build-isolation -r requirements/anglecam.lock
