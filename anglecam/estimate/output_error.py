@@ -196,7 +196,7 @@ def _fit_once(
     p = len(start)
     edges = np.cumsum([p, *(len(o) for o in own)])
     rows = np.cumsum([0, *(len(r.time) for r in records)])
-    shared = slice(p, p) if fixed else slice(0, p)
+    shared = [] if fixed else list(range(p))
 
     def split(x: Floats) -> tuple[Floats, list[Floats]]:
         return x[:p], [x[edges[i] : edges[i + 1]] for i in range(len(records))]
@@ -216,8 +216,8 @@ def _fit_once(
         for i, (record, o) in enumerate(zip(records, unknowns, strict=True)):
             both = np.concatenate([parameters, o])
             magnitudes = np.concatenate([np.maximum(model.scales, np.abs(parameters)), np.full(len(o), 0.1)])
-            columns = [*range(*shared.indices(p)), *range(p, p + len(o))]
-            place = [*range(*shared.indices(p)), *range(edges[i], edges[i + 1])]
+            columns = [*shared, *range(p, p + len(o))]
+            place = [*shared, *range(edges[i], edges[i + 1])]
             block = np.empty((len(record.time), len(columns)))
             for k, j in enumerate(columns):
                 step = 1e-5 * magnitudes[j]
@@ -232,7 +232,7 @@ def _fit_once(
         return result
 
     x0 = np.concatenate([start, *own])
-    free = np.arange(p, len(x0)) if fixed else np.arange(len(x0))
+    free = np.array([*shared, *range(p, len(x0))])
     lower, upper = np.full(len(x0), -np.inf), np.full(len(x0), np.inf)
     lower[:p], upper[:p] = model.lower, model.upper
 
@@ -241,9 +241,14 @@ def _fit_once(
         full[free] = x
         return full
 
+    def ended(x: Floats, white: Floats, slopes: Floats) -> Fit:
+        parameters, unknowns = split(x)
+        left = tuple(r.angle - predict(r, parameters, o) for r, o in zip(records, unknowns, strict=True))
+        return Fit(model, parameters, tuple(unknowns), left, slopes, phi, white)
+
     inside = np.clip(x0, np.nextafter(lower, np.inf), np.nextafter(upper, -np.inf))
     if not np.all(np.isfinite(errors(inside))):
-        return _ended(model, records, split(x0), np.full(rows[-1], np.inf), np.zeros((rows[-1], len(x0))), phi, predict)
+        return ended(x0, np.full(rows[-1], np.inf), np.zeros((rows[-1], len(x0))))
     found = least_squares(
         lambda x: errors(whole(x)),
         inside[free],
@@ -256,13 +261,7 @@ def _fit_once(
         max_nfev=60,
     )
     x = whole(found.x)
-    return _ended(model, records, split(x), errors(x), -jacobian(x), phi, predict)
-
-
-def _ended(model, records, parts, white, jacobian, phi, predict) -> Fit:  # type: ignore[no-untyped-def]
-    parameters, own = parts
-    residuals = tuple(r.angle - predict(r, parameters, o) for r, o in zip(records, own, strict=True))
-    return Fit(model, parameters, tuple(own), residuals, jacobian, phi, white)
+    return ended(x, errors(x), -jacobian(x))
 
 
 def _first_state(model: Model, record: Record) -> Floats:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.estimate.output_error import Model
 from anglecam.session import Command
 
 Floats = NDArray[np.float64]
@@ -32,7 +33,7 @@ class StepFigures:
 NO_STEP = StepFigures(np.nan, np.nan, np.nan, np.nan)
 
 
-def step_figures(model, parameters: Floats, poles: NDArray, steady_state: float) -> StepFigures:  # type: ignore[no-untyped-def]
+def step_figures(model: Model, parameters: Floats, poles: NDArray, steady_state: float) -> StepFigures:
     """Simulate the response to a unit step and read its figures off.
 
     Parameters

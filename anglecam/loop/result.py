@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from anglecam.effects import Effect, effect
+from anglecam.effects import Effect, Parameter, effect
 from anglecam.loop.close import Verdict
 
 MODEL_NAMES = ("a_per_s", "b_per_s2", "c_per_s2")
@@ -107,5 +107,5 @@ def _values(verdict: Verdict) -> list[dict[str, float]]:
     ]
 
 
-def _first(effect_id: str):  # type: ignore[no-untyped-def]
+def _first(effect_id: str) -> Parameter:
     return effect(effect_id).parameters[0]
