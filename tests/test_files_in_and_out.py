@@ -83,6 +83,12 @@ def test_a_bad_series_is_one_line_with_file_and_cause(tmp_path, text, says):
     assert "\n" not in message
 
 
+def test_words_in_an_angle_column_are_told(tmp_path):
+    path = broken.angles_with_text(tmp_path)
+    with pytest.raises(InputError, match="not a number"):
+        read_series(path)
+
+
 def test_a_command_is_held_until_its_next_row():
     command = Command(np.array([0.0, 1.0, 2.0]), np.array([0.0, 0.0, 0.3]))
     assert command.first_change() == 2.0

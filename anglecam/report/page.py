@@ -94,6 +94,7 @@ def write_report(
                 "fitted": describe(a.effect, verdict),
                 "relaxes": a.effect.relaxes,
                 "aliases": a.alias_set,
+                "mistaken": a.effect.aliases,
                 "experiment": a.effect.separating_experiment,
             }
             for a in verdict.accepted

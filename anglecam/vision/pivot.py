@@ -30,8 +30,8 @@ _EDGE_SHARE = 0.4
 """Of the steepest gradient; fainter ones are no edge of the marker."""
 _FLOOR_PX = 0.03
 """Standard uncertainty of a marker's centre that no number of edge pixels improves: shading, chroma, codec."""
-_CORRELATED = 2.0
-"""Neighbouring gradients share their noise: the smoothing's area in pixels, by which the covariance is larger."""
+_SECTORS = 12
+"""Gradients within a sector of the circumference share their noise and the slope of the ground behind them."""
 _SURE_RADIUS = 0.2
 """Relative uncertainty of the path's radius above which its centre says nothing."""
 _DISAGREE = 9.21
@@ -201,9 +201,13 @@ def _refine(gx: Floats, gy: Floats, centre: Floats, radius: float) -> tuple[Floa
         target = (normal * (weight * (normal * p).sum(axis=1))[:, None]).sum(axis=0)
         now = np.linalg.solve(N, target)
         miss = ((now - p) * normal).sum(axis=1)
-        told = normal * (weight * miss)[:, None]
+        # cluster-robust sandwich (Liang & Zeger 1986), a cluster a sector
+        sector = (np.arctan2(*(p - now).T) / (2.0 * np.pi) % 1.0 * _SECTORS).astype(int) % _SECTORS
+        told = np.zeros((_SECTORS, 2))
+        np.add.at(told, sector, normal * (weight * miss)[:, None])
         inverse = np.linalg.inv(N)
-        covariance = _CORRELATED * inverse @ (told.T @ told) @ inverse + _FLOOR_PX**2 * np.eye(2)
+        meat = told.T @ told * _SECTORS / (_SECTORS - 2)
+        covariance = inverse @ meat @ inverse + _FLOOR_PX**2 * np.eye(2)
         moved, centre = np.hypot(*(now - centre)), now
         if moved < 1e-3:
             break

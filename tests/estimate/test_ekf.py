@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anglecam.estimate.ekf import fit_ekf, settings_for
+from anglecam.estimate.ekf import PAPER, fit_ekf, settings_for
 from support.motion import Plant as TruePlant
 from support.series import session
 
@@ -26,3 +26,9 @@ def test_innovations_are_as_large_as_the_filter_says():
     start = np.array([26.0, 524.0, 508.0])
     estimate = fit_ekf(records, start, settings_for(records, start, np.radians(0.2)))
     assert np.std(np.concatenate(estimate.normalised)) == pytest.approx(1.0, abs=0.1)
+
+
+def test_the_papers_own_settings_and_start_lead_to_its_model():
+    records = session(TruePlant(), 8, sigma_deg=0.05)
+    estimate = fit_ekf(records, np.array([5.0, 531.0, 520.0]), PAPER)
+    assert estimate.parameters == pytest.approx([26.0, 524.0, 508.0], rel=0.05)

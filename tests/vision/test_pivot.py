@@ -7,11 +7,17 @@ import pytest
 from anglecam.vision.circle import fit_circle
 from anglecam.vision.pivot import Marker, choose_pivot, find_marker
 
+DARK_DISC, BRIGHT_DISC = [(7, 20)], [(12, 240)]
+BLACK_RING, WHITE_RING = [(12, 245), (8, 20), (4, 245)], [(13, 15), (9, 240), (5, 15)]
+ROUGH = 12
+"""Standard deviation of a ground's bumps, grey levels."""
+DRAGGED = pytest.mark.xfail(strict=True, reason="a rough ground drags a disc's one edge by 0.13 px RMS")
 
-def _scene(centre, rings, seed=0):
+
+def _scene(centre, rings, seed=0, relief=ROUGH):
     """Draw discs (radius, grey) one on the other, at 8×, on a ground with bumps, with noise of 2 grey levels."""
     rng = np.random.default_rng(seed)
-    ground = rng.normal(150, 4, (12, 16)).astype(np.float32)
+    ground = rng.normal(150, relief, (12, 16)).astype(np.float32)
     bumps = cv2.resize(ground, (160 * 8, 120 * 8), interpolation=cv2.INTER_CUBIC)
     for radius, grey in rings:
         at = tuple(round(((c + 0.5) * 8 - 0.5) * 256) for c in centre)
@@ -22,17 +28,25 @@ def _scene(centre, rings, seed=0):
 
 
 @pytest.mark.parametrize(
-    "rings",
-    [[(7, 20)], [(12, 240)], [(12, 245), (8, 20), (4, 245)], [(13, 15), (9, 240), (5, 15)]],
-    ids=["dark disc", "bright disc", "black ring on white", "white ring on black"],
+    ("rings", "relief"),
+    [
+        pytest.param(DARK_DISC, 4, id="dark disc"),
+        pytest.param(BRIGHT_DISC, 4, id="bright disc"),
+        pytest.param(DARK_DISC, ROUGH, id="dark disc on rough ground", marks=DRAGGED),
+        pytest.param(BRIGHT_DISC, ROUGH, id="bright disc on rough ground", marks=DRAGGED),
+        pytest.param(BLACK_RING, ROUGH, id="black ring on white"),
+        pytest.param(WHITE_RING, ROUGH, id="white ring on black"),
+    ],
 )
-def test_the_centre_is_good_to_a_tenth_of_a_pixel_with_a_hint_12_px_off(rings):
+def test_the_centre_is_good_to_a_tenth_of_a_pixel_with_a_hint_12_px_off(rings, relief):
     rng = np.random.default_rng(5)
     pulls = []
     for seed in range(12):
         centre = np.array([80.0, 60.0]) + rng.uniform(-5, 5, 2)
         away = rng.uniform(0, 2 * np.pi)
-        found = find_marker(_scene(centre, rings, seed), centre + 12 * np.array([np.cos(away), np.sin(away)]), 10.0)
+        found = find_marker(
+            _scene(centre, rings, seed, relief), centre + 12 * np.array([np.cos(away), np.sin(away)]), 10.0
+        )
         off = found.centre_px - centre
         assert np.hypot(*off) < 0.1
         pulls.append(off @ np.linalg.solve(found.covariance_px2, off) / 2)
