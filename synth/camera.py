@@ -1,68 +1,110 @@
-"""The ideal camera: where a point of the rig appears in the picture.
+"""The camera's geometry: where a point of the rig appears in the picture.
 
-A pinhole at (0, 0, D) looks along −z, straight down the shaft, and its principal point is the shaft's place in the
-picture. Whatever turns about the shaft therefore turns about that one pixel, at every depth, by the same angle.
-Pixel (0, 0) is the centre of the top left pixel, x to the right, y down.
+A pinhole looks at the shaft from `distance_m`; the shaft's place in the picture is its principal point. Seen square
+on, whatever turns about the shaft therefore turns about that one pixel, at every depth, by the same angle. The lens
+distorts about a point of its own, the middle of the picture, as if the camera had a shift lens. Axes of the world:
+x to the right, y up, z towards the camera. Pixel (0, 0) is the centre of the top left pixel, x to the right, y down.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from synth.spec import Spec
 
 Floats = NDArray[np.float64]
-
-DISTANCE = 1.5
-"""Camera to the plane of motion z = 0, m."""
 
 
 @dataclass(frozen=True)
 class Pinhole:
-    """A camera that faces right; a rig that faces left is its mirror image."""
+    """Camera and lens; a rig that faces left is filmed facing right and the picture mirrored."""
 
     size: tuple[int, int]
     """Width and height, px."""
     focal_px: float
-    pivot_px: tuple[float, float]
-    """Principal point, in the picture as it is written."""
-    mirrored: bool
+    principal_px: tuple[float, float]
+    """Where the shaft appears, in the picture before it is mirrored."""
+    distance_m: float
+    """From the camera to the shaft's point in the plane of motion."""
+    rotation: Floats
+    """(3, 3), from the world's axes to the camera's (right, up, backwards)."""
+    k1: float = 0.0
+    """r becomes r·(1 + k1·r²), r from `lens_px` in units of the focal length."""
+    mirrored: bool = False
     """Whether the picture is turned about its vertical middle line at the end."""
 
     @property
-    def drawn_pivot_px(self) -> tuple[float, float]:
-        """Principal point before the picture is mirrored."""
-        x, y = self.pivot_px
-        return (self.size[0] - 1 - x if self.mirrored else x, y)
+    def lens_px(self) -> tuple[float, float]:
+        """Centre of the distortion: the middle of the picture."""
+        return ((self.size[0] - 1) / 2, (self.size[1] - 1) / 2)
 
     def project(self, points: ArrayLike) -> Floats:
-        """Pixels (…, 2) of points (…, 3) given in m."""
-        x, y, z = np.moveaxis(np.asarray(points, dtype=float), -1, 0)
-        scale = self.focal_px / (DISTANCE - z)
+        """Pixels (…, 2), in the picture as it is written, of points (…, 3) given in m."""
+        pixels = self.draw(points)[0]
+        if self.mirrored:
+            pixels[..., 0] = self.size[0] - 1 - pixels[..., 0]
+        return pixels
+
+    def draw(self, points: ArrayLike) -> tuple[Floats, Floats]:
+        """Pixels (…, 2) before mirroring, and depth (…) along the line of sight, m, of points (…, 3)."""
+        seen = np.asarray(points, dtype=float) @ self.rotation.T
+        depth = self.distance_m - seen[..., 2]
+        ideal = np.asarray(self.principal_px) + self.focal_px * seen[..., :2] * [1.0, -1.0] / depth[..., None]
+        off = ideal - self.lens_px
+        stretch = self.k1 * (off**2).sum(axis=-1, keepdims=True) / self.focal_px**2
+        return ideal + off * stretch, depth
+
+    def place(self, pixel: tuple[float, float], z: float) -> Floats:
+        """Point (3,) at height z above the plane of motion that a square view without distortion shows at a pixel."""
+        x = self.size[0] - 1 - pixel[0] if self.mirrored else pixel[0]
+        scale = (self.distance_m - z) / self.focal_px
+        return np.array([(x - self.principal_px[0]) * scale, (self.principal_px[1] - pixel[1]) * scale, z])
+
+    def shaken(self, dx: float, dy: float, roll: float) -> Pinhole:
+        """Camera moved so that the picture shifts by (dx, dy) px and turns by `roll` rad about the shaft."""
         sign = -1.0 if self.mirrored else 1.0
-        return np.stack([self.pivot_px[0] + sign * scale * x, self.pivot_px[1] - scale * y], axis=-1)
+        return dataclasses.replace(
+            self,
+            principal_px=(self.principal_px[0] + sign * dx, self.principal_px[1] + dy),
+            rotation=Rotation.from_euler("z", roll).as_matrix() @ self.rotation,
+        )
 
 
-def aim(size: tuple[int, int], lever_px: float, lever: float, pivot_px: tuple[float, float], mirrored: bool) -> Pinhole:
-    """Choose the focal length at which a lever in the plane of motion measures `lever_px`.
+def aim(spec: Spec, lever: float) -> Pinhole:
+    """Point the camera at the rig so that a lever in the plane of motion measures what the spec asks for.
 
     Parameters
     ----------
-    size : tuple of int
-        Width and height, px.
-    lever_px : float
-        What the lever shall measure, px.
+    spec : Spec
+        Of which camera, rig and the optical effects count.
     lever : float
-        Its length, m.
-    pivot_px : tuple of float
-        Where the shaft shall appear, px.
-    mirrored : bool
-        Whether the face looks to the left.
+        Length of the lever, m.
 
     Returns
     -------
     Pinhole
-        The camera.
+        The camera at rest.
     """
-    return Pinhole(size, lever_px * DISTANCE / lever, pivot_px, mirrored)
+    camera, rig, effects = spec.camera, spec.rig, spec.effects
+    view = Rotation.from_euler("YX", [-camera.azimuth_deg, camera.elevation_deg], degrees=True)
+    if tilt := effects.camera_tilt:
+        about = math.radians(tilt.axis_deg)
+        axis = np.array([math.cos(about), math.sin(about), 0.0])
+        view = Rotation.from_rotvec(math.radians(tilt.tilt_deg) * axis) * view
+    mirrored = rig.facing == "left"
+    x, y = rig.pivot_px
+    return Pinhole(
+        size=camera.size,
+        focal_px=rig.lever_px * camera.distance_m / lever,
+        principal_px=(camera.size[0] - 1 - x if mirrored else x, y),
+        distance_m=camera.distance_m,
+        rotation=view.as_matrix(),
+        k1=effects.lens_distortion.k1 if effects.lens_distortion else 0.0,
+        mirrored=mirrored,
+    )

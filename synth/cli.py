@@ -1,4 +1,4 @@
-"""The command ``synth``: render a session, score what was found in it."""
+"""The command ``synth``: render a session, score what was found in it, show what there is."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from synth.gallery import gallery
 from synth.render import RenderError
 from synth.score import score
 from synth.session import render
@@ -34,6 +35,15 @@ def score_command(
 ) -> None:
     """Hold what anglecam found against the truth."""
     score(result, truth, Console())
+
+
+@app.command("gallery")
+def gallery_command(
+    out: Annotated[Path, typer.Option(help="folder for gallery.png")],
+    specs: Annotated[list[Path] | None, typer.Argument(help="specs, YAML; all of configs/ where none is named")] = None,
+) -> None:
+    """Render one frame of every spec to a contact sheet."""
+    Console().print(str(gallery(specs or [], out)), soft_wrap=True)
 
 
 def main() -> None:

@@ -1,42 +1,37 @@
-"""Frames into a file, on an exact fixed grid: frame k stands at k / fps.
+"""Pictures into a file, each under its own time stamp. ffv1 keeps every grey level, the other codecs do not.
 
-AVI for mjpeg and ffv1, MP4 for h264, because AVI gives H.264 wrong times. ffv1 keeps every grey level.
+AVI has no time stamps, only a grid: a gap in it is written as empty chunks, and H.264 must do without B-frames, or its
+times come out wrong. MP4 keeps every stamp. MKV counts milliseconds.
 """
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Iterator
-from fractions import Fraction
 from pathlib import Path
+from typing import Literal
 
 import av
 import numpy as np
 from numpy.typing import NDArray
 
+from synth.clock import Timetable, as_fraction
 from synth.spec import Camera
 
 Frame = NDArray[np.uint8]
 
 UNFINISHED = ".unfinished-"
 """How the name of a clip begins while it is being written."""
-_PIXELS = {"mjpeg": "yuvj444p", "ffv1": "bgr0", "h264": "yuv420p"}
+_ENCODERS: dict[str, Literal["mjpeg", "ffv1", "libx264"]] = {"mjpeg": "mjpeg", "ffv1": "ffv1", "h264": "libx264"}
 
 
 def file_name(name: str, camera: Camera) -> str:
     """Name of a recording's clip."""
-    return f"{name}.{'mp4' if camera.codec == 'h264' else 'avi'}"
-
-
-def frame_rate(camera: Camera) -> Fraction:
-    """Frames per second as the file states it: 29.97 is 30000/1001."""
-    whole = Fraction(camera.fps).limit_denominator(1001)
-    ntsc = Fraction(round(camera.fps * 1.001) * 1000, 1001)
-    return ntsc if abs(float(ntsc) - camera.fps) < 0.005 and whole.denominator != 1 else whole
+    return f"{name}.{camera.suffix}"
 
 
 @contextlib.contextmanager
-def clip_writer(path: Path, camera: Camera) -> Iterator[Callable[[Frame], None]]:
+def clip_writer(path: Path, camera: Camera, table: Timetable) -> Iterator[Callable[[Frame], None]]:
     """Open a clip; it stands under its name only when it is whole.
 
     Parameters
@@ -44,7 +39,9 @@ def clip_writer(path: Path, camera: Camera) -> Iterator[Callable[[Frame], None]]
     path : Path
         The file to be.
     camera : Camera
-        Size, rate and codec.
+        Size and codec.
+    table : Timetable
+        Time stamps of the frames to come.
 
     Yields
     ------
@@ -55,23 +52,21 @@ def clip_writer(path: Path, camera: Camera) -> Iterator[Callable[[Frame], None]]
     try:
         # bitexact: no version of the encoder in the file, the same bytes for the same frames
         with av.open(str(unfinished), "w", options={"fflags": "+bitexact"}) as container:
-            rate = frame_rate(camera)
-            stream = container.add_stream(camera.codec if camera.codec != "h264" else "libx264", rate=rate)
+            stream = container.add_stream(_ENCODERS[camera.codec], rate=as_fraction(camera.declared_fps or camera.fps))
             stream.width, stream.height = camera.size
-            stream.pix_fmt = _PIXELS[camera.codec]
+            stream.pix_fmt = _pixel_format(camera)
+            stream.time_base = stream.codec_context.time_base = table.unit
             stream.codec_context.flags |= av.codec.context.Flags.bitexact
             stream.codec_context.thread_count = 1
             if camera.codec == "mjpeg":
                 stream.codec_context.qmin = stream.codec_context.qmax = camera.quality
             elif camera.codec == "h264":
-                stream.options = {"crf": str(camera.crf)}
-            count = 0
+                stream.options = {"crf": str(camera.crf), **({"bf": "0"} if camera.suffix == "avi" else {})}
+            stamps = iter(table.stamps.tolist())
 
             def write(frame: Frame) -> None:
-                nonlocal count
                 picture = av.VideoFrame.from_ndarray(frame, format="rgb24")
-                picture.pts, picture.time_base = count, 1 / rate
-                count += 1
+                picture.pts, picture.time_base = next(stamps), table.unit
                 container.mux(stream.encode(picture))
 
             yield write
@@ -79,3 +74,10 @@ def clip_writer(path: Path, camera: Camera) -> Iterator[Callable[[Frame], None]]
         unfinished.replace(path)
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+def _pixel_format(camera: Camera) -> str:
+    if camera.codec == "ffv1":
+        return "bgr0"
+    chroma = camera.chroma or ("444" if camera.codec == "mjpeg" else "420")
+    return f"yuvj{chroma}p" if camera.codec == "mjpeg" else f"yuv{chroma}p"

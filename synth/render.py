@@ -1,8 +1,7 @@
-"""Frames by the thousand: spawned workers, one a core, each with a renderer of its own.
+"""Frames by the thousand: spawned workers, one a core, each with a stage of its own.
 
-A forked renderer hangs, so the workers are spawned. They are asked for a few frames at a time and answer with
-finished pictures, noise included, so that nothing depends on which worker drew a frame: the noise of frame k of
-recording r comes from the seed, r and k alone.
+A forked renderer hangs, so the workers are spawned. They are given plans of a few frames at a time and answer with
+finished pictures, noise included, so that nothing depends on which worker drew a frame.
 """
 
 from __future__ import annotations
@@ -15,15 +14,20 @@ import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from synth.camera import Pinhole
-from synth.mesh import build, poses
-from synth.spec import Rig
+from synth.spec import Spec
+from synth.take import Exposure, Take, View, plan
+
+if TYPE_CHECKING:
+    from synth.camera import Pinhole
+    from synth.draw.edge_error import EdgeError
+    from synth.draw.engine import Engine
+    from synth.film import Stage
+    from synth.mechanism import Part
 
 Frames = NDArray[np.uint8]
 
@@ -33,22 +37,11 @@ REPLACEMENTS = 2
 """How often dead workers are replaced before we give up."""
 
 
-_NEEDED = "Mesa's EGL is needed: apt-get install libegl1 libgl1 libgl1-mesa-dri"
+_EGL = "Mesa's EGL is needed: apt-get install libegl1 libgl1 libgl1-mesa-dri; or say render: {engine: raster}"
 
 
 class RenderError(Exception):
     """The machine cannot draw; the text is the one line that the user reads."""
-
-
-@dataclass(frozen=True)
-class Shot:
-    """What every worker needs to know."""
-
-    rig: Rig
-    camera: Pinhole
-    noise_grey: float
-    """Standard deviation, grey levels."""
-    seed: int
 
 
 def workers() -> int:
@@ -59,8 +52,9 @@ def workers() -> int:
 class Studio:
     """Workers at the ready; use it in a ``with`` block."""
 
-    def __init__(self, shot: Shot, count: int) -> None:
-        self._shot = shot
+    def __init__(self, spec: Spec, seen: View, count: int) -> None:
+        self._spec = spec
+        self._seen = seen
         self._count = count
         self._replacements = REPLACEMENTS
         self._pool = self._hire()
@@ -71,15 +65,30 @@ class Studio:
     def __exit__(self, *_: object) -> None:
         self._pool.shutdown(cancel_futures=True)
 
-    def film(self, recording: int, angles: Sequence[float]) -> Iterator[Frames]:
-        """Draw the frames of one recording, in order.
+    def edge_error(self) -> EdgeError:
+        """Measure how far the engine's edges are from exact areas, at the quality that is rendered.
+
+        Returns
+        -------
+        EdgeError
+            Errors in px.
+
+        Raises
+        ------
+        RenderError
+            If the machine cannot draw off-screen.
+        """
+        return self._pool.submit(_measure_edges).result()
+
+    def film(self, take: Take, frames: Sequence[int]) -> Iterator[NDArray[np.uint8]]:
+        """Draw frames of one recording, in order.
 
         Parameters
         ----------
-        recording : int
-            Its number in the spec; part of the noise's seed.
-        angles : sequence of float
-            Head angle of each frame, rad.
+        take : Take
+            The recording.
+        frames : sequence of int
+            Numbers of the wanted frames.
 
         Yields
         ------
@@ -92,9 +101,9 @@ class Studio:
             If the machine cannot draw off-screen.
         """
         done = 0
-        while done < len(angles):
+        while done < len(frames):
             try:
-                for drawn in self._draw_ahead(recording, angles, done):
+                for drawn in self._draw_ahead(take, frames[done:]):
                     done += len(drawn)
                     yield from drawn
             except BrokenProcessPool as error:
@@ -109,53 +118,63 @@ class Studio:
 
     def _hire(self) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(
-            self._count, mp_context=multiprocessing.get_context("spawn"), initializer=_set_up, initargs=(self._shot,)
+            self._count,
+            mp_context=multiprocessing.get_context("spawn"),
+            initializer=_set_up,
+            initargs=(self._spec, self._seen),
         )
 
-    def _draw_ahead(self, recording: int, angles: Sequence[float], first: int) -> Iterator[Frames]:
-        starts = iter(range(first, len(angles), CHUNK))
+    def _draw_ahead(self, take: Take, frames: Sequence[int]) -> Iterator[Frames]:
+        starts = iter(range(0, len(frames), CHUNK))
         waiting: collections.deque[Future[Frames]] = collections.deque()
         while True:
             # enough ahead that no worker idles, not so much that pictures pile up
             while len(waiting) < 3 * self._count and (start := next(starts, None)) is not None:
-                waiting.append(self._pool.submit(_draw, recording, start, angles[start : start + CHUNK]))
+                plans = [plan(self._spec, self._seen, take, frame) for frame in frames[start : start + CHUNK]]
+                waiting.append(self._pool.submit(_draw, take.number, plans))
             if not waiting:
                 return
             yield waiting.popleft().result()
 
 
-_shot: Shot
-_stage: Any
-"""What this worker draws with: a Stage, or why there is none."""
+_spec: Spec
+_stage: Stage | Exception
+"""What this worker draws with, or why it cannot."""
 
 
-def _set_up(shot: Shot) -> None:
+def _set_up(spec: Spec, seen: View) -> None:
     """Prepare a worker; the renderer is given back when the process ends, whatever ends it."""
-    global _shot, _stage
+    global _spec, _stage
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
-    _shot = shot
+    _spec = spec
     try:
-        from synth.offscreen import Stage  # graphics libraries load in the workers only
+        from synth.film import Stage  # renderers load in the workers only
 
-        _stage = Stage(shot.camera, build(shot.rig, shot.seed))
+        _stage = Stage(spec, seen)
     except Exception as error:  # noqa: BLE001 - whatever it is, the parent must hear of it in one line
         _stage = error
     else:
         multiprocessing.util.Finalize(_stage, _stage.close, exitpriority=10)
 
 
-def _draw(recording: int, first: int, angles: Sequence[float]) -> Frames:
+def _measure_edges() -> EdgeError:
+    from synth.draw.edge_error import edge_error
+    from synth.draw.engine import make_engine
+
+    def make(parts: Sequence[Part], camera: Pinhole, quality: str, gamma: float) -> Engine:
+        return make_engine(_spec.render, parts, camera, gamma)
+
+    _ready()
+    return edge_error(make, _spec.render.quality)
+
+
+def _draw(recording: int, plans: Sequence[Exposure]) -> Frames:
+    stage = _ready()
+    return np.stack([stage.picture(recording, exposure) for exposure in plans])
+
+
+def _ready() -> Stage:
     if isinstance(_stage, Exception):
-        raise RenderError(f"no picture can be drawn off-screen ({type(_stage).__name__}: {_stage}); {_NEEDED}")
-    pictures = []
-    for frame, angle in enumerate(angles, first):
-        picture = _stage.picture(poses(_shot.rig.linkage, float(angle)))
-        if _shot.noise_grey > 0:
-            # the same as SeedSequence(seed).spawn(...)[recording].spawn(...)[1].spawn(...)[frame]
-            rng = np.random.default_rng(np.random.SeedSequence(_shot.seed, spawn_key=(recording, 1, frame)))
-            noisy = rng.standard_normal(picture.shape, dtype=np.float32)
-            noisy *= _shot.noise_grey
-            noisy += picture
-            picture = np.clip(np.rint(noisy, out=noisy), 0, 255, out=noisy).astype(np.uint8)
-        pictures.append(picture)
-    return np.stack(pictures)
+        advice = f"; {_EGL}" if _spec.render.engine == "pyrender" else ""
+        raise RenderError(f"no picture can be drawn off-screen ({type(_stage).__name__}: {_stage}){advice}")
+    return _stage

@@ -89,7 +89,7 @@ def score(result: Path, truth: Path, console: Console) -> None:
     if facts is None:
         raise SpecError(f"{truth}: no truth.json in it; was it written by synth render --truth?")
     clips = [
-        score_clip(path, truth / f"{name}.truth.csv", recording["command"]["kind"] != "free")
+        score_clip(path, truth / f"{name}.truth.csv", recording["command"]["kind"] not in {"free", "nod"})
         for name, recording in facts["recordings"].items()
         if (path := result / f"{name}.angles.csv").exists()
     ]
@@ -102,7 +102,7 @@ def score(result: Path, truth: Path, console: Console) -> None:
         if any(clip.offset_deg is not None for clip in clips):
             console.print("clips without a command have their own median as zero: the median difference is taken out")
     if loop is not None or any(models.values()):
-        console.print(_model_table(facts["plant"], models, loop))
+        console.print(_model_table(facts["linear_model"], models, loop))
     if loop is not None:
         console.print(_effect_table(facts["effects"], loop))
         console.print(_error_table(loop))

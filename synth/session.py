@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from synth.clip import UNFINISHED, clip_writer, file_name
-from synth.render import Shot, Studio, workers
+from synth.render import Studio, workers
 from synth.spec import SpecError, read_spec
-from synth.truth import Take, perform, view, write_truth
+from synth.take import Take, perform, view
+from synth.truth import fingerprint, write_facts, write_take
 
 WORTH_A_WORKER = 60
 """Frames that take about as long as it takes another worker to start."""
@@ -50,22 +54,34 @@ def render(path: Path, out: Path, truth: Path) -> None:
     for folder, ours in ((out, session), (truth, secret)):
         _free(folder, ours)
 
-    write_truth(truth, spec, seen, takes)
     (out / "rig.yaml").write_text(yaml.safe_dump(spec.declare, sort_keys=False), encoding="utf-8")
     for take in takes:
         if take.command is not None:
             _write_command(out / f"{take.recording.name}.command.csv", take)
 
-    shot = Shot(spec.rig, seen.pinhole, spec.camera.noise_grey, spec.seed)
-    total = sum(len(take.angles) for take in takes)
-    with _progress() as progress, Studio(shot, min(workers(), 1 + total // WORTH_A_WORKER)) as studio:
+    total = sum(len(take.table.stamps) for take in takes)
+    with progress_bar() as progress, Studio(spec, seen, min(workers(), 1 + total // WORTH_A_WORKER)) as studio:
         bar = progress.add_task("render", total=total)
-        for number, take in enumerate(takes):
+        write_facts(truth, spec, seen, asdict(studio.edge_error()))
+        for take in takes:
             progress.update(bar, description=f"render {take.recording.name}")
-            with clip_writer(out / file_name(take.recording.name, spec.camera), spec.camera) as write:
-                for frame in studio.film(number, take.angles.tolist()):
+            fingerprints = []
+            with clip_writer(out / file_name(take.recording.name, spec.camera), spec.camera, take.table) as write:
+                for frame in _with_duplicates(take, studio):
                     write(frame)
+                    fingerprints.append(fingerprint(frame))
                     progress.advance(bar)
+            write_take(truth, seen, take, fingerprints)
+
+
+def _with_duplicates(take: Take, studio: Studio) -> Iterator[NDArray[np.uint8]]:
+    """Give every frame of the file; a duplicate is the very picture before it, noise and all."""
+    drawn = studio.film(take, np.flatnonzero(~take.table.repeats).tolist())
+    frame = next(drawn)
+    yield frame
+    for repeats in take.table.repeats[1:]:
+        frame = frame if repeats else next(drawn)
+        yield frame
 
 
 def _write_command(path: Path, take: Take) -> None:
@@ -91,7 +107,8 @@ def _free(folder: Path, ours: set[str]) -> None:
         raise SpecError(f"{folder}: holds {foreign[0]}, which is not of this session; give an empty folder")
 
 
-def _progress() -> Progress:
+def progress_bar() -> Progress:
+    """Show on standard error how far the work is."""
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),

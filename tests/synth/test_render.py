@@ -1,5 +1,6 @@
 """Small films, looked at closely: 320 × 240, a few frames."""
 
+import hashlib
 import json
 import multiprocessing
 import subprocess
@@ -12,11 +13,13 @@ import numpy as np
 import pytest
 import yaml
 
-from synth.mesh import Part, build, poses
-from synth.render import Shot, Studio
+from support.oracle import border, centroid, coverage
+from synth.draw.engine import make_engine
+from synth.mechanism import Part, build, poses
+from synth.render import Studio
 from synth.session import render
-from synth.spec import Spec, SpecError
-from synth.truth import marks, view
+from synth.spec import Render, Spec, SpecError
+from synth.take import marks, perform, view
 
 SPEC = {
     "seed": 5,
@@ -60,7 +63,7 @@ def test_the_session_holds_what_the_contract_says_and_the_truth_what_it_says(ren
         "truth.json", "one.truth.csv", "two.truth.csv",
     }  # fmt: skip
     header = (rendered / "truth" / "one.truth.csv").read_text().splitlines()[0]
-    assert header == "frame,time_s,true_time_s,angle_deg,mouth_x_px,mouth_y_px,pivot_x_px,pivot_y_px"
+    assert header.startswith("frame,time_s,true_time_s,angle_deg,mouth_x_px,mouth_y_px,pivot_x_px,pivot_y_px,")
     assert (rendered / "session" / "one.command.csv").read_text().splitlines()[0] == "time_s,command_deg"
     assert yaml.safe_load((rendered / "session" / "rig.yaml").read_text()) == SPEC["declare"]
     facts = json.loads((rendered / "truth" / "truth.json").read_text())
@@ -77,6 +80,15 @@ def test_nothing_of_the_truth_reaches_the_session(rendered):
     with av.open(str(rendered / "session" / "one.avi")) as container:
         assert container.metadata == {}
         assert container.streams.video[0].metadata == {}
+
+
+def test_the_truth_knows_every_frames_pixels_and_how_good_its_edges_are(rendered):
+    _, frames = read_clip(rendered / "session" / "one.avi")
+    rows = np.genfromtxt(rendered / "truth" / "one.truth.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    assert [hashlib.sha256(np.ascontiguousarray(frame)).hexdigest() for frame in frames] == list(rows["frame_sha256"])
+    facts = json.loads((rendered / "truth" / "truth.json").read_text())
+    assert 0 < facts["render"]["edge_error"]["half_plane_px"] < 0.01
+    assert set(facts["versions"]) >= {"python", "anglecam", "numpy", "trimesh"}
 
 
 def test_every_frame_is_there_at_its_time(rendered):
@@ -112,51 +124,58 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_noise(rende
     assert np.std(first[1].astype(float) - first[0]) == pytest.approx(2.0 * np.sqrt(2), rel=0.03)
 
 
-@pytest.mark.parametrize(("facing", "marker"), [("right", "disc"), ("left", "ring")])
-def test_projected_truth_is_where_the_picture_has_it(facing, marker):
-    """Lips and marker at full brightness on black: grey levels are then areas, and their centroids exact."""
-    from synth.offscreen import Stage
-
-    pivot = [150.3, 170.6] if facing == "right" else [168.7, 170.6]
-    rig = {"lever_px": 150, "pivot_px": pivot, "facing": facing, "marker": marker}
-    spec = Spec.model_validate({"camera": {"size": [320, 300]}, "rig": rig, "recordings": SPEC["recordings"]})
-    seen = view(spec)
-    shown = {"lips": [900.0, 0.0, 0.0], "marker": [0.0, 0.0, 900.0]}
-    parts = [
+def marks_alone(spec: Spec) -> list[Part]:
+    """Lips and marker at full brightness in colours of their own, all else black: grey levels are then areas."""
+    shown = {"lips": [1e6, 0.0, 0.0], "marker": [0.0, 0.0, 1e6]}
+    return [
         Part(part.name, part.body, part.mesh, np.zeros_like(part.colours) + shown.get(part.name, [0.0, 0.0, 0.0]))
-        for part in build(spec.rig)
+        for part in build(spec)
     ]
-    angles = np.radians(np.linspace(-22.0, 28.0, 26))
-    found = []
-    with closing(Stage(seen.pinhole, parts)) as stage:
-        for angle in angles:
-            picture = stage.picture(poses(spec.rig.linkage, float(angle))).astype(float)
-            y, x = np.indices(picture.shape[:2])
-            found.append([np.average(axis, weights=picture[..., colour]) for colour in (0, 2) for axis in (x, y)])
-    errors = np.array(found) - marks(seen, angles)
-    assert np.abs(errors[:, 2:]).max() < 0.05
-    # four samples a pixel: each frame's edges are a little off, at random; over the frames nothing remains
-    assert np.abs(errors[:, :2]).max() < 0.1
-    assert np.abs(errors[:, :2].mean(axis=0)).max() < 0.015
-    measured = np.array(found)
-    across = (measured[:, 0] - measured[:, 2]) * (-1 if facing == "left" else 1)
-    line = np.degrees(np.arctan2(measured[:, 3] - measured[:, 1], across))
-    residual = line - np.degrees(angles)
-    assert np.std(residual) < 0.02
-    expected = np.degrees(np.arctan2(*seen.mouth[::-1]))
-    assert np.mean(residual) == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.parametrize("engine", ["raster", "pyrender"])
+@pytest.mark.parametrize(("facing", "marker"), [("right", "disc"), ("left", "ring")])
+def test_the_picture_is_the_analytic_oracles_and_the_truth_is_where_it_shows_the_marks(engine, facing, marker):
+    spec = Spec.model_validate(
+        {
+            "camera": {"size": [320, 300]},
+            "rig": {"lever_px": 150, "pivot_px": [150.3 if facing == "right" else 168.7, 170.6],
+                    "facing": facing, "marker": marker},
+            "recordings": [SPEC["recordings"][0]],
+        }
+    )  # fmt: skip
+    seen = view(spec)
+    (take,) = perform(spec, seen)
+    parts = marks_alone(spec)
+    lips = next(part.mesh for part in parts if part.name == "lips")
+    with closing(make_engine(Render(engine=engine, quality="metrology"), parts, seen.pinhole, 1.0)) as stage:
+        for frame in range(0, 30, 4):
+            angle = float(take.motion.angle(take.table.taken[frame : frame + 1])[0])
+            picture = stage.draw(seen.pinhole, poses(spec.rig, angle), slice(0, 300))
+            picture = picture[:, ::-1] if facing == "left" else picture
+            turned = lips.vertices[:, :2] @ [[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]
+            scale = spec.rig.lever_px / np.hypot(*seen.mouth) * 1.5 / (1.5 - lips.vertices[:, 2])
+            mirror = -1 if facing == "left" else 1
+            shown = np.array(spec.rig.pivot_px) + turned * scale[:, None] * [mirror, -1]
+            drawn = coverage(border(shown, lips.faces[:, ::mirror]), 320, 300)
+            true = marks(seen, take)[frame]
+            np.testing.assert_allclose(centroid(drawn), true[:2], atol=0.02)
+            np.testing.assert_allclose(centroid(picture[..., 0]), true[:2], atol=0.02)
+            np.testing.assert_allclose(centroid(picture[..., 2]), true[2:4], atol=0.02)
+            assert np.sqrt(np.mean((picture[..., 0] - drawn)[(drawn > 0) & (drawn < 1)] ** 2)) < 0.02
 
 
 def test_a_worker_that_dies_is_replaced_and_no_frame_is_lost():
     spec = Spec.model_validate(SPEC)
-    shot = Shot(spec.rig, view(spec).pinhole, 2.0, seed=5)
-    angles = np.radians(np.linspace(0.0, 10.0, 60)).tolist()
-    with Studio(shot, 1) as studio:
-        undisturbed = list(studio.film(0, angles))
+    seen = view(spec)
+    (take, _) = perform(spec, seen)
+    frames = list(range(30))
+    with Studio(spec, seen, 1) as studio:
+        undisturbed = list(studio.film(take, frames))
         disturbed = []
-        for frame in studio.film(0, angles):
+        for frame in studio.film(take, frames):
             disturbed.append(frame)
-            if len(disturbed) == 10:
+            if len(disturbed) == 5:
                 (worker,) = multiprocessing.active_children()
                 worker.kill()
     np.testing.assert_array_equal(disturbed, undisturbed)

@@ -1,0 +1,1 @@
+"""Renderers behind one interface, and how far each is from exact areas."""

@@ -1,0 +1,87 @@
+"""What a frame sees while its rows are open: the light is an integral over time, here a sum over a few instants.
+
+Row y of a frame taken at t is open for the exposure E about t + row_time·(y − middle row). Between instants the
+picture is taken to change linearly, so that an instant's weight in a row is the integral of a hat function over the
+time the row is open. Hat functions keep means: the mean time of every row is exact, however few instants there are.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+STILL_PX = 0.1
+"""Where the mark moves less than this while the frame is open, one instant does."""
+
+
+@dataclass(frozen=True)
+class Shutter:
+    """How the rows of a frame are exposed."""
+
+    exposure_s: float
+    row_time_s: float
+    rows: int
+
+    @property
+    def span_s(self) -> float:
+        """From the first row's opening to the last row's closing."""
+        return self.exposure_s + self.row_time_s * (self.rows - 1)
+
+    def row_times(self, taken: float) -> Floats:
+        """Middle of each row's exposure, s: shape (rows,), or (1,) where all rows are one."""
+        if self.row_time_s == 0.0:
+            return np.array([taken])
+        return np.asarray(taken + self.row_time_s * (np.arange(self.rows) - (self.rows - 1) / 2))
+
+
+@dataclass(frozen=True)
+class Instants:
+    """At which times a frame is drawn, and how much each drawing counts in each row."""
+
+    times: Floats
+    """(n,), s."""
+    weights: Floats
+    """(n, rows) or (n, 1); every column sums to 1."""
+
+
+def instants(shutter: Shutter, taken: float, path_px: float, step_px: float) -> Instants:
+    """Choose the instants of one frame.
+
+    Parameters
+    ----------
+    shutter : Shutter
+        Exposure and rolling shutter.
+    taken : float
+        Time of the frame, s.
+    path_px : float
+        Way of the mark in the picture while the frame is open, px.
+    step_px : float
+        Longest way between two instants, px.
+
+    Returns
+    -------
+    Instants
+        A single one where the mark moves less than `STILL_PX`.
+    """
+    if path_px <= STILL_PX:
+        return Instants(np.array([taken]), np.ones((1, 1)))
+    steps = max(1, math.ceil(path_px / step_px))
+    times = taken + shutter.span_s * (np.arange(steps + 1) / steps - 0.5)
+    spacing = shutter.span_s / steps
+    rows = shutter.row_times(taken)
+    away = (rows[None, :] - times[:, None]) / spacing
+    if shutter.exposure_s == 0.0:
+        return Instants(times, np.maximum(0.0, 1 - np.abs(away)))
+    half = shutter.exposure_s / spacing / 2
+    return Instants(times, (_below_hat(away + half) - _below_hat(away - half)) / (2 * half))
+
+
+def _below_hat(x: Floats) -> Floats:
+    """Integral of the hat function max(0, 1 − |x|) from −∞ to x."""
+    inside = np.clip(x, -1.0, 1.0)
+    return np.where(inside < 0, (1 + inside) ** 2 / 2, 1 - (1 - inside) ** 2 / 2)

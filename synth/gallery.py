@@ -1,0 +1,86 @@
+"""A contact sheet: one frame of every spec, so that a person sees at a glance what there is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from synth.render import Studio, workers
+from synth.session import progress_bar
+from synth.spec import Spec, SpecError, read_spec
+from synth.take import perform, view
+
+SHIPPED = Path(__file__).resolve().parents[1] / "configs"
+"""The specs that stand beside the package in a checkout."""
+
+_TILE = (320, 240)
+_LABEL = 24
+"""Height of the line under a picture, px."""
+
+
+def gallery(specs: Sequence[Path], out: Path) -> Path:
+    """Render one frame of each spec to ``gallery.png``.
+
+    Parameters
+    ----------
+    specs : sequence of Path
+        The specs; none for all that are shipped.
+    out : Path
+        Folder, made where it is not there.
+
+    Returns
+    -------
+    Path
+        Of the picture.
+
+    Raises
+    ------
+    SpecError
+        If a spec is wrong or there is none.
+    RenderError
+        If this machine cannot draw off-screen.
+    """
+    paths = list(specs) or sorted(SHIPPED.glob("*.yaml"))
+    if not paths:
+        raise SpecError(f"{SHIPPED}: no specs there; name some")
+    with progress_bar() as progress, ThreadPoolExecutor(workers()) as side_by_side:
+        drawn = progress.track(side_by_side.map(_one_frame, paths), total=len(paths), description="gallery")
+        tiles = [_labelled(picture, path.stem) for picture, path in zip(drawn, paths, strict=True)]
+    columns = min(len(tiles), math.ceil(math.sqrt(1.5 * len(tiles))))
+    tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % columns)
+    sheet = np.vstack([np.hstack(tiles[start : start + columns]) for start in range(0, len(tiles), columns)])
+    out.mkdir(parents=True, exist_ok=True)
+    written = out / "gallery.png"
+    if not cv2.imwrite(str(written), sheet[..., ::-1]):
+        raise OSError(f"{written}: cannot be written")
+    return written
+
+
+def _one_frame(path: Path) -> NDArray[np.uint8]:
+    """Draw the frame in which most is to be seen: the one with the head farthest from neutral."""
+    spec: Spec = read_spec(path)
+    seen = view(spec)
+    try:
+        take = perform(spec, seen)[0]
+    except SpecError as error:
+        raise SpecError(f"{path}: {error}") from error
+    own = np.flatnonzero(~take.table.repeats)
+    frame = int(own[np.argmax(np.abs(take.motion.angle(take.table.taken[own])))])
+    with Studio(spec, seen, 1) as studio:
+        return next(studio.film(take, [frame]))
+
+
+def _labelled(picture: NDArray[np.uint8], name: str) -> NDArray[np.uint8]:
+    height, width = picture.shape[:2]
+    scale = min(_TILE[0] / width, _TILE[1] / height)
+    small = cv2.resize(picture, (round(width * scale), round(height * scale)), interpolation=cv2.INTER_AREA)
+    tile = np.full((_TILE[1] + _LABEL, _TILE[0], 3), 255, dtype=np.uint8)
+    tile[: small.shape[0], : small.shape[1]] = small
+    cv2.putText(tile, name, (6, _TILE[1] + 16), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (0, 0, 0), 1, cv2.LINE_AA)
+    return tile

@@ -1,0 +1,26 @@
+"""What every section of a spec is made of: numbers with bounds, and strictness about keys."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+Byte = Annotated[int, Field(ge=0, le=255)]
+Rgb = tuple[Byte, Byte, Byte]
+Pixel = tuple[Finite, Finite]
+"""x and y; (0, 0) is the centre of the top left pixel."""
+
+
+class SpecError(Exception):
+    """The call or the spec is wrong; the text is the one line that the user reads."""
+
+
+class Section(BaseModel):
+    """A part of the spec: an unknown key is an error, and nothing changes once it is read."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)

@@ -1,0 +1,123 @@
+"""What is to be filmed: one YAML file, validated whole before anything moves.
+
+`plant`, `controller` and `effects` say how the head moves and stay secret; `rig`, `scene`, `camera` and `render` say
+what the film shows; `recordings` say what is commanded; `declare` is handed out word for word as the session's
+``rig.yaml``, right or wrong, because a wrong declaration may be the very thing under test.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import yaml
+from pydantic import Field, ValidationError, model_validator
+
+from synth.spec.base import Section, SpecError
+from synth.spec.commands import Command, Nod
+from synth.spec.effects import Effects
+from synth.spec.picture import Camera, Render, Rig, Scene
+from synth.spec.plant import Controller, LinearPlant, NeckPlant, Plant
+
+
+class Recording(Section):
+    """One clip and what is commanded while it is taken."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
+    duration_s: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
+    command: Command
+
+
+class Spec(Section):
+    """A whole session to be rendered."""
+
+    seed: Annotated[int, Field(ge=0)] = 0
+    plant: Plant = LinearPlant()
+    controller: Controller = Controller()
+    effects: Effects = Effects()
+    rig: Rig = Rig()
+    scene: Scene = Scene()
+    camera: Camera = Camera()
+    render: Render = Render()
+    declare: dict[str, Any] = Field(default_factory=dict)
+    recordings: Annotated[list[Recording], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Spec:
+        if isinstance(self.plant, NeckPlant):
+            for name in ("gravity_geometry", "linkage_geometry", "dead_zone"):
+                if getattr(self.effects, name) is not None:
+                    raise ValueError(f"effects.{name}: belongs to a linear plant, a neck has its own")
+        if self.rig.neck == "human":
+            for number, recording in enumerate(self.recordings):
+                if not isinstance(recording.command, Nod):
+                    raise ValueError(f"recordings.{number}.command: a human neck only nods, say kind: nod")
+        return self
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> Spec:
+        names = [recording.name for recording in self.recordings]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"recordings: the name {twice[0]} stands twice")
+        return self
+
+
+def read_spec(path: Path) -> Spec:
+    """Read and validate a spec.
+
+    Parameters
+    ----------
+    path : Path
+        A YAML file.
+
+    Returns
+    -------
+    Spec
+        With the defaults in place of what is not given.
+
+    Raises
+    ------
+    SpecError
+        One line that names the file, the key and the cause.
+    """
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SpecError(f"{path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise SpecError(f"{path}: not a UTF-8 text file") from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        problem = getattr(error, "problem", None) or "not valid YAML"
+        mark = getattr(error, "problem_mark", None)
+        raise SpecError(f"{path}: not YAML ({problem}{f', line {mark.line + 1}' if mark else ''})") from error
+    if not isinstance(content, dict):
+        raise SpecError(f"{path}: expected keys and values, found {type(content).__name__}")
+    try:
+        return Spec.model_validate(content)
+    except ValidationError as error:
+        raise SpecError(f"{path}: {_first_finding(error)}") from error
+
+
+_UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}
+
+
+_TAGS = {
+    "plant": {"linear", "neck"},
+    "command": {"step", "stairs", "paper_series", "triangle", "chirp", "release", "random", "free", "nod"},
+}
+"""What pydantic puts after a key to say which of several kinds was meant; no key of the file."""
+
+
+def _first_finding(error: ValidationError) -> str:
+    """Say the most telling finding in one line; an unknown key explains most of the others."""
+    findings = error.errors()
+    unknown = [finding for finding in findings if finding["type"] in _UNKNOWN]
+    finding = (unknown or findings)[0]
+    where = finding["loc"]
+    key = ".".join(str(part) for at, part in enumerate(where) if not (at and part in _TAGS.get(str(where[at - 1]), ())))
+    if unknown:
+        return f"unknown key {key}"
+    message = finding["msg"].removeprefix("Value error, ")
+    got = "" if finding["type"] in {"missing", "value_error"} else f" (got {str(finding['input'])[:60]})"
+    return f"{key + ': ' if key else ''}{message[0].lower()}{message[1:]}{got}"
