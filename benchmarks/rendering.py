@@ -123,14 +123,18 @@ def with_vtk(_: str, parts: list[Part], camera: Pinhole) -> Draw:
     view.SetViewAngle(float(np.degrees(2 * np.arctan(height / 2 / camera.focal_px))))
     view.SetWindowCenter(1 - 2 * camera.principal_px[0] / width, 2 * camera.principal_px[1] / height - 1)
     view.SetClippingRange(0.5, 6.0)
-    grabbed = vtk.vtkUnsignedCharArray()
+    grab = vtk.vtkWindowToImageFilter()
+    grab.SetInput(window)
+    grab.ReadFrontBufferOff()
+    grab.ShouldRerenderOff()
 
     def draw(placed: dict[str, np.ndarray]) -> np.ndarray:
         for body, matrix in matrices.items():
             matrix.DeepCopy(placed[body].ravel())
         window.Render()
-        window.GetPixelData(0, 0, width - 1, height - 1, 0, grabbed)
-        return vtk_to_numpy(grabbed).reshape(height, width, 3)[::-1]
+        grab.Modified()
+        grab.Update()
+        return vtk_to_numpy(grab.GetOutput().GetPointData().GetScalars()).reshape(height, width, 3)[::-1]
 
     return draw
 

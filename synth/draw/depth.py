@@ -185,18 +185,22 @@ def find_nearest(
     nearest[:], owner[:], depths[:] = NOTHING, NOTHING, 0.0
     low, high, start, slope = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for k in range(len(seen)):
-        top, bottom = np.inf, -np.inf
+        t = seen[k]
+        xa, xb, xc = pixels[faces[t, 0], 0], pixels[faces[t, 1], 0], pixels[faces[t, 2], 0]
+        ya, yb, yc = pixels[faces[t, 0], 1], pixels[faces[t, 1], 1], pixels[faces[t, 2], 1]
+        top, bottom = max(np.ceil(min(ya, yb, yc)), first), min(np.ceil(max(ya, yb, yc)), first + rows)
+        if top >= bottom or np.ceil(min(xa, xb, xc)) >= np.ceil(max(xa, xb, xc)):
+            continue  # no pixel's centre lies between its sides
         for e in range(3):
             # Both triangles at an edge reckon from its upper end, so that rounding opens no crack between them.
-            a, b = faces[seen[k], e], faces[seen[k], (e + 1) % 3]
+            a, b = faces[t, e], faces[t, e + 1 if e < 2 else 0]
             if pixels[a, 1] > pixels[b, 1] or (pixels[a, 1] == pixels[b, 1] and pixels[a, 0] > pixels[b, 0]):
                 a, b = b, a
             low[e], high[e], start[e] = pixels[a, 1], pixels[b, 1], pixels[a, 0]
             slope[e] = (pixels[b, 0] - pixels[a, 0]) / (high[e] - low[e]) if high[e] > low[e] else 0.0
-            top, bottom = min(top, low[e]), max(bottom, high[e])
         gx, gy, q0 = planes[k, 0, 0], planes[k, 0, 1], planes[k, 0, 2]
-        belongs = part[seen[k]]
-        for row in range(max(int(np.ceil(top)), first), min(int(np.ceil(bottom)), first + rows)):
+        belongs = part[t]
+        for row in range(int(top), int(bottom)):
             left, right = np.inf, -np.inf
             for e in range(3):
                 if low[e] <= row < high[e]:

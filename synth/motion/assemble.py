@@ -33,11 +33,6 @@ def assemble(spec: Spec) -> System:
     -------
     System
         Right-hand side, modes and their ends.
-
-    Raises
-    ------
-    ValueError
-        If two effects name different shares of b as the servo's own, or the neck cannot be built.
     """
     effects = spec.effects
     mechanism = _mechanism(spec)
@@ -104,7 +99,5 @@ def _mechanism(spec: Spec) -> Mechanism:
 
 def _servo_share(effects: Effects) -> float:
     """Share of b that is the servo's position feedback: all of it unless an effect says otherwise."""
-    named = {effect.share for effect in (effects.torque_saturation, effects.linkage_geometry) if effect}
-    if len(named) > 1:
-        raise ValueError("torque_saturation.share and linkage_geometry.share name one thing and must be the same")
-    return named.pop() if named else 1.0
+    saying = effects.torque_saturation or effects.linkage_geometry
+    return saying.share if saying else 1.0

@@ -109,15 +109,7 @@ class Neck:
 
 
 def build_neck(plant: NeckPlant, linkage: FourBar) -> Neck:
-    """Put servo, linkage, springs and head together.
-
-    Raises
-    ------
-    ValueError
-        If the springs' arm is not longer than their base: then there is no right angle at neutral.
-    """
-    if plant.spring_arm <= plant.spring_base:
-        raise ValueError("spring_arm must be longer than spring_base")
+    """Put servo, linkage, springs and head together."""
     through = transmission(linkage)
     rate = plant.spring_rate * plant.spring_arm / plant.spring_base / 2
     carried = plant.mass * plant.gravity * plant.centre_of_mass * math.sin(math.radians(plant.neutral_deg))

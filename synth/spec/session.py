@@ -106,18 +106,24 @@ _TAGS = {
     "plant": {"linear", "neck"},
     "command": {"step", "stairs", "paper_series", "triangle", "chirp", "release", "random", "free", "nod"},
 }
-"""What pydantic puts after a key to say which of several kinds was meant; no key of the file."""
+"""What pydantic puts after a key to say which of several kinds was meant."""
 
 
 def _first_finding(error: ValidationError) -> str:
-    """Say the most telling finding in one line; an unknown key explains most of the others."""
+    """Say the most telling finding in one line; an unknown key explains most of the others, a deep one the shallow."""
     findings = error.errors()
     unknown = [finding for finding in findings if finding["type"] in _UNKNOWN]
-    finding = (unknown or findings)[0]
-    where = finding["loc"]
-    key = ".".join(str(part) for at, part in enumerate(where) if not (at and part in _TAGS.get(str(where[at - 1]), ())))
+    finding = unknown[0] if unknown else max(findings, key=lambda finding: len(finding["loc"]))
+    where = [str(part) for part in finding["loc"]]
+    key = ".".join(
+        part
+        for at, part in enumerate(where)
+        if "[" not in part and not (at and part in _TAGS.get(where[at - 1], ()))  # alternatives are no keys of the file
+    )
     if unknown:
         return f"unknown key {key}"
+    if finding["type"] == "union_tag_invalid":
+        return f"{key}.kind: should be {finding['ctx']['expected_tags']} (got {finding['ctx']['tag']})"
     message = finding["msg"].removeprefix("Value error, ")
     got = "" if finding["type"] in {"missing", "value_error"} else f" (got {str(finding['input'])[:60]})"
     return f"{key + ': ' if key else ''}{message[0].lower()}{message[1:]}{got}"

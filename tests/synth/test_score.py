@@ -8,7 +8,8 @@ from rich.console import Console
 
 from synth.score import score, score_clip
 from synth.spec import SpecError, read_spec
-from synth.truth import perform, view, write_truth
+from synth.take import perform, view
+from synth.truth import write_facts, write_take
 
 SPEC = """
 effects: {coulomb_friction: {torque: 2.0}}
@@ -26,7 +27,9 @@ def truth(tmp_path):
     seen = view(spec)
     folder = tmp_path / "truth"
     folder.mkdir()
-    write_truth(folder, spec, seen, perform(spec, seen))
+    for take in perform(spec, seen):
+        write_take(folder, seen, take, [""] * len(take.table.stamps))
+    write_facts(folder, spec, seen, {})
     return folder
 
 

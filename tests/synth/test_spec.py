@@ -1,9 +1,11 @@
+import importlib
 from pathlib import Path
 
 import pytest
 import yaml
 
 from synth.spec import SpecError, read_spec
+from synth.spec.base import Section
 
 GOOD = {"recordings": [{"name": "a", "duration_s": 1.0, "command": {"kind": "step"}}]}
 
@@ -34,6 +36,20 @@ def test_defaults_are_the_papers_neck(tmp_path):
         ({"camera": {"size": [641, 480]}}, "even width"),
         ({"plant": {"b": -1}}, "plant.b"),
         ({"plant": {"mass": 1}}, "unknown key plant.mass"),
+        ({"plant": {"kind": "neck", "mass": -2.31}}, "plant.mass"),
+        ({"plant": {"kind": "neck", "spring_arm": 0.04}}, "plant: spring_arm"),
+        ({"plant": {"kind": "neck"}, "effects": {"dead_zone": {"half_width_deg": 1}}}, "effects.dead_zone"),
+        ({"camera": {"codec": "ffv1", "container": "mp4"}}, "camera: container"),
+        ({"camera": {"interval_jitter": 0.2}}, "camera: interval_jitter"),
+        ({"camera": {"exposure_s": 0.04}}, "camera: exposure_s"),
+        ({"rig": {"skin": "green"}}, "rig.skin"),
+        ({"rig": {"neck": "human"}}, "rig: marker"),
+        ({"rig": {"neck": "human", "marker": "none"}}, "recordings.0.command: a human neck only nods"),
+        ({"render": {"engine": "crayons"}}, "render.engine"),
+        (
+            {"effects": {"torque_saturation": {"limit": 9, "share": 0.5}, "linkage_geometry": {}}},
+            "effects: torque_saturation.share",
+        ),
         ({"effects": {"gremlins": {}}}, "unknown key effects.gremlins"),
         ({"effects": {"coulomb_friction": {"torque": 2.0, "breakaway": 1.0}}}, "effects.coulomb_friction: breakaway"),
         ({"effects": {"dead_time": {}}}, "effects.dead_time.tau_s"),
@@ -72,3 +88,12 @@ def test_what_is_no_spec_at_all_is_one_line_too(tmp_path, content):
     path.write_bytes(content)
     with pytest.raises(SpecError, match=r"spec\.yaml: "):
         read_spec(path)
+
+
+def test_the_reference_names_every_key_of_every_section():
+    reference = (Path(__file__).parents[2] / "configs" / "README.md").read_text()
+    for module in ("plant", "effects", "commands", "picture", "session"):
+        for name, section in vars(importlib.import_module(f"synth.spec.{module}")).items():
+            if isinstance(section, type) and issubclass(section, Section):
+                for key in section.model_fields:
+                    assert f"{key}" in reference, f"{name}.{key}"
