@@ -213,7 +213,11 @@ def main(frames: int) -> None:
         for size in SIZES:
             drawing = alone(seconds_a_frame, name, size, frames)
             raw, ffv1 = writing[size]
-            cells += [f"{1 / drawing:.0f}", f"{drawing / raw:.1f}", f"{drawing / ffv1:.1f}"]
+            cells += [
+                f"{1 / drawing:.2g}" if drawing > 0.1 else f"{1 / drawing:.0f}",
+                f"{drawing / raw:.1f}",
+                f"{drawing / ffv1:.1f}",
+            ]
         print(f"| {name} | {' | '.join(cells)} |", flush=True)
     rates = [f"{1 / raw:.0f}, FFV1 {1 / ffv1:.0f} fps | | " for raw, ffv1 in writing.values()]
     print(f"| writing: raw .npy | | {'| '.join(rates)}|")

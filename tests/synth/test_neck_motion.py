@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.signal import TransferFunction, lsim
 
 from anglecam.neck import FourBar, head_angle, joints
-from support.moved import NECK, let_go, moved, spec_of
+from support.moved import NECK, let_go, moved
 from synth.motion import linear_model
 from synth.motion.linkage import transmission
 from synth.motion.neck import build_neck
