@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 COMMAND, NOISE, CLOCK, SHAKE = range(4)
 """Purposes of the random numbers of a recording."""
-STEP_PX = {"draft": 1.0, "standard": 0.5, "metrology": 0.25}
+STEP_PX = {"draft": 1.0, "standard": 0.75, "metrology": 0.25}
 """Longest way of the mark between two instants of a frame."""
 AFTERWARDS_S = 0.5
 """Motion beyond the last frame's time: its exposure and its lower rows are later."""

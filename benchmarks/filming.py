@@ -1,0 +1,80 @@
+"""How fast whole films are made, sensor and codec included, and where the time goes.
+
+    .venv/bin/python benchmarks/filming.py
+
+Films the demo's motion at 640 × 480 and 1280 × 720, without and with motion blur, on as many workers as there are
+cores, and says beside it what one instant's drawing, the sensor and the codec take of it on one core.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+
+from synth.clip import clip_writer
+from synth.film import Stage
+from synth.render import Studio, workers
+from synth.sensor import develop
+from synth.spec import Spec, read_spec
+from synth.take import perform, plan, view
+
+DEMO = Path(__file__).parents[1] / "configs" / "demo.yaml"
+WARM_UP = 48
+"""Frames that are not counted: workers start and load."""
+
+
+def variant(size: tuple[int, int], exposure_s: float) -> Spec:
+    demo = read_spec(DEMO).model_dump()
+    demo["camera"] |= {"size": size, "exposure_s": exposure_s}
+    demo["rig"] |= {"lever_px": size[1] / 2.4, "pivot_px": (size[0] * 0.375, size[1] * 0.625)}
+    return Spec.model_validate(demo)
+
+
+def measure(spec: Spec) -> list[str]:
+    seen = view(spec)
+    take = perform(spec, seen)[0]
+    frames = list(range(len(take.table.stamps)))
+    with tempfile.TemporaryDirectory() as folder, Studio(spec, seen, workers()) as studio:
+        with clip_writer(Path(folder) / "film.avi", spec.camera, take.table) as write:
+            for done, picture in enumerate(studio.film(take, frames)):
+                if done == WARM_UP:
+                    start = time.perf_counter()
+                write(picture)
+            whole = (time.perf_counter() - start) / (len(frames) - WARM_UP)
+        start = time.perf_counter()
+        with clip_writer(Path(folder) / "again.avi", spec.camera, take.table) as write:
+            for _ in frames:
+                write(picture)
+        coding = (time.perf_counter() - start) / len(frames)
+    plans = [plan(spec, seen, take, frame) for frame in frames]
+    stage = Stage(spec, seen)
+    drawn = plans[:: len(plans) // 24]
+    stage.light(drawn[0])
+    start = time.perf_counter()
+    lights = [stage.light(exposure) for exposure in drawn]
+    drawing = (time.perf_counter() - start) / sum(len(exposure.times) for exposure in drawn)
+    start = time.perf_counter()
+    for light, exposure in zip(lights, drawn, strict=True):
+        develop(light, spec.camera, exposure.gain, np.random.default_rng(0))
+    sensing = (time.perf_counter() - start) / len(drawn)
+    instants = np.mean([len(exposure.times) for exposure in plans])
+    return [f"{1 / whole:.0f}", f"{instants:.1f}", *(f"{1000 * part:.1f}" for part in (drawing, sensing, coding))]
+
+
+def main() -> None:
+    print(f"{date.today():%d %B %Y}, {workers()} workers, MJPEG\n")
+    print(
+        "| film | fps | instants a frame | one instant, ms | sensor, ms | codec, ms |\n| --- | --- | --- | --- | --- | --- |"
+    )
+    for size in ((640, 480), (1280, 720)):
+        for exposure_s in (0.0, 0.01):
+            name = f"{size[0]} × {size[1]}, exposure {1000 * exposure_s:.0f} ms"
+            print(f"| {name} | {' | '.join(measure(variant(size, exposure_s)))} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
