@@ -67,9 +67,8 @@ def measure(spec: Spec) -> list[str]:
 
 def main() -> None:
     print(f"{date.today():%d %B %Y}, {workers()} workers, MJPEG\n")
-    print(
-        "| film | fps | instants a frame | one instant, ms | sensor, ms | codec, ms |\n| --- | --- | --- | --- | --- | --- |"
-    )
+    print("| film | fps | instants a frame | one instant, ms | sensor, ms | codec, ms |")
+    print("| --- | --- | --- | --- | --- | --- |")
     for size in ((640, 480), (1280, 720)):
         for exposure_s in (0.0, 0.01):
             name = f"{size[0]} × {size[1]}, exposure {1000 * exposure_s:.0f} ms"
