@@ -61,7 +61,10 @@ def clip_writer(path: Path, camera: Camera, table: Timetable) -> Iterator[Callab
             if camera.codec == "mjpeg":
                 stream.codec_context.qmin = stream.codec_context.qmax = camera.quality
             elif camera.codec == "h264":
-                stream.options = {"crf": str(camera.crf), **({"bf": "0"} if camera.suffix == "avi" else {})}
+                # its macroblock tree reads memory that nobody wrote: other bytes for the same frames
+                stream.options = {"crf": str(camera.crf), "x264-params": "mbtree=0"}
+                if camera.suffix == "avi":
+                    stream.options["bf"] = "0"
             stamps = iter(table.stamps.tolist())
 
             def write(frame: Frame) -> None:
@@ -79,5 +82,5 @@ def clip_writer(path: Path, camera: Camera, table: Timetable) -> Iterator[Callab
 def _pixel_format(camera: Camera) -> str:
     if camera.codec == "ffv1":
         return "bgr0"
-    chroma = camera.chroma or ("444" if camera.codec == "mjpeg" else "420")
+    chroma = camera.chroma or (444 if camera.codec == "mjpeg" else 420)
     return f"yuvj{chroma}p" if camera.codec == "mjpeg" else f"yuv{chroma}p"

@@ -11,9 +11,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from synth.errors import SpecError
 from synth.render import Studio, workers
 from synth.session import progress_bar
-from synth.spec import Spec, SpecError, read_spec
+from synth.spec import Spec, read_spec
 from synth.take import perform, view
 
 SHIPPED = Path(__file__).resolve().parents[1] / "configs"
@@ -49,13 +50,13 @@ def gallery(specs: Sequence[Path], out: Path) -> Path:
     paths = list(specs) or sorted(SHIPPED.glob("*.yaml"))
     if not paths:
         raise SpecError(f"{SHIPPED}: no specs there; name some")
+    out.mkdir(parents=True, exist_ok=True)
     with progress_bar() as progress, ThreadPoolExecutor(workers()) as side_by_side:
         drawn = progress.track(side_by_side.map(_one_frame, paths), total=len(paths), description="gallery")
         tiles = [_labelled(picture, path.stem) for picture, path in zip(drawn, paths, strict=True)]
     columns = min(len(tiles), math.ceil(math.sqrt(1.5 * len(tiles))))
     tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % columns)
     sheet = np.vstack([np.hstack(tiles[start : start + columns]) for start in range(0, len(tiles), columns)])
-    out.mkdir(parents=True, exist_ok=True)
     written = out / "gallery.png"
     if not cv2.imwrite(str(written), sheet[..., ::-1]):
         raise OSError(f"{written}: cannot be written")

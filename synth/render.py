@@ -7,10 +7,13 @@ finished pictures, noise included, so that nothing depends on which worker drew 
 from __future__ import annotations
 
 import collections
+import contextlib
+import ctypes
 import multiprocessing
 import multiprocessing.util
 import os
 import signal
+import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -19,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from synth.errors import RenderError
 from synth.spec import Spec
 from synth.take import Exposure, Take, View, plan
 
@@ -37,11 +41,8 @@ REPLACEMENTS = 2
 """How often dead workers are replaced before we give up."""
 
 
+_PR_SET_PDEATHSIG = 1
 _EGL = "Mesa's EGL is needed: apt-get install libegl1 libgl1 libgl1-mesa-dri; or say render: {engine: raster}"
-
-
-class RenderError(Exception):
-    """The machine cannot draw; the text is the one line that the user reads."""
 
 
 def workers() -> int:
@@ -138,43 +139,61 @@ class Studio:
 
 
 _spec: Spec
-_stage: Stage | Exception
-"""What this worker draws with, or why it cannot."""
+_seen: View
+_stage: Stage | None = None
+"""What this worker draws with, once it has drawn."""
 
 
 def _set_up(spec: Spec, seen: View) -> None:
     """Prepare a worker; the renderer is given back when the process ends, whatever ends it."""
-    global _spec, _stage
+    global _spec, _seen
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
-    _spec = spec
-    try:
-        from synth.film import Stage  # renderers load in the workers only
-
-        _stage = Stage(spec, seen)
-    except Exception as error:  # noqa: BLE001 - whatever it is, the parent must hear of it in one line
-        _stage = error
-    else:
-        multiprocessing.util.Finalize(_stage, _stage.close, exitpriority=10)
+    if sys.platform == "linux":
+        # nobody draws for a parent that was killed, be it before this worker was ready
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        parent = multiprocessing.parent_process()
+        if parent is not None and os.getppid() != parent.pid:
+            os._exit(1)
+    _spec, _seen = spec, seen
+    multiprocessing.util.Finalize(None, _strike, exitpriority=10)
 
 
 def _measure_edges() -> EdgeError:
-    from synth.draw.edge_error import edge_error
-    from synth.draw.engine import make_engine
+    with _one_line():
+        from synth.draw.edge_error import edge_error
+        from synth.draw.engine import make_engine
 
-    def make(parts: Sequence[Part], camera: Pinhole, quality: str, gamma: float) -> Engine:
-        return make_engine(_spec.render, parts, camera, gamma)
+        def make(parts: Sequence[Part], camera: Pinhole, quality: str, gamma: float) -> Engine:
+            return make_engine(_spec.render, parts, camera, gamma)
 
-    _ready()
-    return edge_error(make, _spec.render.quality)
+        _strike()  # OpenGL has one live renderer a process
+        return edge_error(make, _spec.render.quality)
 
 
 def _draw(recording: int, plans: Sequence[Exposure]) -> Frames:
-    stage = _ready()
-    return np.stack([stage.picture(recording, exposure) for exposure in plans])
+    global _stage
+    with _one_line():
+        if _stage is None:
+            from synth.film import Stage  # renderers load in the workers only
+
+            _stage = Stage(_spec, _seen)
+        return np.stack([_stage.picture(recording, exposure) for exposure in plans])
 
 
-def _ready() -> Stage:
-    if isinstance(_stage, Exception):
+def _strike() -> None:
+    """Take the stage down."""
+    global _stage
+    if _stage is not None:
+        _stage.close()
+    _stage = None
+
+
+@contextlib.contextmanager
+def _one_line() -> Iterator[None]:
+    """Say whatever goes wrong in a worker in one line; graphics libraries raise what cannot even be pickled."""
+    try:
+        yield
+    except Exception as error:  # noqa: BLE001
         advice = f"; {_EGL}" if _spec.render.engine == "pyrender" else ""
-        raise RenderError(f"no picture can be drawn off-screen ({type(_stage).__name__}: {_stage}){advice}")
-    return _stage
+        said = " ".join(str(error).split())[:200]
+        raise RenderError(f"no picture can be drawn off-screen ({type(error).__name__}: {said}){advice}") from None

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from synth.spec import SpecError
+from synth.errors import SpecError
 
 Floats = NDArray[np.float64]
 

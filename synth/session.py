@@ -13,8 +13,9 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from synth.clip import UNFINISHED, clip_writer, file_name
+from synth.errors import SpecError
 from synth.render import Studio, workers
-from synth.spec import SpecError, read_spec
+from synth.spec import read_spec
 from synth.take import Take, perform, view
 from synth.truth import fingerprint, write_facts, write_take
 

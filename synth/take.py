@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from anglecam.neck import reach
 from synth.camera import Pinhole, aim
 from synth.clock import Timetable, timetable
+from synth.errors import SpecError
 from synth.exposure import Shutter, instants
 from synth.mechanism import build, mouth_centre, neutral_rocker
 from synth.mechanism.linkage import FACE_Z
 from synth.motion import Motion, command_rows, move
 from synth.sensor import flicker
 from synth.shake import Unrest, unrest
-from synth.spec import Recording, Rig, Spec, SpecError
+from synth.spec import Recording, Rig, Spec
 
 Floats = NDArray[np.float64]
 

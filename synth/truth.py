@@ -96,7 +96,7 @@ def write_facts(folder: Path, spec: Spec, seen: View, edges: dict[str, Any]) -> 
             **{name: version(name) for name in DEPENDENCIES},
         },
     }
-    (folder / "truth.json").write_text(json.dumps(facts, indent=1) + "\n", encoding="utf-8")
+    (folder / "truth.json").write_text(json.dumps(facts, indent=1, default=str) + "\n", encoding="utf-8")
 
 
 def _optics(pinhole: Pinhole) -> dict[str, Any]:

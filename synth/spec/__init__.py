@@ -1,6 +1,6 @@
 """The spec of a session to be rendered, section by section."""
 
-from synth.spec.base import Pixel, Rgb, SpecError
+from synth.spec.base import Pixel, Rgb
 from synth.spec.commands import (
     Chirp,
     Command,
@@ -43,7 +43,6 @@ __all__ = [
     "Scene",
     "Shake",
     "Spec",
-    "SpecError",
     "Stairs",
     "Step",
     "Triangle",

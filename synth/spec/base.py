@@ -16,10 +16,6 @@ Pixel = tuple[Finite, Finite]
 """x and y; (0, 0) is the centre of the top left pixel."""
 
 
-class SpecError(Exception):
-    """The call or the spec is wrong; the text is the one line that the user reads."""
-
-
 class Section(BaseModel):
     """A part of the spec: an unknown key is an error, and nothing changes once it is read."""
 

@@ -155,7 +155,7 @@ class Camera(Section):
     codec: Literal["mjpeg", "ffv1", "h264"] = "mjpeg"
     container: Container | None = None
     """AVI for mjpeg and ffv1, MP4 for h264 where not given."""
-    chroma: Literal["444", "422", "420"] | None = None
+    chroma: Literal[444, 422, 420] | None = None
     """Colour resolution; 444 for mjpeg and 420 for h264 where not given. ffv1 keeps red, green and blue."""
     quality: Annotated[int, Field(ge=1, le=31)] = 2
     """Quantiser of mjpeg: 1 is best, 31 worst."""
@@ -175,6 +175,8 @@ class Camera(Section):
             raise ValueError("container: mp4 does not hold ffv1, take avi or mkv")
         if self.codec == "ffv1" and self.chroma is not None:
             raise ValueError("chroma: ffv1 keeps red, green and blue, there is nothing to choose")
+        if self.codec == "h264" and self.suffix == "avi" and self.dropped:
+            raise ValueError("dropped: h264 in avi has no times to show a gap with, take mp4 or mkv")
         if self.interval_jitter and self.suffix == "avi":
             raise ValueError("interval_jitter: avi keeps a fixed grid of times, take mp4 or mkv")
         if self.declared_fps is not None and self.interval_jitter:

@@ -13,7 +13,8 @@ from typing import Annotated, Any
 import yaml
 from pydantic import Field, ValidationError, model_validator
 
-from synth.spec.base import Section, SpecError
+from synth.errors import SpecError
+from synth.spec.base import Section
 from synth.spec.commands import Command, Nod
 from synth.spec.effects import Effects
 from synth.spec.picture import Camera, Render, Rig, Scene
@@ -23,7 +24,7 @@ from synth.spec.plant import Controller, LinearPlant, NeckPlant, Plant
 class Recording(Section):
     """One clip and what is commanded while it is taken."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100)]
     duration_s: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
     command: Command
 
@@ -56,11 +57,25 @@ class Spec(Section):
 
     @model_validator(mode="after")
     def _names_differ(self) -> Spec:
-        names = [recording.name for recording in self.recordings]
+        # disks differ in whether they tell capitals apart
+        names = [recording.name.lower() for recording in self.recordings]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ValueError(f"recordings: the name {twice[0]} stands twice")
         return self
+
+
+class _EveryKeyOnce(yaml.SafeLoader):
+    """YAML as it should be: a key that stands twice is a mistake, and nothing but plain data is made."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+        for number, key in enumerate(keys):
+            if key in keys[:number]:
+                raise yaml.constructor.ConstructorError(
+                    problem=f"the key {key} stands twice", problem_mark=node.start_mark
+                )
+        return super().construct_mapping(node, deep)
 
 
 def read_spec(path: Path) -> Spec:
@@ -82,7 +97,7 @@ def read_spec(path: Path) -> Spec:
         One line that names the file, the key and the cause.
     """
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        content = yaml.load(path.read_text(encoding="utf-8"), _EveryKeyOnce)
     except OSError as error:
         raise SpecError(f"{path}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
@@ -125,5 +140,9 @@ def _first_finding(error: ValidationError) -> str:
     if finding["type"] == "union_tag_invalid":
         return f"{key}.kind: should be {finding['ctx']['expected_tags']} (got {finding['ctx']['tag']})"
     message = finding["msg"].removeprefix("Value error, ")
-    got = "" if finding["type"] in {"missing", "value_error"} else f" (got {str(finding['input'])[:60]})"
+    got = (
+        ""
+        if finding["type"] in {"missing", "value_error"}
+        else f" (got {' '.join(repr(finding['input']).split())[:60]})"
+    )
     return f"{key + ': ' if key else ''}{message[0].lower()}{message[1:]}{got}"

@@ -3,8 +3,11 @@
 import hashlib
 import json
 import multiprocessing
+import os
+import signal
 import subprocess
 import sys
+import time
 from contextlib import closing
 from pathlib import Path
 
@@ -15,10 +18,11 @@ import yaml
 
 from support.oracle import border, centroid, coverage
 from synth.draw.engine import make_engine
+from synth.errors import SpecError
 from synth.mechanism import Part, build, poses
 from synth.render import Studio
 from synth.session import render
-from synth.spec import Render, Spec, SpecError
+from synth.spec import Render, Spec
 from synth.take import marks, perform, view
 
 SPEC = {
@@ -230,3 +234,44 @@ def test_a_bad_spec_ends_with_status_2_and_one_line(tmp_path, changes, key):
     assert key in ended.stderr
     assert len(ended.stderr.splitlines()) == 1
     assert {path.name for path in tmp_path.iterdir()} == {"spec.yaml"}
+
+
+def call(spec: Path, folder: Path, **environment: str) -> subprocess.Popen:
+    command = [str(Path(sys.executable).with_name("synth")), "render", str(spec)]
+    command += ["--out", str(folder / "session"), "--truth", str(folder / "truth")]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env={**os.environ, **environment})
+
+
+def test_h264_gives_the_same_bytes_whatever_lay_in_memory(tmp_path):
+    short = [{"name": "one", "duration_s": 0.7, "command": {"kind": "free", "rest_s": 0.5}}]
+    camera = {"size": [160, 128], "codec": "h264"}
+    path = write_spec(tmp_path, recordings=short, camera=camera, rig={"lever_px": 50, "pivot_px": [60, 80]})
+    written = []
+    for fill in ("90", "165"):
+        with call(path, tmp_path / fill, MALLOC_PERTURB_=fill) as rendering:
+            assert rendering.wait(60) == 0
+        written.append((tmp_path / fill / "session" / "one.mp4").read_bytes())
+    assert written[0] == written[1]
+
+
+def test_pyrender_makes_films_too_and_says_how_good_its_edges_are(tmp_path):
+    short = [{**SPEC["recordings"][0], "duration_s": 0.2}]
+    render_spec = {"engine": "pyrender", "quality": "standard"}
+    render(write_spec(tmp_path, recordings=short, render=render_spec), tmp_path / "session", tmp_path / "truth")
+    _, frames = read_clip(tmp_path / "session" / "one.avi")
+    assert frames.shape == (6, 240, 320, 3)
+    facts = json.loads((tmp_path / "truth" / "truth.json").read_text())
+    assert 0.001 < facts["render"]["edge_error"]["half_plane_px"] < 0.1
+
+
+@pytest.mark.parametrize("blow", [signal.SIGTERM, signal.SIGKILL])
+def test_who_ends_the_command_ends_its_workers(tmp_path, blow):
+    long = [{**SPEC["recordings"][0], "duration_s": 30.0}]
+    with call(write_spec(tmp_path, recordings=long), tmp_path) as rendering:
+        while not list((tmp_path).glob("session/.unfinished-*")):
+            assert rendering.poll() is None
+            time.sleep(0.1)
+        rendering.send_signal(blow)
+        # workers hold the other end of the pipe: it closes when the last of them is gone
+        rendering.communicate(timeout=20)
+    assert not (tmp_path / "session" / "one.avi").exists()

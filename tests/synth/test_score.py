@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from synth.errors import SpecError
 from synth.score import score, score_clip
-from synth.spec import SpecError, read_spec
+from synth.spec import read_spec
 from synth.take import perform, view
 from synth.truth import write_facts, write_take
 

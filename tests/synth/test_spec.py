@@ -4,7 +4,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from synth.spec import SpecError, read_spec
+from synth.errors import SpecError
+from synth.spec import read_spec
 from synth.spec.base import Section
 
 GOOD = {"recordings": [{"name": "a", "duration_s": 1.0, "command": {"kind": "step"}}]}
@@ -58,6 +59,10 @@ def test_defaults_are_the_papers_neck(tmp_path):
         ({"rig": {"linkage": {"lever": 0.2}}}, "unknown key rig.linkage.lever"),
         ({"recordings": []}, "recordings"),
         ({"recordings": 2 * GOOD["recordings"]}, "the name a stands twice"),
+        ({"recordings": [GOOD["recordings"][0], {**GOOD["recordings"][0], "name": "A"}]}, "the name a stands twice"),
+        ({"recordings": [{**GOOD["recordings"][0], "name": 300 * "a"}]}, "recordings.0.name"),
+        ({"recordings": [{**GOOD["recordings"][0], "name": "a\nb"}]}, "recordings.0.name"),
+        ({"camera": {"codec": "h264", "container": "avi", "dropped": 0.1}}, "camera: dropped"),
         (
             {"recordings": [{"name": "a", "duration_s": 1, "command": {"kind": "step", "hz": 3}}]},
             "unknown key recordings.0.command.hz",
@@ -82,7 +87,9 @@ def test_a_bad_spec_is_one_line_with_file_and_key(tmp_path, changes, key):
     assert "\n" not in line
 
 
-@pytest.mark.parametrize("content", [b"recordings: [", b"- 1\n", b"\xff\xfe\x00", b"", b"a: 2020-13-45\n"])
+@pytest.mark.parametrize(
+    "content", [b"recordings: [", b"- 1\n", b"\xff\xfe\x00", b"", b"a: 2020-13-45\n", b"seed: 1\nseed: 2\n"]
+)
 def test_what_is_no_spec_at_all_is_one_line_too(tmp_path, content):
     path = tmp_path / "spec.yaml"
     path.write_bytes(content)
