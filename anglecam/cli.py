@@ -16,14 +16,18 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from anglecam.calibrate import calibrate_clip
+from anglecam.calibration import write_calibration
 from anglecam.errors import AnglecamError, InputError, RigError, blame
 from anglecam.files import write_json
 from anglecam.identify import ESTIMATORS, Estimator, declared_start, identify_records
 from anglecam.loop.close import close_records
 from anglecam.loop.holdout import split_records
 from anglecam.loop.result import verdict_as_dict
-from anglecam.measure import measure_clip
+from anglecam.measure import Measurement, measure_clip
 from anglecam.recordings import Measured, measure_session
+from anglecam.report.budget_page import budget_table, write_budget
+from anglecam.report.calibration_figure import plot_calibration
 from anglecam.report.figures import plot_series
 from anglecam.report.page import write_report
 from anglecam.report.summary import loop_table, model_table, series_table
@@ -68,16 +72,7 @@ def measure(
                 if clip.stem in done:
                     raise InputError(f"{clip}: {done[clip.stem]} has the same name; measure them to separate folders")
                 done[clip.stem] = clip
-                bar = bars.add_task(clip.name, total=None)
-                used = declared if declared is not None else rig_beside(clip)
-                _say_what_is_not_applied(used, clip)
-                with blame(clip):
-                    measurement = measure_clip(
-                        clip,
-                        used,
-                        command_beside(clip),
-                        progress=lambda n, total, bar=bar: bars.update(bar, completed=n, total=total or None),  # type: ignore[misc]
-                    )
+                measurement = _measure(clip, declared if declared is not None else rig_beside(clip), bars)
                 write_series(measurement.series, out / f"{clip.stem}{SERIES_ENDING}")
                 plot_series(measurement.series, out / f"{clip.stem}.png")
                 if overlay:
@@ -90,6 +85,53 @@ def measure(
     if rows:
         screen.print(series_table(rows))
     _end(problems)
+
+
+@app.command()
+def budget(
+    clips: Annotated[list[Path], typer.Argument(metavar="CLIP", help="Clips, or folders of clips.")],
+    out: Out,
+    rig: Annotated[
+        Path | None, typer.Option("--rig", help="Rig file for all clips; default: rig.yaml beside each clip.")
+    ] = None,
+) -> None:
+    """Say what the angle's uncertainty is made of: NAME.budget.json and a page for each clip."""
+    declared = read_rig(rig) if rig else None
+    _make_folder(out)
+    problems: list[AnglecamError] = []
+    with _progress() as bars:
+        for clip in _expand(clips, problems):
+            try:
+                used = declared if declared is not None else rig_beside(clip)
+                measurement = _measure(clip, used, bars)
+                screen.print(budget_table(write_budget(clip, measurement, used, out)))
+                if measurement.truncated:
+                    raise InputError(f"{clip}: {measurement.truncated}")
+            except AnglecamError as problem:
+                problems.append(problem)
+    _end(problems)
+
+
+@app.command()
+def calibrate(
+    clip: Annotated[Path, typer.Argument(metavar="CLIP", help="A clip of a chessboard, held still in many poses.")],
+    out: Out,
+    board: Annotated[str, typer.Option("--board", help="Inner corners, COLUMNSxROWS.")] = "9x6",
+) -> None:
+    """Find camera matrix and lens distortion from a chessboard: NAME.calibration.yaml and a figure."""
+    try:
+        columns, rows = (int(side) for side in board.lower().split("x"))
+    except ValueError:
+        raise RigError(f"--board {board}: say how many inner corners there are, such as 9x6") from None
+    _make_folder(out)
+    with blame(clip):
+        found = calibrate_clip(clip, (columns, rows))
+    write_calibration(found.calibration, out / f"{clip.stem}.calibration.yaml")
+    plot_calibration(found, out / f"{clip.stem}.calibration.png", clip.name)
+    terms = ", ".join(found.terms) or "no distortion"
+    screen.print(f"{out / clip.stem}.calibration.yaml: {len(found.views)} views, {terms}", soft_wrap=True)
+    for note in found.notes:
+        errors.print(note)
 
 
 @app.command()
@@ -203,6 +245,18 @@ def _make_folder(out: Path) -> None:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
         raise RigError(f"--out {out}: this folder cannot be made ({problem.strerror})") from problem
+
+
+def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement:
+    bar = bars.add_task(clip.name, total=None)
+    _say_what_is_not_applied(rig, clip)
+    with blame(clip):
+        return measure_clip(
+            clip,
+            rig,
+            command_beside(clip),
+            progress=lambda n, total: bars.update(bar, completed=n, total=total or None),
+        )
 
 
 def _say_what_is_not_applied(rig: Rig, where: Path) -> None:

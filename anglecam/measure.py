@@ -1,7 +1,8 @@
-"""From a clip to the angle in every frame: the only place where video and vision meet.
+"""From a clip to the angle in every frame: coarse by the mouth's place, fine by the whole head.
 
-A clip is decoded twice. The first pass keeps a few frames, from which the mouth's colour, its rough path and the
-pivot's marker are learnt; the second finds the mouth in every frame.
+The first reading of a clip keeps a few frames, from which the mouth's colour, its rough path and the pivot's marker
+are learnt; the second finds the mouth in every frame. Where more of the head than the mouth is rigid and has edges,
+`anglecam.registration` reads on and finds the turn from all of it; the more certain of the two is taken.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.budget import angle_sigma, place_errors, worst_case
+from anglecam.angles import Angles, coarse_angles, fine_angles, turns
+from anglecam.budget import worst_case
 from anglecam.errors import InputError
+from anglecam.registration import Registered, register_clip
 from anglecam.rig import Rig
 from anglecam.series import CONTRACT_RADII_PX, OK, AngleSeries
 from anglecam.session import Command, recording_name
@@ -25,7 +28,7 @@ from anglecam.vision.circle import Circle
 from anglecam.vision.pivot import Marker, Pivot, choose_pivot, find_marker
 from anglecam.vision.search import Found, find_mouth
 from anglecam.vision.segment import Region, find_regions
-from anglecam.vision.track import Track, follow_mouth
+from anglecam.vision.track import follow_mouth
 
 Floats = NDArray[np.float64]
 
@@ -57,6 +60,10 @@ class Measurement:
     """Fitted to the mouth's path, where it moved."""
     neutral: float
     """Direction of the line that counts as zero, rad."""
+    angles: Angles
+    """The measured frames, and what their uncertainties are made of."""
+    why_coarse: str | None
+    """Why the angles are the mouth's own; ``None`` where they are the whole head's."""
     colour_rgb: tuple[int, int, int]
     """The mouth's colour in this clip."""
     frames: int
@@ -111,7 +118,20 @@ def measure_clip(
     pivot, disagreement = choose_pivot(marker, track.circle)
     if pivot is None:
         raise InputError(f"{path}: no pivot found: the mouth does not move and there is no round marker to see")
-    series, neutral = _angles(path, rig, command, time, track, status, pivot, repeated, _pixel_noise(images))
+    ok = np.array([s == OK for s in status])
+    regions = [r for r, s in zip(track.regions, ok, strict=True) if s and r is not None]
+    noise = _pixel_noise(images)
+    angles = coarse_angles(regions, time[ok], pivot, track.circle, rig, command, noise)
+    why_coarse: str | None = "the mouth does not move"
+    if found.circle is not None:
+        rows = np.flatnonzero(ok)
+        turn, sigma = np.full(len(time), np.nan), np.full(len(time), np.nan)
+        turn[rows], sigma[rows] = turns(angles, rig), angles.sigma
+        registered = register_clip(path, turn, sigma, pivot, noise, info.coarse_colour, progress)
+        why_coarse = registered if isinstance(registered, str) else None
+        if isinstance(registered, Registered):
+            angles = fine_angles(angles, registered, rows, time[ok], rig, command)
+    series = _series(path, rig, time, status, ok, angles, repeated)
     notes = [disagreement] if disagreement else []
     if found.circle is None:
         notes.append("the mouth does not move in this clip")
@@ -121,10 +141,12 @@ def measure_clip(
         truncated = f"truncated: {sample.decoded}{of} frames could be read"
     return Measurement(
         series=series,
-        pivot=pivot,
+        pivot=angles.pivot,
         marker=marker,
         circle=track.circle,
-        neutral=neutral,
+        neutral=angles.neutral,
+        angles=angles,
+        why_coarse=why_coarse,
         colour_rgb=found.model.mean_rgb,
         frames=len(time),
         truncated=truncated,
@@ -168,77 +190,35 @@ def _find_pivot_marker(images: Sequence[Image], rig: Rig, circle: Circle | None)
     return find_marker(still, circle.centre_px, float(np.clip(sigma, *_REACH_PX)))
 
 
-def _angles(
+def _series(
     path: Path,
     rig: Rig,
-    command: Command | None,
     time: Floats,
-    track: Track,
     status: list[str],
-    pivot: Pivot,
+    ok: NDArray[np.bool_],
+    angles: Angles,
     repeated: NDArray[np.bool_],
-    pixel_noise: float,
-) -> tuple[AngleSeries, float]:
-    ok = np.array([s == OK for s in status])
-    regions = [r for r, s in zip(track.regions, ok, strict=True) if s and r is not None]
-    mouth = np.array([r.centre_px for r in regions])
-    arm = mouth - pivot.centre_px
-    # y goes down in the image; a face that looks to the left is mirrored, so that an upward nod is positive.
-    ahead = arm[:, 0] if rig.facing == "right" else -arm[:, 0]
-    line = np.unwrap(np.arctan2(-arm[:, 1], ahead))
-    line -= 2.0 * np.pi * np.round(np.median(line) / (2.0 * np.pi))
-    lever = np.hypot(*arm.T)
-    neutral, resting = _neutral(rig, command, time[ok], line, lever)
-    around = track.circle
-    off = lever - np.median(lever) if around is None else np.hypot(*(mouth - around.centre_px).T) - around.radius_px
-    out = arm / lever[:, None]
-    noise = pixel_noise**2 * np.array([r.noise_px2 for r in regions])
-    across, along = (
-        np.sqrt(np.einsum("ni,nij,nj->n", v, noise, v)) for v in (out, np.column_stack([-out[:, 1], out[:, 0]]))
-    )
-    errors = place_errors(mouth, off, across, along)
-    sigma = angle_sigma(mouth, pivot.centre_px, pivot.covariance_px2, errors, resting)
-
-    n = len(time)
-    empty = np.full(n, np.nan)
+) -> AngleSeries:
+    """Lay the measured frames among all the clip's frames, less the duplicates."""
+    empty = np.full(len(time), np.nan)
     lines, sigmas, levers = empty.copy(), empty.copy(), empty.copy()
-    mouths = np.full((n, 2), np.nan)
-    lines[ok], sigmas[ok], levers[ok], mouths[ok] = line, sigma, lever, mouth
+    mouths = np.full((len(time), 2), np.nan)
+    lines[ok], sigmas[ok], levers[ok], mouths[ok] = angles.line, angles.sigma, angles.lever_px, angles.mouth_px
     for i in _duplicates(lines, sigmas, repeated):
         status[i] = "duplicate"
         lines[i] = sigmas[i] = levers[i] = np.nan
         mouths[i] = np.nan
-    pivots = np.where(np.isfinite(lines)[:, None], pivot.centre_px, np.nan)
-    series = AngleSeries(
+    return AngleSeries(
         name=recording_name(path),
         time=time,
-        angle=lines - neutral,
+        angle=lines - angles.neutral,
         sigma=sigmas,
         status=tuple(status),
         line=lines,
         mouth_px=mouths,
-        pivot_px=pivots,
+        pivot_px=np.where(np.isfinite(lines)[:, None], angles.pivot.centre_px, np.nan),
         bounds={r: worst_case(r, levers) for r in {*CONTRACT_RADII_PX, *rig.pixel_error_px}},
     )
-    return series, neutral
-
-
-def _neutral(
-    rig: Rig, command: Command | None, time: Floats, line: Floats, lever: Floats
-) -> tuple[float, NDArray[np.bool_] | None]:
-    """Return the line that counts as zero, and the frames that it is taken from, if it is.
-
-    A median errs as the frames do that lie within half a pixel of it.
-    """
-    if rig.neutral != "auto":
-        return float(np.radians(rig.neutral)), None
-    change = None if command is None else command.first_change()
-    if change is not None and (time < change).any():
-        resting = time < change
-        return float(line[resting].mean()), resting
-    middle = float(np.median(line))
-    away = np.abs(line - middle) * lever
-    return middle, away <= max(0.5, float(away.min()))
 
 
 def _duplicates(line: Floats, sigma: Floats, repeated: NDArray[np.bool_]) -> list[int]:

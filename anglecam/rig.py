@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from anglecam.errors import RigError
 
 Byte = Annotated[int, Field(ge=0, le=255)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+SlantDeg = Annotated[float, Field(gt=-80, lt=80, allow_inf_nan=False)]
 
 
 class _Declared(BaseModel):
@@ -38,8 +39,25 @@ class Camera(_Declared):
     """What is known about the camera."""
 
     calibration: str | None = None
+    """A calibration file, relative to ``rig.yaml``."""
+    focal_px: Positive | None = None
+    """Focal length where there is no calibration; counts only where the view is tilted."""
+    tilt_deg: SlantDeg | None = None
+    """Between the line of sight to the pivot and the axis of rotation."""
+    tilt_axis_deg: Finite = 0.0
+    """Of the axis in the picture about which the camera is turned: 0 looks from above, 90 from the side at the left;
+    counted as angles are, so that ``facing: left`` mirrors it."""
+    tilt_sigma_deg: Annotated[float, Field(ge=0, lt=45, allow_inf_nan=False)] = 0.0
+    """Standard uncertainty of ``tilt_deg``."""
     row_time_s: Positive | None = None
+    """How much later each row is exposed than the one above it."""
     exposure_s: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one_focal_length(self) -> Camera:
+        if self.calibration is not None and self.focal_px is not None:
+            raise ValueError("focal_px stands in the calibration already; declare one of them")
+        return self
 
 
 class Sync(_Declared):
@@ -84,6 +102,8 @@ class Rig(_Declared):
         """Name the declared keys that this version reads but does not yet act on."""
         keys = {
             "camera.calibration": self.camera.calibration,
+            "camera.focal_px": self.camera.focal_px,
+            "camera.tilt_deg": self.camera.tilt_deg,
             "camera.row_time_s": self.camera.row_time_s,
             "camera.exposure_s": self.camera.exposure_s,
             "sync.lamp": self.sync.lamp,
@@ -139,5 +159,6 @@ def _first(error: ValidationError) -> str:
     key = ".".join(str(part) for part in finding["loc"] if part not in ("Mouth", "literal['auto']", "float"))
     if unknown:
         return f"unknown key {key}"
-    said = finding["msg"].replace("tuple", "list")
-    return f"{key}: {said[0].lower()}{said[1:]} (got {str(finding['input'])[:60]})"
+    said = finding["msg"].removeprefix("Value error, ").replace("tuple", "list")
+    got = "" if finding["type"] == "value_error" else f" (got {str(finding['input'])[:60]})"
+    return f"{key}: {said[0].lower()}{said[1:]}{got}"

@@ -15,7 +15,7 @@ from anglecam.measure import Measurement
 
 def series_table(measurements: Sequence[Measurement]) -> Table:
     """Tabulate measured clips: frames, range, uncertainty, pivot."""
-    table = Table("clip", "measured", "angle, °", "median sigma, °", "6 px bound, °", "pivot")
+    table = Table("clip", "measured", "angle, °", "median sigma, °", "6 px bound, °", "pivot", "by")
     for column in table.columns[1:5]:
         column.justify = "right"
     for column in table.columns[:3]:
@@ -31,6 +31,7 @@ def series_table(measurements: Sequence[Measurement]) -> Table:
             f"{np.degrees(np.median(series.sigma[ok])):.4f}",
             f"{np.degrees(np.median(series.bounds[6.0][ok])):.2f}",
             measurement.pivot.source,
+            "mouth" if measurement.angles.registered is None else "whole head",
         )
     return table
 

@@ -45,6 +45,8 @@ class ClipInfo:
     """px."""
     declared_frames: int
     """The container's own count, 0 where it states none. It may be wrong in an intact file."""
+    coarse_colour: bool
+    """Whether colour is stored at a lower resolution than brightness."""
     cut_short: bool
     """Whether bytes are missing at the end of the file."""
 
@@ -81,7 +83,9 @@ def inspect_clip(path: Path) -> ClipInfo:
     """
     with _open(path) as container:
         stream = container.streams.video[0]
-        return ClipInfo(path, stream.width, stream.height, stream.frames, is_cut_short(path))
+        planes = stream.codec_context.format.components if stream.codec_context.format else ()
+        coarse = any(plane.width < stream.width for plane in planes)
+        return ClipInfo(path, stream.width, stream.height, stream.frames, coarse, is_cut_short(path))
 
 
 def read_frames(path: Path) -> Iterator[Frame]:

@@ -1,6 +1,6 @@
 """Clips of a chessboard before a camera whose lens is known: an independent film-maker.
 
-Every pixel's grey is the mean over its area: where an edge of the board passes, over 6 × 6 points of it. The lens is
+Every pixel's grey is the mean over its area: where an edge of the board passes, over 8 × 8 points of it. The lens is
 undone by fixed-point iteration of its own equation, not by OpenCV, so that nothing here is checked against itself.
 """
 
@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-_FINE = 6
+_FINE = 8
 """Points a side within a pixel that an edge passes."""
 _BLACK, _WHITE, _WALL = 30.0, 220.0, 120.0
 

@@ -1,0 +1,189 @@
+"""From places in the picture to angles: the line from pivot to mouth, its zero, and how sure each of them is.
+
+Coarse angles come from the mouth's centroid frame by frame; fine ones from the turn of the whole head, which knows
+nothing of the mouth: the line to the mouth's median place on the head is turned along. The mouth's own place in a frame
+stays the centroid that was measured there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.budget import PlaceErrors, angle_sigma, place_errors
+from anglecam.registration import Registered
+from anglecam.rig import Rig
+from anglecam.session import Command
+from anglecam.vision.circle import Circle
+from anglecam.vision.pivot import Pivot
+from anglecam.vision.segment import Region
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Angles:
+    """The frames in which the mouth was seen; arrays of length n."""
+
+    line: Floats
+    """Direction from pivot to mouth from the picture's horizontal, upward positive for either facing, rad."""
+    sigma: Floats
+    """Standard uncertainty of ``line`` less ``neutral``, rad."""
+    mouth_px: Floats
+    """(n, 2) px."""
+    pivot: Pivot
+    neutral: float
+    """Line that counts as zero, rad."""
+    resting: NDArray[np.bool_] | None
+    """Frames that neutral is taken from; ``None`` where it is declared."""
+    errors: PlaceErrors
+    """Of the mouth's centroid."""
+    registered: Registered | None = None
+    """What the fine angles come from."""
+    shared: float = 0.0
+    """Standard uncertainty of neutral that all fine angles share, the pivot's aside, rad."""
+
+    @property
+    def lever_px(self) -> Floats:
+        """Pivot to mouth, (n,) px."""
+        return np.asarray(np.hypot(*(self.mouth_px - self.pivot.centre_px).T))
+
+
+def coarse_angles(
+    regions: Sequence[Region],
+    time: Floats,
+    pivot: Pivot,
+    circle: Circle | None,
+    rig: Rig,
+    command: Command | None,
+    pixel_noise: float,
+) -> Angles:
+    """Read angles from the mouth's centroid.
+
+    Parameters
+    ----------
+    regions : sequence of Region
+        The mouth in n frames.
+    time : ndarray
+        (n,) of those frames, s.
+    pivot : Pivot
+        Where the mechanism turns.
+    circle : Circle, optional
+        Fitted to the mouth's path.
+    rig : Rig
+        Facing and neutral.
+    command : Command, optional
+        Its first change ends the rest that defines neutral.
+    pixel_noise : float
+        Standard deviation of the pixels, grey levels.
+
+    Returns
+    -------
+    Angles
+        Without registration.
+    """
+    mouth = np.array([r.centre_px for r in regions])
+    arm = mouth - pivot.centre_px
+    # y goes down in the image; a face that looks to the left is mirrored, so that an upward nod is positive.
+    line = np.unwrap(np.arctan2(-arm[:, 1], _ahead(arm[:, 0], rig)))
+    line -= 2.0 * np.pi * np.round(np.median(line) / (2.0 * np.pi))
+    lever = np.hypot(*arm.T)
+    neutral, resting = _neutral(rig, command, time, line, lever)
+    off = lever - np.median(lever) if circle is None else np.hypot(*(mouth - circle.centre_px).T) - circle.radius_px
+    out = arm / lever[:, None]
+    noise = pixel_noise**2 * np.array([r.noise_px2 for r in regions])
+    across, along = (
+        np.sqrt(np.einsum("ni,nij,nj->n", v, noise, v)) for v in (out, np.column_stack([-out[:, 1], out[:, 0]]))
+    )
+    errors = place_errors(mouth, off, across, along)
+    sigma = angle_sigma(mouth, pivot.centre_px, pivot.covariance_px2, errors, resting)
+    return Angles(line, sigma, mouth, pivot, neutral, resting, errors)
+
+
+def turns(angles: Angles, rig: Rig) -> Floats:
+    """Turn of the head from the median line, counter-clockwise as seen, (n,) rad."""
+    turn = angles.line - np.median(angles.line)
+    return turn if rig.facing == "right" else -turn
+
+
+def fine_angles(
+    coarse: Angles, found: Registered, rows: NDArray[np.intp], time: Floats, rig: Rig, command: Command | None
+) -> Angles:
+    """Take the turns of the whole head in place of the mouth's.
+
+    A frame in which the head was not found keeps its coarse angle. Neutral is a mean over frames of its own: its
+    error is shared by all angles, and part of the pivot's error cancels against it.
+
+    Parameters
+    ----------
+    coarse : Angles
+        From the mouth's centroid.
+    found : Registered
+        The turns, in every frame of the clip.
+    rows : ndarray
+        (n,) numbers of the frames in which the mouth was seen.
+    time : ndarray
+        (n,) s.
+    rig : Rig
+        Facing and neutral.
+    command : Command, optional
+        As for the coarse angles.
+
+    Returns
+    -------
+    Angles
+        With registration.
+    """
+    turn, noise, pose, pull = found.turn[rows], found.noise[rows], found.pose[rows], found.pull[rows]
+    seen = np.isfinite(turn)
+    signed = turn if rig.facing == "right" else -turn
+    base = float(np.median(coarse.line[seen] - signed[seen]))
+    line = np.where(seen, base + signed, coarse.line)
+    neutral, resting = _neutral(rig, command, time, line, coarse.lever_px)
+    used = seen if resting is None or not (resting & seen).any() else resting & seen
+    usual = float(np.median(pose[seen]))
+    # what goes with the place on the pixel grid does not grow less by resting there
+    places = len(np.unique(np.round(coarse.mouth_px[used]).astype(int), axis=0))
+    shared = float(np.sqrt((noise[used] ** 2).mean() / used.sum() + usual**2 / places))
+    against = pull - pull[used].mean(axis=0)
+    by_pivot = np.einsum("ni,ij,nj->n", against, found.pivot_covariance_px2, against)
+    sigma = np.sqrt(noise**2 + pose**2 + shared**2 + by_pivot)
+    if resting is None:
+        # an absolute line stands on the mouth's mean place on the head, and on the pivot
+        sigma = np.sqrt(sigma**2 + float(np.median(coarse.sigma[seen])) ** 2)
+    pivot = Pivot(found.pivot_px, found.pivot_covariance_px2, f"{coarse.pivot.source} and the head's turns")
+    return replace(
+        coarse,
+        line=line,
+        sigma=np.where(seen, sigma, coarse.sigma),
+        pivot=pivot,
+        neutral=neutral,
+        resting=resting,
+        registered=found,
+        shared=shared,
+    )
+
+
+def _ahead(x: Floats, rig: Rig) -> Floats:
+    return x if rig.facing == "right" else -x
+
+
+def _neutral(
+    rig: Rig, command: Command | None, time: Floats, line: Floats, lever: Floats
+) -> tuple[float, NDArray[np.bool_] | None]:
+    """Return the line that counts as zero, and the frames that it is taken from, if it is.
+
+    A median errs as the frames do that lie within half a pixel of it.
+    """
+    if rig.neutral != "auto":
+        return float(np.radians(rig.neutral)), None
+    change = None if command is None else command.first_change()
+    if change is not None and (time < change).any():
+        resting = time < change
+        return float(line[resting].mean()), resting
+    middle = float(np.median(line))
+    away = np.abs(line - middle) * lever
+    return middle, away <= max(0.5, float(away.min()))

@@ -1,0 +1,291 @@
+"""A clip's uncertainty budget: at its typical frame, at its worst, over all of it, and the bounds of the paper."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.budget import worst_case, worst_case_both_ends
+from anglecam.gum import Combined, Comparison, Propagated, combine, compare, propagate
+from anglecam.series import CONTRACT_RADII_PX
+from anglecam.uncertainty import Course, ErrorSources, angle_draws, courses
+
+Floats = NDArray[np.float64]
+
+PAPER = ((6.0, 0.28), (10.0, 0.68))
+"""Pixel error, px, and what the paper says it does to the angle, degrees (text on Fig. 8)."""
+
+
+@dataclass(frozen=True)
+class FrameBudget:
+    """The uncertainty of one frame's angle; in degrees, because digits count in the unit that is stated."""
+
+    index: int
+    """Among the measured frames."""
+    frame: int
+    time: float
+    """s."""
+    angle_deg: float
+    lever_px: float
+    sigma_deg: float
+    """Of the terms that the series' sigma holds."""
+    combined: Combined
+    """Of all terms, by the GUM."""
+    drawn: Propagated
+    """By Monte Carlo, uncertain standard uncertainties widened to Student's t."""
+    comparison: Comparison
+    """Of both."""
+    drawn_as_known: Propagated
+    """By Monte Carlo, every standard uncertainty taken as known."""
+    linearity: Comparison
+    """Of that with ± 1.960·u: what linearisation alone costs."""
+
+
+@dataclass(frozen=True)
+class PixelBound:
+    """What a place wrong by up to so many pixels does to the angle, rad: answers to different questions."""
+
+    radius_px: float
+    """r."""
+    lever_px: float
+    """R, the arm that the rest was computed at."""
+    worst: float
+    """At most, the mouth anywhere within the circle: asin(r/R)."""
+    worst_both: float
+    """At most, mouth and pivot each anywhere within theirs: asin(2r/R)."""
+    standard: float
+    """Standard uncertainty, the mouth uniformly distributed in the disc, so r/2 along the path: r/(2R)."""
+    standard_both: float
+    """The same at both ends: r/(√2·R)."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """The uncertainty of a clip's angles."""
+
+    name: str
+    """The recording's."""
+    sources: ErrorSources
+    courses: tuple[Course, ...]
+    sigma: Floats
+    """(n,) of the terms that the series' sigma holds, rad."""
+    total: Floats
+    """(n,) of all terms, rad."""
+    typical: FrameBudget
+    """The frame of the median uncertainty."""
+    worst: FrameBudget
+    """The frame of the largest."""
+    bounds: tuple[PixelBound, ...]
+    """By radius, at the clip's median lever arm."""
+    notes: tuple[str, ...]
+    """What is not in it, and what that could cost, a line each."""
+
+    @property
+    def lever_px(self) -> float:
+        """The clip's median lever arm, px."""
+        return float(np.median(self.sources.lever_px))
+
+
+def budget_of(name: str, sources: ErrorSources, radii_px: tuple[float, ...] = CONTRACT_RADII_PX) -> Budget:
+    """Work out a clip's uncertainty budget.
+
+    Parameters
+    ----------
+    name : str
+        The recording's.
+    sources : ErrorSources
+        What errs in it.
+    radii_px : tuple of float
+        Pixel errors to bound, beside the contract's.
+
+    Returns
+    -------
+    Budget
+        The same for the same sources: the drawing is seeded.
+    """
+    terms = courses(sources)
+    variance = np.array([c.contribution**2 for c in terms])
+    total = np.sqrt(variance.sum(axis=0))
+    sigma = np.sqrt(variance[[c.in_sigma for c in terms]].sum(axis=0))
+    order = np.argsort(total)
+    lever = float(np.median(sources.lever_px))
+    return Budget(
+        name=name,
+        sources=sources,
+        courses=terms,
+        sigma=sigma,
+        total=total,
+        typical=_frame(sources, terms, sigma, int(order[(len(order) - 1) // 2])),
+        worst=_frame(sources, terms, sigma, int(order[-1])),
+        bounds=tuple(pixel_bound(r, lever) for r in sorted({*CONTRACT_RADII_PX, *radii_px})),
+        notes=_not_in_it(sources),
+    )
+
+
+def pixel_bound(radius_px: float, lever_px: float) -> PixelBound:
+    """Return worst cases and standard uncertainties for places wrong by up to ``radius_px`` at an arm."""
+    return PixelBound(
+        radius_px,
+        lever_px,
+        float(worst_case(radius_px, lever_px)),
+        float(worst_case_both_ends(radius_px, lever_px)),
+        radius_px / (2.0 * lever_px),
+        radius_px / (math.sqrt(2.0) * lever_px),
+    )
+
+
+def budget_as_dict(budget: Budget) -> dict[str, Any]:
+    """Return what ``NAME.budget.json`` holds; degrees of freedom that are infinite become ``null`` there."""
+    s = budget.sources
+    mean2 = float((budget.total**2).mean())
+    return {
+        "name": budget.name,
+        "frames_measured": len(s.frame),
+        "lever_px": budget.lever_px,
+        "pivot": {
+            "x_px": s.pivot_px[0],
+            "y_px": s.pivot_px[1],
+            "covariance_px2": s.pivot_covariance_px2,
+            "source": s.pivot_source,
+        },
+        "neutral": {
+            "line_deg": math.degrees(s.line[0] - s.angle[0]),
+            "frames": None if s.neutral is None else s.neutral.frames,
+            "poses": None if s.neutral is None else s.neutral.poses,
+        },
+        "typical": _frame_as_dict(budget, budget.typical),
+        "worst": _frame_as_dict(budget, budget.worst),
+        "rms": {
+            "sigma_deg": math.degrees(math.sqrt((budget.sigma**2).mean())),
+            "combined_deg": math.degrees(math.sqrt(mean2)),
+            "terms": [
+                {
+                    "name": c.name,
+                    "in_sigma": c.in_sigma,
+                    "contribution_deg": math.degrees(math.sqrt((c.contribution**2).mean())),
+                    "share": float((c.contribution**2).mean()) / mean2,
+                }
+                for c in budget.courses
+            ],
+        },
+        "bounds": [
+            {
+                "radius_px": b.radius_px,
+                "lever_px": b.lever_px,
+                "worst_case_deg": math.degrees(b.worst),
+                "worst_case_both_ends_deg": math.degrees(b.worst_both),
+                "standard_deg": math.degrees(b.standard),
+                "standard_both_ends_deg": math.degrees(b.standard_both),
+            }
+            for b in budget.bounds
+        ],
+        "paper": [
+            {"radius_px": r, "stated_deg": stated, "implied_lever_px": implied_lever(r, stated)} for r, stated in PAPER
+        ],
+        "not_included": list(budget.notes),
+    }
+
+
+def implied_lever(radius_px: float, stated_deg: float) -> float:
+    """Return the lever arm, px, at which a worst case of so many pixels is the stated angle: r / sin θ."""
+    return radius_px / math.sin(math.radians(stated_deg))
+
+
+def _frame(sources: ErrorSources, terms: tuple[Course, ...], sigma: Floats, i: int) -> FrameBudget:
+    stated = [course.at(i) for course in terms]
+    certain = replace(sources, noise_dof=math.inf, pose_dof=math.inf, pivot_dof=math.inf)
+    combined, as_known = combine(stated), combine([replace(term, dof=math.inf) for term in stated])
+    drawn, drawn_as_known = (_draw_degrees(s, i) for s in (sources, certain))
+    angle = math.degrees(sources.angle[i])
+    return FrameBudget(
+        index=i,
+        frame=int(sources.frame[i]),
+        time=float(sources.time[i]),
+        angle_deg=angle,
+        lever_px=float(sources.lever_px[i]),
+        sigma_deg=math.degrees(sigma[i]),
+        combined=combined,
+        drawn=drawn,
+        comparison=compare(angle, combined, drawn),
+        drawn_as_known=drawn_as_known,
+        linearity=compare(angle, as_known, drawn_as_known),
+    )
+
+
+def _draw_degrees(sources: ErrorSources, i: int) -> Propagated:
+    draw = angle_draws(sources, i)
+    return propagate(lambda rng, m: np.degrees(draw(rng, m)))
+
+
+def _frame_as_dict(budget: Budget, one: FrameBudget) -> dict[str, Any]:
+    combined = one.combined
+    return {
+        "frame": one.frame,
+        "time_s": one.time,
+        "angle_deg": one.angle_deg,
+        "lever_px": one.lever_px,
+        "sigma_deg": one.sigma_deg,
+        "combined_deg": combined.standard,
+        "degrees_of_freedom": combined.dof,
+        "coverage_factor": combined.coverage_factor,
+        "expanded_deg": combined.expanded,
+        "interval_95_deg": [one.angle_deg - combined.expanded, one.angle_deg + combined.expanded],
+        "terms": [
+            {
+                "name": t.name,
+                "estimate": t.estimate,
+                "standard_uncertainty": t.uncertainty,
+                "unit": t.unit,
+                "distribution": t.shape,
+                "degrees_of_freedom": t.dof,
+                "sensitivity": t.sensitivity,
+                "sensitivity_unit": f"°/{t.unit}",
+                "contribution_deg": t.contribution,
+                "share": share,
+                "in_sigma": course.in_sigma,
+                "known": t.known,
+            }
+            for course, t, share in zip(budget.courses, combined.terms, combined.shares, strict=True)
+        ],
+        "monte_carlo": _drawn_as_dict(one.drawn, one.comparison),
+        "monte_carlo_uncertainties_as_known": _drawn_as_dict(one.drawn_as_known, one.linearity),
+    }
+
+
+def _drawn_as_dict(drawn: Propagated, comparison: Comparison) -> dict[str, Any]:
+    return {
+        "trials": drawn.trials,
+        "mean_deg": drawn.estimate,
+        "standard_deg": drawn.standard,
+        "interval_95_deg": [drawn.low, drawn.high],
+        "numerical_error_deg": drawn.error,
+        "tolerance_deg": comparison.tolerance,
+        "distance_low_deg": comparison.low,
+        "distance_high_deg": comparison.high,
+        "gum_validated": comparison.agrees,
+    }
+
+
+def _not_in_it(s: ErrorSources) -> tuple[str, ...]:
+    """Say what nothing is known about, and what a plausible amount of it would cost at the clip's worst moment."""
+    farthest = float(np.abs(np.sin(s.angle)).max())
+    fastest = float(np.abs(s.speed).max())
+    notes = []
+    if s.neutral is None:
+        notes.append("neutral is declared: a definition, without an uncertainty of its own")
+    if s.lens_px is None:
+        cost = math.degrees(0.1 / float(s.lever_px.min()))
+        notes.append(
+            f"no calibration of the lens: distortion that moves the mouth 0.1 px along its path costs {cost:.3f}°"
+        )
+    if s.tilt is None:
+        cost = math.degrees(0.5 * math.radians(3.0) ** 2 * farthest)
+        notes.append(f"no tilt is declared: a camera 3° off the axis of rotation costs up to {cost:.3f}°")
+    if s.exposure_s is None and s.clock_s is None:
+        cost = math.degrees(fastest * 1e-3)
+        notes.append(f"no error of the time: 1 ms is worth up to {cost:.3f}° at the fastest moment")
+    return tuple(notes)

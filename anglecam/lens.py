@@ -1,0 +1,263 @@
+"""From the picture as it was filmed to the plane of motion seen square on: points, not frames.
+
+Two things are undone, each only if it is known. The lens: OpenCV's model, by its calibration. Then a declared tilt:
+the camera looks at the pivot along a line that is not the axis of rotation but leans τ away from it, turned about
+an axis a in the picture. With the pivot at the origin, U along a and V across it, a point (X, Y) of the plane, in the
+pixels of a square view, appears at ::
+
+    U = X / (1 − Y·sin τ / f),    V = Y·cos τ / (1 − Y·sin τ / f)
+
+so that a circle about the pivot appears with axes in the ratio cos τ, nearer points larger. What is undone is ::
+
+    X = U / (1 + V·tan τ / f),    Y = V / cos τ / (1 + V·tan τ / f)
+
+Lengths along a are kept at the pivot. Both coordinates share the denominator: without f (weak perspective) the line
+from pivot to mouth still has the right direction, and only distances from the pivot are wrong, by a share Y·sin τ/f.
+A centre fitted to a path of radius R is then off by about R²·sin τ/f, and nothing in the path tells.
+
+What turns with the body but z nearer to the camera than the pivot turns, rectified, by exactly the same angle and on
+a circle, but about a centre of its own: the axis of rotation is seen from beside, and stands where it passes z. With
+b the unit vector across a, a view from above having b upwards, that centre is −b·z·sin τ/(cos τ − z/f) off the pivot.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from anglecam.calibration import Calibration, read_calibration
+from anglecam.errors import InputError, RigError
+from anglecam.rig import Rig
+
+Floats = NDArray[np.float64]
+
+_UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
+"""OpenCV's own default, five rounds, leaves 0.1 px in the corners of a wide lens."""
+_STEP_PX = 0.5
+"""Half the base of a difference quotient; lenses are smooth over many pixels."""
+_RETURNS_PX = 0.01
+"""How near a point of the picture's border must come to itself when it is rectified and distorted again."""
+
+
+@dataclass(frozen=True, eq=False)
+class Lens:
+    """Camera, lens and view of one clip; without arguments the identity."""
+
+    calibration: Calibration | None = None
+    """``None``: a pinhole."""
+    tilt: float = 0.0
+    """Of the line of sight to the pivot away from the axis of rotation, rad."""
+    tilt_axis: float = 0.0
+    """Direction in the picture of the axis about which the camera is turned, rad, y up: at 0 it looks from above."""
+    tilt_sigma: float = 0.0
+    """Standard uncertainty of the tilt, rad."""
+    focal_px: float | None = None
+    """px; ``None``: weak perspective."""
+    pivot_px: tuple[float, float] = (0.0, 0.0)
+    """Where the tilted view is centred, px, in the picture without distortion."""
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether points pass unchanged."""
+        return self.calibration is None and self.tilt == 0.0
+
+    @property
+    def neglects_perspective(self) -> bool:
+        """Whether distances in a tilted view are wrong for want of a focal length."""
+        return self.tilt != 0.0 and self.focal_px is None
+
+    @property
+    def parallax(self) -> Floats:
+        """(2,) how far off the pivot, rectified, what is nearer to the camera has its centre, for each px of height.
+
+        Its direction is exact for every height, its length to first order: (cos τ)/(cos τ − z/f) times as much.
+        """
+        return math.tan(self.tilt) * np.array([math.sin(self.tilt_axis), math.cos(self.tilt_axis)])
+
+    def looking_at(self, pivot_px: ArrayLike) -> Lens:
+        """Return this lens with the tilt centred on a pivot that stands at (2,) px in the picture as it was filmed."""
+        x, y = self._undistort(np.asarray(pivot_px, dtype=float))
+        return dataclasses.replace(self, pivot_px=(float(x), float(y)))
+
+    def rectify(self, points_px: ArrayLike) -> Floats:
+        """Return (…, 2) points of the picture where a square view without distortion shows them, px; NaN stays NaN."""
+        points = self._undistort(np.asarray(points_px, dtype=float))
+        return points if self.tilt == 0.0 else _map(self._homography(), points)
+
+    def distort(self, points_px: ArrayLike) -> Floats:
+        """Return (…, 2) rectified points where the picture shows them, px: the inverse of `rectify`."""
+        points = np.asarray(points_px, dtype=float)
+        if self.tilt != 0.0:
+            points = _map(np.asarray(np.linalg.inv(self._homography()), dtype=float), points)
+        if self.calibration is None or points.size == 0:
+            return points
+        square, centre = self._square()
+        rays = np.dstack([(points.reshape(-1, 1, 2) - centre) / square, np.ones(points.size // 2)[:, None]])
+        seen = cv2.projectPoints(
+            rays, np.zeros(3), np.zeros(3), self.calibration.camera_matrix, self.calibration.distortion
+        )[0]
+        return np.asarray(seen, dtype=float).reshape(points.shape)
+
+    def jacobian(self, points_px: ArrayLike) -> Floats:
+        """Return (…, 2, 2) how a rectified point moves when the point in the picture does: J·C·Jᵀ is its covariance."""
+        points = np.asarray(points_px, dtype=float)
+        if self.is_identity:
+            return np.broadcast_to(np.eye(2), (*points.shape, 2))
+        columns = [
+            (self.rectify(points + step) - self.rectify(points - step)) / (2.0 * _STEP_PX)
+            for step in _STEP_PX * np.eye(2)
+        ]
+        return np.stack(columns, axis=-1)
+
+    def deviants(self) -> tuple[Lens, ...]:
+        """Return lenses that each err by one standard deviation in one independent direction.
+
+        Whatever is computed through a lens, y, has from it the variance Σ (y(deviant) − y(lens))². The errors are
+        common to all frames: a difference of two angles is to be formed with the same deviant.
+
+        Returns
+        -------
+        tuple of Lens
+            One for each direction in which calibration and tilt are uncertain, none where they state no uncertainty.
+        """
+        found = []
+        if self.calibration is not None and self.calibration.covariance is not None:
+            found = [dataclasses.replace(self, calibration=c) for c in _deviate(self.calibration)]
+            found = [lens._keeping_focal(self) for lens in found]
+        if self.tilt_sigma > 0.0:
+            found.append(dataclasses.replace(self, tilt=self.tilt + self.tilt_sigma))
+        return tuple(found)
+
+    def covariance(self, points_px: ArrayLike) -> Floats:
+        """Return (…, 2, 2) px², the covariance of rectified points that stems from calibration and tilt alone."""
+        here = self.rectify(points_px)
+        moved = [lens.rectify(points_px) - here for lens in self.deviants()]
+        return sum((d[..., :, None] * d[..., None, :] for d in moved), np.zeros((*here.shape, 2)))
+
+    def _keeping_focal(self, nominal: Lens) -> Lens:
+        """Move the focal length of the perspective along with the calibration's."""
+        assert self.calibration is not None
+        focal = None if nominal.focal_px is None else self.calibration.focal_px
+        return dataclasses.replace(self, focal_px=focal)
+
+    def _square(self) -> tuple[float, Floats]:
+        """Return focal length and principal point of the picture without distortion, whose pixels are square."""
+        assert self.calibration is not None
+        return self.calibration.focal_px, self.calibration.camera_matrix[:2, 2]
+
+    def _undistort(self, points: Floats) -> Floats:
+        if self.calibration is None or points.size == 0:
+            return points
+        focal, (x, y) = self._square()
+        matrix = np.array([[focal, 0.0, x], [0.0, focal, y], [0.0, 0.0, 1.0]])
+        ideal = cv2.undistortPoints(
+            np.ascontiguousarray(points).reshape(-1, 1, 2),
+            self.calibration.camera_matrix,
+            self.calibration.distortion,
+            P=matrix,
+            criteria=_UNTIL,
+        )
+        return np.asarray(ideal, dtype=float).reshape(points.shape)
+
+    def _homography(self) -> Floats:
+        """(3, 3), from the tilted view to the square one, the pivot staying in its place."""
+        c, s = math.cos(self.tilt_axis), math.sin(self.tilt_axis)
+        turn = np.array([[c, -s, 0.0], [-s, -c, 0.0], [0.0, 0.0, 1.0]])  # rows: along a and across it, y down
+        nearer = 0.0 if self.focal_px is None else math.tan(self.tilt) / self.focal_px
+        lean = np.array([[1.0, 0.0, 0.0], [0.0, 1.0 / math.cos(self.tilt), 0.0], [0.0, nearer, 1.0]])
+        there = np.eye(3)
+        there[:2, 2] = self.pivot_px
+        back = np.eye(3)
+        back[:2, 2] = -np.asarray(self.pivot_px)
+        return np.asarray(there @ turn.T @ lean @ turn @ back)
+
+
+def lens_from_rig(rig: Rig, folder: Path, size: tuple[int, int], clip: Path) -> Lens:
+    """Return the lens that a rig declares for a clip.
+
+    Parameters
+    ----------
+    rig : Rig
+        Of which ``camera``, ``facing`` and ``pivot.near`` count. ``facing: left`` mirrors the tilt's axis too.
+    folder : Path
+        That ``camera.calibration`` is relative to: the rig file's own.
+    size : tuple of int
+        Width and height of the clip, px.
+    clip : Path
+        Named where the calibration does not fit it.
+
+    Returns
+    -------
+    Lens
+        The identity where nothing is declared. Its tilt is centred on ``pivot.near``, else on the middle of the
+        picture, until `Lens.looking_at` says better.
+
+    Raises
+    ------
+    RigError
+        Where the calibration cannot be read, or cannot be undone within its own picture.
+    InputError
+        Where it was made for pictures of another size.
+    """
+    camera = rig.camera
+    calibration = None
+    if camera.calibration is not None:
+        path = folder / camera.calibration
+        calibration = read_calibration(path)
+        if calibration.size is not None and calibration.size != size:
+            made, has = ("×".join(map(str, s)) for s in (calibration.size, size))
+            raise InputError(f"{clip}: {has} px, but {path} was made for pictures of {made} px")
+        _check_border(Lens(calibration), size, path)
+    axis = math.radians(camera.tilt_axis_deg)
+    lens = Lens(
+        calibration=calibration,
+        tilt=math.radians(camera.tilt_deg or 0.0),
+        tilt_axis=axis if rig.facing == "right" else -axis,
+        tilt_sigma=math.radians(camera.tilt_sigma_deg),
+        focal_px=camera.focal_px if calibration is None else calibration.focal_px,
+    )
+    middle = ((size[0] - 1) / 2.0, (size[1] - 1) / 2.0)
+    return lens.looking_at(middle if rig.pivot.near is None else rig.pivot.near)
+
+
+def _check_border(lens: Lens, size: tuple[int, int], path: Path) -> None:
+    """Refuse coefficients whose polynomial turns back inside the picture: points there have no one place."""
+    across, down = (np.linspace(0.0, side - 1.0, 9) for side in size)
+    grid = np.stack(np.meshgrid(across, down), axis=-1)
+    returned = lens.distort(lens.rectify(grid))
+    turned = np.linalg.det(lens.jacobian(grid)) <= 0.0
+    off = np.nan_to_num(np.abs(returned - grid).max(axis=-1), nan=np.inf)
+    if turned.any() or (off > _RETURNS_PX).any():
+        x, y = grid[np.unravel_index(np.argmax(np.where(turned, np.inf, off)), off.shape)]
+        raise RigError(f"{path}: its distortion cannot be undone at pixel {x:.0f},{y:.0f} of the picture")
+
+
+def _deviate(calibration: Calibration) -> list[Calibration]:
+    """Move a calibration by one standard deviation along each principal axis of its correlation."""
+    covariance = np.asarray(calibration.covariance)
+    sigma = np.sqrt(np.diag(covariance))
+    stated = np.flatnonzero(sigma > 0.0)
+    values, axes = np.linalg.eigh(covariance[np.ix_(stated, stated)] / np.outer(sigma[stated], sigma[stated]))
+    found = []
+    for value, axis in zip(values, axes.T, strict=True):
+        if value <= 1e-12:
+            continue
+        step = np.zeros(len(sigma))
+        step[stated] = math.sqrt(value) * axis * sigma[stated]
+        matrix = calibration.camera_matrix.copy()
+        matrix[[0, 1, 0, 1], [0, 1, 2, 2]] += step[:4]
+        found.append(
+            dataclasses.replace(calibration, camera_matrix=matrix, distortion=calibration.distortion + step[4:])
+        )
+    return found
+
+
+def _map(homography: Floats, points: Floats) -> Floats:
+    mapped = points @ homography[:2, :2].T + homography[:2, 2]
+    return np.asarray(mapped / (points @ homography[2, :2] + homography[2, 2])[..., None])

@@ -1,0 +1,84 @@
+"""The budget's page and file say the same, and Fig. 8 is drawn at the worst places of the user's own frame."""
+
+from __future__ import annotations
+
+import json
+import math
+from html import unescape
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from anglecam.measure import measure_clip
+from anglecam.report.budget_page import budget_table, write_budget
+from anglecam.report.figure8 import touching_point
+from anglecam.rig import read_rig
+from anglecam.session import read_command
+from support.drawn import Look, Recording, draw_session
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("nod <b>")
+    clips = [Recording("stairs", "stairs", duration_s=2.5, amplitude_deg=12.0)]
+    truth = draw_session(folder, look=Look(), recordings=clips, seed=4, rig={"pixel_error_px": [6, 10, 3]})["stairs"]
+    rig, command = read_rig(folder / "rig.yaml"), read_command(folder / "stairs.command.csv")
+    measured = measure_clip(truth.clip, rig, command)
+    budget = write_budget(truth.clip, measured, rig, folder / "out")
+    return budget, measured, folder / "out"
+
+
+def test_the_file_states_every_term_with_its_unit(written):
+    _, measured, out = written
+    content = json.loads((out / "stairs.budget.json").read_text())
+    for name in ("typical", "worst"):
+        frame = content[name]
+        joined = math.sqrt(sum(t["contribution_deg"] ** 2 for t in frame["terms"]))
+        assert joined == pytest.approx(frame["combined_deg"])
+        assert frame["sigma_deg"] == pytest.approx(math.degrees(measured.series.sigma[frame["frame"]]), rel=1e-6)
+        assert frame["expanded_deg"] == pytest.approx(frame["coverage_factor"] * frame["combined_deg"])
+        assert sum(t["share"] for t in frame["terms"]) == pytest.approx(1.0)
+        for t in frame["terms"]:
+            assert t["contribution_deg"] == pytest.approx(abs(t["sensitivity"]) * t["standard_uncertainty"])
+            assert t["sensitivity_unit"] == f"°/{t['unit']}"
+    assert content["lever_px"] == pytest.approx(Look().lever_px, abs=1.0)
+    assert [b["radius_px"] for b in content["bounds"]] == [3.0, 6.0, 10.0]
+    assert [round(p["implied_lever_px"]) for p in content["paper"]] == [1228, 843]
+    assert content["rms"]["sigma_deg"] <= content["worst"]["sigma_deg"]
+
+
+def test_the_page_holds_the_numbers_and_the_figures(written):
+    budget, _, out = written
+    text = (out / "stairs.budget.html").read_text()
+    page = unescape(text)
+    assert page.count("<svg") == 3
+    assert page.count("data:image/png;base64") >= 6  # the six panels
+    assert "http://" not in page.replace("http://www.w3.org", "").replace("http://purl.org", "")
+    assert "src=" not in page
+    assert f"{math.degrees(budget.bounds[-1].worst):.3f}" in page
+    assert "0.408°" in page
+    for course in budget.courses:
+        assert course.name in page
+    assert "None" not in page
+    assert "nan" not in page.replace("provenance", "")
+
+
+def test_the_table_shows_terms_bounds_and_expanded_uncertainty(written):
+    budget, _, _ = written
+    console = Console(width=160, record=True, file=None)
+    with console.capture() as capture:
+        console.print(budget_table(budget))
+    shown = capture.get()
+    for name in (budget.courses[0].name, "pivot", "expanded, 95 %", "6 px, worst case", "10 px, standard"):
+        assert name in shown
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_worst_place_lies_on_the_circle_and_turns_the_line_by_the_bound(side):
+    pivot, mouth = np.array([240.0, 300.0]), np.array([420.0, 260.0])
+    end = touching_point(pivot, mouth, 10.0, side)
+    assert np.hypot(*(end - mouth)) == pytest.approx(10.0)
+    (ax, ay), (bx, by) = mouth - pivot, end - pivot
+    turned = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+    assert turned == pytest.approx(side * math.asin(10.0 / np.hypot(ax, ay)))

@@ -1,0 +1,51 @@
+"""The whole head against the mouth alone, on a film whose truth is known to a ten-thousandth of a degree."""
+
+import numpy as np
+import pytest
+import yaml
+
+from anglecam.measure import measure_clip
+from anglecam.rig import Rig
+from synth.session import render
+
+SPEC = {
+    "seed": 71,
+    "camera": {"codec": "ffv1", "noise_grey": 2.0},
+    "recordings": [
+        {"name": "swing", "duration_s": 3.0, "command": {"kind": "triangle", "amplitude_deg": 20, "period_s": 2.0}}
+    ],
+}
+
+
+@pytest.fixture(scope="module")
+def swing(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("swing")
+    (folder / "spec.yaml").write_text(yaml.safe_dump(SPEC))
+    render(folder / "spec.yaml", folder / "session", folder / "truth")
+    truth = np.genfromtxt(folder / "truth" / "swing.truth.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    return measure_clip(folder / "session" / "swing.avi", Rig()), truth
+
+
+def test_the_whole_head_gives_the_angle_to_a_thousandth_of_a_degree(swing):
+    measured, truth = swing
+    assert measured.why_coarse is None
+    assert measured.series.status == ("ok",) * 90
+    error = np.degrees(measured.series.angle) - truth["angle_deg"]
+    assert np.std(error) < 0.001
+    registered = measured.angles.registered
+    pivot = [truth["pivot_x_px"][0], truth["pivot_y_px"][0]]
+    np.testing.assert_allclose(registered.pivot_px, pivot, atol=0.02)
+
+
+def test_sigma_is_true(swing):
+    measured, truth = swing
+    # without a command the median is zero
+    error = np.degrees(measured.series.angle) - truth["angle_deg"]
+    error -= np.median(error)
+    assert 0.5 < np.sqrt(np.mean((error / np.degrees(measured.series.sigma)) ** 2)) < 1.3
+
+
+def test_the_mouths_place_in_a_frame_stays_what_was_seen_there(swing):
+    measured, truth = swing
+    away = measured.series.mouth_px - np.column_stack([truth["mouth_x_px"], truth["mouth_y_px"]])
+    assert np.hypot(*away.T).max() < 0.5
