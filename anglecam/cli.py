@@ -48,6 +48,9 @@ screen = Console()
 errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
 
 Out = Annotated[Path, typer.Option("--out", help="Folder for the results; made if missing.")]
+RigFile = Annotated[
+    Path | None, typer.Option("--rig", help="Rig file for all clips; default: rig.yaml beside each clip.")
+]
 SessionFolder = Annotated[Path, typer.Argument(metavar="SESSION", help="Folder of clips or *.angles.csv of one rig.")]
 
 
@@ -55,9 +58,7 @@ SessionFolder = Annotated[Path, typer.Argument(metavar="SESSION", help="Folder o
 def measure(
     clips: Annotated[list[Path], typer.Argument(metavar="CLIP", help="Clips, or folders of clips.")],
     out: Out,
-    rig: Annotated[
-        Path | None, typer.Option("--rig", help="Rig file for all clips; default: rig.yaml beside each clip.")
-    ] = None,
+    rig: RigFile = None,
     overlay: Annotated[bool, typer.Option("--overlay", help="Also write NAME.overlay.mp4.")] = False,
 ) -> None:
     """Measure the angle in every frame: NAME.angles.csv and a plot for each clip."""
@@ -91,9 +92,7 @@ def measure(
 def budget(
     clips: Annotated[list[Path], typer.Argument(metavar="CLIP", help="Clips, or folders of clips.")],
     out: Out,
-    rig: Annotated[
-        Path | None, typer.Option("--rig", help="Rig file for all clips; default: rig.yaml beside each clip.")
-    ] = None,
+    rig: RigFile = None,
 ) -> None:
     """Say what the angle's uncertainty is made of: NAME.budget.json and a page for each clip."""
     declared = read_rig(rig) if rig else None
