@@ -7,21 +7,40 @@ stays the centroid that was measured there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.budget import PlaceErrors, angle_sigma, place_errors
+from anglecam.lens import Lens
 from anglecam.registration import Registered
 from anglecam.rig import Rig
 from anglecam.session import Command
-from anglecam.vision.circle import Circle
+from anglecam.sighting import Sighting
+from anglecam.uncertainty import Tilt
 from anglecam.vision.pivot import Pivot
-from anglecam.vision.segment import Region
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+_THICK = 0.25
+"""Standard deviation of the height of what is seen of a mouth, as a share of the root of its area."""
+
+
+@dataclass(frozen=True)
+class ViewErrors:
+    """What the uncertainty of lens and tilt does to the angles; arrays of length n, standard uncertainties, rad."""
+
+    lens: Floats
+    tilt: Tilt | None
+    by_tilt: Floats
+
+    @property
+    def sigma(self) -> Floats:
+        """Of both, rad."""
+        return np.asarray(np.hypot(self.lens, self.by_tilt))
 
 
 @dataclass(frozen=True)
@@ -41,6 +60,8 @@ class Angles:
     """Frames that neutral is taken from; ``None`` where it is declared."""
     errors: PlaceErrors
     """Of the mouth's centroid."""
+    view: ViewErrors
+    """Of lens and tilt."""
     registered: Registered | None = None
     """What the fine angles come from."""
     shared: float = 0.0
@@ -52,55 +73,49 @@ class Angles:
         return np.asarray(np.hypot(*(self.mouth_px - self.pivot.centre_px).T))
 
 
-def coarse_angles(
-    regions: Sequence[Region],
-    time: Floats,
-    pivot: Pivot,
-    circle: Circle | None,
-    rig: Rig,
-    command: Command | None,
-    pixel_noise: float,
-) -> Angles:
+def coarse_angles(seen: Sighting, ok: NDArray[np.bool_], time: Floats, rig: Rig, command: Command | None) -> Angles:
     """Read angles from the mouth's centroid.
 
     Parameters
     ----------
-    regions : sequence of Region
-        The mouth in n frames.
+    seen : Sighting
+        Mouth and pivot.
+    ok : ndarray
+        (frames,) which n of them count.
     time : ndarray
-        (n,) of those frames, s.
-    pivot : Pivot
-        Where the mechanism turns.
-    circle : Circle, optional
-        Fitted to the mouth's path.
+        (frames,) when the mouth was where it was seen, s.
     rig : Rig
         Facing and neutral.
     command : Command, optional
         Its first change ends the rest that defines neutral.
-    pixel_noise : float
-        Standard deviation of the pixels, grey levels.
 
     Returns
     -------
     Angles
         Without registration.
     """
-    mouth = np.array([r.centre_px for r in regions])
+    regions = [r for r, counts in zip(seen.regions, ok, strict=True) if counts and r is not None]
+    mouth, pivot, circle = np.array([r.centre_px for r in regions]), seen.pivot, seen.circle
     arm = mouth - pivot.centre_px
     # y goes down in the image; a face that looks to the left is mirrored, so that an upward nod is positive.
     line = np.unwrap(np.arctan2(-arm[:, 1], _ahead(arm[:, 0], rig)))
     line -= 2.0 * np.pi * np.round(np.median(line) / (2.0 * np.pi))
     lever = np.hypot(*arm.T)
-    neutral, resting = _neutral(rig, command, time, line, lever)
+    neutral, resting = _neutral(rig, command, time[ok], line, lever)
     off = lever - np.median(lever) if circle is None else np.hypot(*(mouth - circle.centre_px).T) - circle.radius_px
     out = arm / lever[:, None]
-    noise = pixel_noise**2 * np.array([r.noise_px2 for r in regions])
+    noise = seen.noise**2 * np.array([r.noise_px2 for r in regions])
     across, along = (
         np.sqrt(np.einsum("ni,nij,nj->n", v, noise, v)) for v in (out, np.column_stack([-out[:, 1], out[:, 0]]))
     )
     errors = place_errors(mouth, off, across, along)
-    sigma = angle_sigma(mouth, pivot.centre_px, pivot.covariance_px2, errors, resting)
-    return Angles(line, sigma, mouth, pivot, neutral, resting, errors)
+    view = _view_errors(seen.lens, mouth, pivot.centre_px, line, neutral, resting, rig)
+    # of a mouth that is seen at a slant, other parts come into sight as it turns: they stand at other heights
+    thick = _THICK * float(np.median(np.sqrt([r.area_px2 for r in regions])))
+    aside = thick * np.hypot(*seen.lens.parallax) * (line - neutral) / lever
+    known = angle_sigma(mouth, pivot.centre_px, pivot.covariance_px2, errors, resting)
+    sigma = np.sqrt(known**2 + view.sigma**2 + aside**2)
+    return Angles(line, sigma, mouth, pivot, neutral, resting, errors, view)
 
 
 def turns(angles: Angles, rig: Rig) -> Floats:
@@ -150,7 +165,7 @@ def fine_angles(
     shared = float(np.sqrt((noise[used] ** 2).mean() / used.sum() + usual**2 / places))
     against = pull - pull[used].mean(axis=0)
     by_pivot = np.einsum("ni,ij,nj->n", against, found.pivot_covariance_px2, against)
-    sigma = np.sqrt(noise**2 + pose**2 + shared**2 + by_pivot)
+    sigma = np.sqrt(noise**2 + pose**2 + shared**2 + by_pivot + coarse.view.sigma**2)
     if resting is None:
         # an absolute line stands on the mouth's mean place on the head, and on the pivot
         sigma = np.sqrt(sigma**2 + float(np.median(coarse.sigma[seen])) ** 2)
@@ -165,6 +180,28 @@ def fine_angles(
         registered=found,
         shared=shared,
     )
+
+
+def _view_errors(
+    lens: Lens, mouth: Floats, pivot: Floats, line: Floats, neutral: float, resting: Flags | None, rig: Rig
+) -> ViewErrors:
+    """See what lenses that err by one standard deviation each make of the angles."""
+    zero = slice(None) if resting is None and rig.neutral == "auto" else resting
+    variance = np.zeros(len(line))
+    filmed, filmed_pivot = lens.distort(mouth), lens.distort(pivot)
+    for deviant in lens.deviants():
+        if deviant.tilt != lens.tilt:
+            continue
+        arm = deviant.rectify(filmed) - deviant.rectify(filmed_pivot)
+        off = (np.arctan2(-arm[:, 1], _ahead(arm[:, 0], rig)) - line + np.pi) % (2.0 * np.pi) - np.pi
+        variance += (off - (0.0 if zero is None else off[zero].mean())) ** 2
+    if lens.tilt_sigma == 0.0:
+        return ViewErrors(np.sqrt(variance), None, np.zeros(len(line)))
+    tilt = Tilt(lens.tilt, np.radians(rig.camera.tilt_axis_deg), lens.tilt_sigma)
+    off = tilt.turned(line, tilt.sigma) - line
+    if rig.neutral == "auto":
+        off = off - (tilt.turned(np.array([neutral]), tilt.sigma) - neutral)
+    return ViewErrors(np.sqrt(variance), tilt, np.abs(off))
 
 
 def _ahead(x: Floats, rig: Rig) -> Floats:

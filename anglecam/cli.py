@@ -79,8 +79,8 @@ def measure(
                 if overlay:
                     write_overlay(clip, measurement, out / f"{clip.stem}.overlay.mp4")
                 rows.append(measurement)
-                if measurement.truncated:
-                    raise InputError(f"{clip}: {measurement.truncated}")
+                if measurement.sighting.truncated:
+                    raise InputError(f"{clip}: {measurement.sighting.truncated}")
             except AnglecamError as problem:
                 problems.append(problem)
     if rows:
@@ -104,8 +104,8 @@ def budget(
                 used = declared if declared is not None else rig_beside(clip)
                 measurement = _measure(clip, used, bars)
                 screen.print(budget_table(write_budget(clip, measurement, used, out)))
-                if measurement.truncated:
-                    raise InputError(f"{clip}: {measurement.truncated}")
+                if measurement.sighting.truncated:
+                    raise InputError(f"{clip}: {measurement.sighting.truncated}")
             except AnglecamError as problem:
                 problems.append(problem)
     _end(problems)
@@ -250,12 +250,15 @@ def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement:
     bar = bars.add_task(clip.name, total=None)
     _say_what_is_not_applied(rig, clip)
     with blame(clip):
-        return measure_clip(
+        measurement = measure_clip(
             clip,
             rig,
             command_beside(clip),
             progress=lambda n, total: bars.update(bar, completed=n, total=total or None),
         )
+    for note in measurement.sighting.notes:
+        errors.print(f"{clip}: {note}")
+    return measurement
 
 
 def _say_what_is_not_applied(rig: Rig, where: Path) -> None:

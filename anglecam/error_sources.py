@@ -77,6 +77,8 @@ def error_sources(measured: Measurement, rig: Rig) -> ErrorSources:
         registration=None if registration is None else registration[kept],
         pivot_pull=None if pull is None else pull[kept],
         mouth_on_head=None if mouth_on_head is None else mouth_on_head[kept],
+        lens_px=(angles.view.lens * angles.lever_px)[kept] if angles.view.lens.any() else None,
+        tilt=angles.view.tilt,
         exposure_s=rig.camera.exposure_s,
     )
 

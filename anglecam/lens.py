@@ -178,15 +178,13 @@ class Lens:
         return np.asarray(there @ turn.T @ lean @ turn @ back)
 
 
-def lens_from_rig(rig: Rig, folder: Path, size: tuple[int, int], clip: Path) -> Lens:
+def lens_from_rig(rig: Rig, size: tuple[int, int], clip: Path) -> Lens:
     """Return the lens that a rig declares for a clip.
 
     Parameters
     ----------
     rig : Rig
         Of which ``camera``, ``facing`` and ``pivot.near`` count. ``facing: left`` mirrors the tilt's axis too.
-    folder : Path
-        That ``camera.calibration`` is relative to: the rig file's own.
     size : tuple of int
         Width and height of the clip, px.
     clip : Path
@@ -208,7 +206,7 @@ def lens_from_rig(rig: Rig, folder: Path, size: tuple[int, int], clip: Path) -> 
     camera = rig.camera
     calibration = None
     if camera.calibration is not None:
-        path = folder / camera.calibration
+        path = Path(camera.calibration)
         calibration = read_calibration(path)
         if calibration.size is not None and calibration.size != size:
             made, has = ("×".join(map(str, s)) for s in (calibration.size, size))

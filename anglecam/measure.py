@@ -1,15 +1,12 @@
 """From a clip to the angle in every frame: coarse by the mouth's place, fine by the whole head.
 
-The first reading of a clip keeps a few frames, from which the mouth's colour, its rough path and the pivot's marker
-are learnt; the second finds the mouth in every frame. Where more of the head than the mouth is rigid and has edges,
+`anglecam.sighting` finds mouth and pivot. Where more of the head than the mouth is rigid and has edges,
 `anglecam.registration` reads on and finds the turn from all of it; the more certain of the two is taken.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,31 +15,15 @@ from numpy.typing import NDArray
 
 from anglecam.angles import Angles, coarse_angles, fine_angles, turns
 from anglecam.budget import worst_case
-from anglecam.errors import InputError
-from anglecam.registration import Registered, register_clip
+from anglecam.registration import Registered, Start, register_clip
 from anglecam.rig import Rig
 from anglecam.series import CONTRACT_RADII_PX, OK, AngleSeries
 from anglecam.session import Command, recording_name
-from anglecam.video.frames import Image, Sample, inspect_clip, read_frames, sample_frames
-from anglecam.vision.circle import Circle
-from anglecam.vision.pivot import Marker, Pivot, choose_pivot, find_marker
-from anglecam.vision.search import Found, find_mouth
-from anglecam.vision.segment import Region, find_regions
-from anglecam.vision.track import follow_mouth
+from anglecam.shutter import measurement_time
+from anglecam.sighting import Sighting, sight_clip
 
 Floats = NDArray[np.float64]
 
-_SAMPLE_BYTES = 100_000_000
-"""Memory for the frames of the first pass."""
-_SAMPLES = 32
-_STILL = 9
-"""Frames whose median shows what does not move."""
-_SMALLEST_SHARE = 0.25
-"""Of the mouth's area; a smaller region is no mouth even if partly hidden."""
-_HINT_PX = 10.0
-"""Standard uncertainty of a hint at the pivot."""
-_REACH_PX = (3.0, 40.0)
-"""Limits of the standard uncertainty of the centre of rotation when a marker is looked for about it."""
 _MOVING = 5.0
 """Standard uncertainties by which the angle must change on both sides of a repeated frame for it to be one."""
 
@@ -52,28 +33,17 @@ class Measurement:
     """What was measured in a clip, and how."""
 
     series: AngleSeries
-    pivot: Pivot
-    """Where the mechanism turns, how certain, and from what."""
-    marker: Marker | None
-    """The round mark at the pivot, where there is one."""
-    circle: Circle | None
-    """Fitted to the mouth's path, where it moved."""
-    neutral: float
-    """Direction of the line that counts as zero, rad."""
+    sighting: Sighting
+    """The coarse pass."""
     angles: Angles
     """The measured frames, and what their uncertainties are made of."""
     why_coarse: str | None
     """Why the angles are the mouth's own; ``None`` where they are the whole head's."""
-    colour_rgb: tuple[int, int, int]
-    """The mouth's colour in this clip."""
-    frames: int
-    """Rows of the series."""
-    truncated: str | None
-    """``truncated: 71 of 120 frames could be read`` where the file ends too early; the rest is measured."""
-    notes: tuple[str, ...]
-    """What the user should know, a line each."""
-    contours_px: tuple[NDArray[np.int32] | None, ...]
-    """Each frame's (k, 2) outline of the mouth, where one was found."""
+
+    @property
+    def contours_px(self) -> tuple[NDArray[np.int32] | None, ...]:
+        """Each frame's (k, 2) outline of the mouth, where one was found."""
+        return tuple(None if r is None else r.contour_px for r in self.sighting.regions)
 
 
 def measure_clip(
@@ -86,7 +56,7 @@ def measure_clip(
     path : Path
         The clip.
     rig : Rig
-        What is declared about mouth, pivot, direction and neutral.
+        What is declared about mouth, pivot, direction, neutral and camera.
     command : Command, optional
         What was commanded; its first change ends the rest that defines neutral.
     progress : callable, optional
@@ -102,109 +72,58 @@ def measure_clip(
     InputError
         Where the file cannot be read, or no frame of it can be measured: one line with file, count and cause.
     """
-    info = inspect_clip(path)
-    most = int(np.clip(_SAMPLE_BYTES // max(3 * info.width * info.height, 1), 8, _SAMPLES))
-    sample = sample_frames(path, most)
-    images = [f.image for f in sample.frames if f.image is not None]
-    found = find_mouth(images, rig.mouth_rgb, rig.pivot.near) if images else None
-    if found is None:
-        raise InputError(_no_mouth(path, sample, rig))
-    time, candidates, decoded, repeated = _read_regions(path, found, sample.count, progress)
-    track = follow_mouth(candidates, time, found)
-    status = [s if d else "undecodable" for s, d in zip(track.status, decoded, strict=True)]
-    if OK not in status:
-        raise InputError(_nothing_measured(path, status, sample, rig))
-    marker = _find_pivot_marker(images, rig, track.circle)
-    pivot, disagreement = choose_pivot(marker, track.circle)
-    if pivot is None:
-        raise InputError(f"{path}: no pivot found: the mouth does not move and there is no round marker to see")
-    ok = np.array([s == OK for s in status])
-    regions = [r for r, s in zip(track.regions, ok, strict=True) if s and r is not None]
-    noise = _pixel_noise(images)
-    angles = coarse_angles(regions, time[ok], pivot, track.circle, rig, command, noise)
+    seen = sight_clip(path, rig, progress)
+    ok = np.array([s == OK for s in seen.status])
+    row_time = rig.camera.row_time_s
+    row = np.full(len(ok), np.nan)
+    row[ok] = seen.lens.distort(np.array([r.centre_px for r, s in zip(seen.regions, ok, strict=True) if s and r]))[:, 1]
+    time = measurement_time(seen.time, row, seen.size[1], row_time)
+    angles = coarse_angles(seen, ok, time, rig, command)
     why_coarse: str | None = "the mouth does not move"
-    if found.circle is not None:
-        rows = np.flatnonzero(ok)
-        turn, sigma = np.full(len(time), np.nan), np.full(len(time), np.nan)
-        turn[rows], sigma[rows] = turns(angles, rig), angles.sigma
-        registered = register_clip(path, turn, sigma, pivot, noise, info.coarse_colour, progress)
+    if seen.moves:
+        start = _start(seen, ok, time, row, angles, rig)
+        registered = register_clip(path, start, seen.lens, progress)
         why_coarse = registered if isinstance(registered, str) else None
         if isinstance(registered, Registered):
-            angles = fine_angles(angles, registered, rows, time[ok], rig, command)
-    series = _series(path, rig, time, status, ok, angles, repeated)
-    notes = [disagreement] if disagreement else []
-    if found.circle is None:
-        notes.append("the mouth does not move in this clip")
-    truncated = None
-    if info.cut_short and not 0 < info.declared_frames <= sample.decoded:
-        of = f" of {info.declared_frames}" if info.declared_frames else ""
-        truncated = f"truncated: {sample.decoded}{of} frames could be read"
-    return Measurement(
-        series=series,
-        pivot=angles.pivot,
-        marker=marker,
-        circle=track.circle,
-        neutral=angles.neutral,
-        angles=angles,
-        why_coarse=why_coarse,
-        colour_rgb=found.model.mean_rgb,
-        frames=len(time),
-        truncated=truncated,
-        notes=tuple(notes),
-        contours_px=tuple(None if r is None else r.contour_px for r in track.regions),
+            time = measurement_time(
+                seen.time, np.where(np.isfinite(registered.turn), registered.row, row), seen.size[1], row_time
+            )
+            angles = fine_angles(angles, registered, np.flatnonzero(ok), time[ok], rig, command)
+    return Measurement(_series(path, rig, time, seen, ok, angles), seen, angles, why_coarse)
+
+
+def _start(seen: Sighting, ok: NDArray[np.bool_], time: Floats, row: Floats, angles: Angles, rig: Rig) -> Start:
+    """Lay the coarse turns among all the clip's frames."""
+    n = len(time)
+    turn, sigma, speed = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n)
+    turn[ok], sigma[ok] = turns(angles, rig), angles.sigma
+    if rig.camera.row_time_s is not None and ok.sum() > 1:
+        speed[ok] = np.gradient(turn[ok], time[ok])
+    return Start(
+        turn=turn,
+        sigma=sigma,
+        pivot=seen.pivot,
+        pivots_px=np.broadcast_to(seen.pivot.centre_px, (n, 2)),
+        turn_per_row=speed * (rig.camera.row_time_s or 0.0),
+        row=row,
     )
-
-
-def _read_regions(
-    path: Path, found: Found, count: int, progress: Callable[[int, int], None] | None
-) -> tuple[Floats, list[list[Region]], list[bool], NDArray[np.bool_]]:
-    """Find the regions of the mouth's colour in every frame; tell which frames repeat the one before bit by bit."""
-    time: list[float] = []
-    candidates: list[list[Region]] = []
-    decoded: list[bool] = []
-    repeated: list[bool] = []
-    before = None
-    for frame in read_frames(path):
-        image = frame.image
-        time.append(frame.time)
-        decoded.append(image is not None)
-        repeated.append(image is not None and before is not None and np.array_equal(image, before))
-        regions = [] if image is None else find_regions(image, found.model, _SMALLEST_SHARE * found.area_px2)
-        candidates.append(regions)
-        before = image
-        if progress is not None:
-            progress(frame.index + 1, count)
-    return np.array(time), candidates, decoded, np.array(repeated)
-
-
-def _find_pivot_marker(images: Sequence[Image], rig: Rig, circle: Circle | None) -> Marker | None:
-    if rig.pivot.marker == "none":
-        return None
-    few = images[:: max(1, len(images) // _STILL)]
-    still = np.median(np.stack(few), axis=0).astype(np.uint8)
-    if rig.pivot.near is not None:
-        return find_marker(still, np.array(rig.pivot.near), _HINT_PX)
-    if circle is None:
-        return find_marker(still, None, 0.0)
-    sigma = float(np.sqrt(np.linalg.eigvalsh(circle.centre_covariance_px2)[-1]))
-    return find_marker(still, circle.centre_px, float(np.clip(sigma, *_REACH_PX)))
 
 
 def _series(
     path: Path,
     rig: Rig,
     time: Floats,
-    status: list[str],
+    seen: Sighting,
     ok: NDArray[np.bool_],
     angles: Angles,
-    repeated: NDArray[np.bool_],
 ) -> AngleSeries:
     """Lay the measured frames among all the clip's frames, less the duplicates."""
-    empty = np.full(len(time), np.nan)
+    empty, status = np.full(len(time), np.nan), list(seen.status)
     lines, sigmas, levers = empty.copy(), empty.copy(), empty.copy()
     mouths = np.full((len(time), 2), np.nan)
-    lines[ok], sigmas[ok], levers[ok], mouths[ok] = angles.line, angles.sigma, angles.lever_px, angles.mouth_px
-    for i in _duplicates(lines, sigmas, repeated):
+    lines[ok], sigmas[ok], levers[ok] = angles.line, angles.sigma, angles.lever_px
+    mouths[ok] = seen.lens.distort(angles.mouth_px)
+    for i in _duplicates(lines, sigmas, seen.repeated):
         status[i] = "duplicate"
         lines[i] = sigmas[i] = levers[i] = np.nan
         mouths[i] = np.nan
@@ -216,7 +135,7 @@ def _series(
         status=tuple(status),
         line=lines,
         mouth_px=mouths,
-        pivot_px=np.where(np.isfinite(lines)[:, None], angles.pivot.centre_px, np.nan),
+        pivot_px=np.where(np.isfinite(lines)[:, None], seen.lens.distort(angles.pivot.centre_px), np.nan),
         bounds={r: worst_case(r, levers) for r in {*CONTRACT_RADII_PX, *rig.pixel_error_px}},
     )
 
@@ -235,33 +154,3 @@ def _duplicates(line: Floats, sigma: Floats, repeated: NDArray[np.bool_]) -> lis
         if (np.abs(steps) > _MOVING * sigma[i - 1]).all():
             rows.extend(range(int(i), j + 1))
     return rows
-
-
-def _pixel_noise(images: Sequence[Image]) -> float:
-    """Estimate the pixels' standard deviation, grey levels, from what differs between frames where nothing moves."""
-    if len(images) < 2:
-        return 1.0
-    pairs = [a[::4, ::4].astype(float) - b[::4, ::4] for a, b in itertools.pairwise(images)]
-    quantised = 1.0 / np.sqrt(12.0)
-    return max(quantised, 1.4826 * float(np.median(np.abs(pairs))) / np.sqrt(2.0))
-
-
-def _colour(rig: Rig) -> str:
-    return "auto" if rig.mouth_rgb is None else ",".join(map(str, rig.mouth_rgb))
-
-
-def _no_mouth(path: Path, sample: Sample, rig: Rig) -> str:
-    if not sample.decoded:
-        return f"{path}: none of its {sample.count} frames can be decoded"
-    hint = "" if rig.pivot.near is None else ", turning about the hint at {:g},{:g}".format(*rig.pivot.near)
-    return (
-        f"{path}: no mouth found in {sample.count} of {sample.count} frames (colour {_colour(rig)}{hint});"
-        " is it in the picture?"
-    )
-
-
-def _nothing_measured(path: Path, status: Sequence[str], sample: Sample, rig: Rig) -> str:
-    if set(status) <= {"no_mouth", "undecodable"}:
-        return _no_mouth(path, sample, rig)
-    causes = ", ".join(f"{cause} in {k}" for cause, k in Counter(status).most_common())
-    return f"{path}: none of {len(status)} frames could be measured: {causes}"

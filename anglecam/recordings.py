@@ -62,8 +62,8 @@ def measure_session(
                 one = measurement.series
                 if out is not None:
                     write_series(one, out / f"{name}{SERIES_ENDING}")
-                if measurement.truncated:
-                    problems.append(InputError(f"{recording.source}: {measurement.truncated}"))
+                if measurement.sighting.truncated:
+                    problems.append(InputError(f"{recording.source}: {measurement.sighting.truncated}"))
             else:
                 one = read_series(recording.source)
             series.append(one)

@@ -7,15 +7,18 @@ frame, one frame at a time, so that memory does not grow with the clip.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.video.frames import read_frames
+from anglecam.lens import Lens
+from anglecam.video.frames import Image, inspect_clip, read_frames
+from anglecam.vision.noise import pixel_noise
 from anglecam.vision.pivot import Pivot
-from anglecam.vision.register import Glimpse, Look, choose_tiles, find_turn, learn
+from anglecam.vision.register import LOST, Look, Turn, find_turn, learn
+from anglecam.vision.tiles import Glimpse, choose_tiles, plane_of
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +34,26 @@ _FEWEST_TILES = 3
 _AGREE = 4.0
 """Times its uncertainty that the coarse angle may typically be off the fine one: beyond, what was learnt is not what
 carries the mouth."""
+_ASTRAY = 13.8
+"""99.9 % point of χ² with two degrees of freedom: a centre of rotation farther from where it was expected is none."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where the coarse measurement has the head; arrays of length n, a frame of the clip each."""
+
+    turn: Floats
+    """Counter-clockwise as seen, from some reference, rad; NaN where it is not known: such a frame is left alone."""
+    sigma: Floats
+    """Its standard uncertainty, rad."""
+    pivot: Pivot
+    """In the plane of motion."""
+    pivots_px: Floats
+    """(n, 2) where it is in each frame, where camera or base move, in the plane of motion, px."""
+    turn_per_row: Floats
+    """What the head turns while the shutter goes on by a row, rad."""
+    row: Floats
+    """Row of the picture to whose exposure ``turn`` refers."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +68,8 @@ class Registered:
     """Standard uncertainty that all frames share in which the head is at the same place, rad."""
     pull: Floats
     """(n, 2) change of the turn with an error of the pivot, rad/px."""
+    row: Floats
+    """Row of the picture to whose exposure the turn refers."""
     pivot_px: Floats
     """(2,) centre of rotation as the whole head has it, px."""
     pivot_covariance_px2: Floats
@@ -59,31 +84,21 @@ class Registered:
 
 
 def register_clip(
-    path: Path,
-    turn: Floats,
-    sigma: Floats,
-    pivot: Pivot,
-    noise: float,
-    coarse_colour: bool,
-    progress: Callable[[int, int], None] | None = None,
+    path: Path, start: Start, lens: Lens, progress: Callable[[int, int], None] | None = None
 ) -> Registered | str:
     """Find the head's turn in every frame.
+
+    Where colour is stored at a lower resolution than brightness, brightness alone is looked at: edges of colour then
+    lie up to half a pixel beside it.
 
     Parameters
     ----------
     path : Path
         The clip.
-    turn : ndarray
-        (n,) coarse turn, rad; NaN where the mouth was not found: such a frame is left alone.
-    sigma : ndarray
-        (n,) its standard uncertainty, rad.
-    pivot : Pivot
-        Where the mechanism turns.
-    noise : float
-        Standard deviation of the pixels, grey levels.
-    coarse_colour : bool
-        Whether colour is stored at a lower resolution than brightness. Such codecs err alike all over the head, which
-        the tiles cannot tell: measured, the uncertainty then comes out up to two times too small, so they are refused.
+    start : Start
+        Where the head is, coarsely.
+    lens : Lens
+        From the picture to the plane of motion.
     progress : callable, optional
         Called with (frames done, frames in all).
 
@@ -92,47 +107,75 @@ def register_clip(
     Registered or str
         Why not, in a few words, where the head cannot be registered or is no better for it.
     """
-    if coarse_colour:
-        return "colour is stored at half resolution"
-    known = np.flatnonzero(np.isfinite(turn))
+    info = inspect_clip(path)
+    n, known = len(start.turn), np.flatnonzero(np.isfinite(start.turn))
     if len(known) < _FEWEST:
         return f"the mouth is seen in {len(known)} frames only"
-    glimpses = _glimpses(path, turn, known, pivot)
-    order = np.argsort([g.turn for g in glimpses])
-    spread = order[np.unique(np.linspace(0, len(order) - 1, _STACK).round().astype(int))]
-    tiles = choose_tiles([glimpses[i] for i in spread], noise)
-    if len(tiles) < _FEWEST_TILES:
-        return "too little of the head is rigid and has edges"
-    look = learn(glimpses, tiles, pivot.covariance_px2)
-    del glimpses
-    found, noises, poses = (np.full(len(turn), np.nan) for _ in range(3))
-    pulls = np.full((len(turn), 2), np.nan)
-    for frame in read_frames(path):
-        if frame.index < len(turn) and np.isfinite(turn[frame.index]) and frame.image is not None:
-            one = find_turn(look, Glimpse(frame.image, float(turn[frame.index]), look.pivot_px))
-            found[frame.index], pulls[frame.index] = one.turn, one.pull
-            noises[frame.index], poses[frame.index] = one.noise, one.pose
-        if progress is not None:
-            progress(frame.index + 1, len(turn))
-    both = np.isfinite(found)
-    if not both.any() or np.median(np.hypot(noises, poses)[both]) > np.median(sigma[both]):
-        return "the mouth alone is more certain than the head"
-    apart = found[both] - turn[both]
-    apart -= np.median(apart)
-    if np.median(np.abs(apart)) > _AGREE * np.median(sigma[both]):
-        return "what is rigid in the picture does not turn with the mouth"
-    return Registered(found, noises, poses, pulls, look.pivot_px, look.pivot_covariance_px2, look)
-
-
-def _glimpses(path: Path, turn: Floats, known: NDArray[np.int64], pivot: Pivot) -> list[Glimpse]:
-    """Read frames whose turns are spread over all that there are, and over the clip."""
-    first = next(frame.image for frame in read_frames(path) if frame.image is not None)
-    most = int(np.clip(_BYTES // first.nbytes, _FEWEST, _LEARNT))
-    by_turn = known[np.argsort(turn[known], kind="stable")]
-    half = np.unique(np.linspace(0, len(known) - 1, max(most // 2, 2)).round().astype(int))
-    wanted = set(by_turn[half].tolist()) | set(known[half].tolist())
-    return [
-        Glimpse(frame.image, float(turn[frame.index]), pivot.centre_px)
-        for frame in read_frames(path)
+    plane = plane_of(lens, (info.width, info.height))
+    planes = 1 if info.coarse_colour else 3
+    most = int(np.clip(_BYTES // (planes * info.width * info.height), _FEWEST, _LEARNT))
+    wanted = _spread_out(start.turn, known, most)
+    glimpses = [
+        _glimpse(start, frame.index, frame.image)
+        for frame in read_frames(path, brightness=info.coarse_colour)
         if frame.index in wanted and frame.image is not None
     ]
+    by_turn = np.argsort([g.turn for g in glimpses])
+    stack = by_turn[np.unique(np.linspace(0, len(by_turn) - 1, _STACK).round().astype(int))]
+    tiles = choose_tiles(
+        [glimpses[i] for i in stack], plane, start.pivot.centre_px, pixel_noise([g.image for g in glimpses])
+    )
+    if len(tiles.corners) < _FEWEST_TILES:
+        return "too little of the head is rigid and has edges"
+    look = learn(glimpses, tiles, plane, start.pivot)
+    del glimpses
+    apart = look.pivot_px - start.pivot.centre_px
+    if apart @ np.linalg.solve(look.pivot_covariance_px2 + start.pivot.covariance_px2, apart) > _ASTRAY:
+        return "what is rigid in the picture does not turn about the pivot"
+    centred = replace(start, pivots_px=start.pivots_px + apart)
+    found, rows = [LOST] * n, start.row.copy()
+    before: Image | None = None
+    for frame in read_frames(path, brightness=info.coarse_colour):
+        i, image = frame.index, frame.image
+        if i < n and np.isfinite(start.turn[i]) and image is not None:
+            one = _glimpse(centred, i, image)
+            if one.turn_per_row:
+                # at the middle of what is looked at, an error of the speed counts least
+                rows[i] = look.row_of_middle(one)
+                one = replace(one, turn=one.turn + one.turn_per_row * (rows[i] - one.row), row=rows[i])
+            found[i] = find_turn(look, one, before if frame.predicted else None)
+        before = image
+        if progress is not None:
+            progress(i + 1, n)
+    registered = _gathered(found, rows, look)
+    both = np.isfinite(registered.turn)
+    if not both.any() or np.median(registered.sigma[both]) > np.median(start.sigma[both]):
+        return "the mouth alone is more certain than the head"
+    off = registered.turn[both] - start.turn[both] - (start.turn_per_row * (rows - start.row))[both]
+    if np.median(np.abs(off - np.median(off))) > _AGREE * np.median(start.sigma[both]):
+        return "what is rigid in the picture does not turn with the mouth"
+    return registered
+
+
+def _glimpse(start: Start, i: int, image: Image) -> Glimpse:
+    return Glimpse(image, float(start.turn[i]), start.pivots_px[i], float(start.turn_per_row[i]), float(start.row[i]))
+
+
+def _spread_out(turn: Floats, known: NDArray[np.intp], most: int) -> set[int]:
+    """Choose frames whose turns are spread over all that there are, and over the clip."""
+    by_turn = known[np.argsort(turn[known], kind="stable")]
+    half = np.unique(np.linspace(0, len(known) - 1, max(most // 2, 2)).round().astype(int))
+    return set(by_turn[half].tolist()) | set(known[half].tolist())
+
+
+def _gathered(found: list[Turn], rows: Floats, look: Look) -> Registered:
+    return Registered(
+        turn=np.array([one.turn for one in found]),
+        noise=np.array([one.noise for one in found]),
+        pose=np.array([one.pose for one in found]),
+        pull=np.array([one.pull for one in found]),
+        row=rows,
+        pivot_px=look.pivot_px,
+        pivot_covariance_px2=look.pivot_covariance_px2,
+        look=look,
+    )

@@ -39,7 +39,7 @@ class Camera(_Declared):
     """What is known about the camera."""
 
     calibration: str | None = None
-    """A calibration file, relative to ``rig.yaml``."""
+    """A calibration file; in ``rig.yaml`` relative to it."""
     focal_px: Positive | None = None
     """Focal length where there is no calibration; counts only where the view is tilted."""
     tilt_deg: SlantDeg | None = None
@@ -101,11 +101,6 @@ class Rig(_Declared):
     def not_applied(self) -> list[str]:
         """Name the declared keys that this version reads but does not yet act on."""
         keys = {
-            "camera.calibration": self.camera.calibration,
-            "camera.focal_px": self.camera.focal_px,
-            "camera.tilt_deg": self.camera.tilt_deg,
-            "camera.row_time_s": self.camera.row_time_s,
-            "camera.exposure_s": self.camera.exposure_s,
             "sync.lamp": self.sync.lamp,
             "model.gravity_deg": self.model.gravity_deg,
         }
@@ -146,9 +141,13 @@ def read_rig(path: Path) -> Rig:
     if not isinstance(content, dict):
         raise RigError(f"{path}: expected keys and values, found a {type(content).__name__}")
     try:
-        return Rig.model_validate(content)
+        rig = Rig.model_validate(content)
     except ValidationError as error:
         raise RigError(f"{path}: {_first(error)}") from error
+    if rig.camera.calibration is None:
+        return rig
+    beside = {"calibration": str(path.parent / rig.camera.calibration)}
+    return rig.model_copy(update={"camera": rig.camera.model_copy(update=beside)})
 
 
 def _first(error: ValidationError) -> str:

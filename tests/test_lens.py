@@ -49,7 +49,7 @@ def _rig(**camera) -> Rig:
 
 
 def test_nothing_declared_changes_no_point():
-    lens = lens_from_rig(Rig(), None, SIZE, None)
+    lens = lens_from_rig(Rig(), SIZE, None)
     points = np.array([[3.0, 4.0], [np.nan, 5.0]])
     assert lens.is_identity
     np.testing.assert_array_equal(lens.rectify(points), points)
@@ -63,7 +63,7 @@ def test_nothing_declared_changes_no_point():
 def test_a_declared_tilt_leaves_the_angle_exact_with_and_without_a_focal_length(tilt_deg, axis_deg):
     seen = _filmed(tilt_deg, axis_deg)
     for focal in ({}, {"focal_px": 800.0}):
-        lens = lens_from_rig(_rig(tilt_deg=tilt_deg, tilt_axis_deg=axis_deg, **focal), None, SIZE, None)
+        lens = lens_from_rig(_rig(tilt_deg=tilt_deg, tilt_axis_deg=axis_deg, **focal), SIZE, None)
         np.testing.assert_allclose(_turned(lens, seen), ANGLES, atol=1e-9)
         radius = np.hypot(*(lens.rectify(seen) - lens.pivot_px).T)
         if focal:
@@ -78,14 +78,14 @@ def test_facing_left_mirrors_the_tilts_axis():
     rig = Rig.model_validate(
         {"facing": "left", "camera": {"tilt_deg": 15, "tilt_axis_deg": 60}, "pivot": {"near": list(PIVOT)}}
     )
-    lens = lens_from_rig(rig, None, SIZE, None)
+    lens = lens_from_rig(rig, SIZE, None)
     off = np.pi - _turned(lens, seen) - ANGLES
     np.testing.assert_allclose(off - 2 * np.pi * np.round(off / (2 * np.pi)), 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("height", [30.0, -60.0])
 def test_what_turns_nearer_to_the_camera_turns_by_the_same_angle_about_a_centre_of_its_own(height):
-    lens = lens_from_rig(_rig(tilt_deg=15, tilt_axis_deg=60, focal_px=800.0), None, SIZE, None)
+    lens = lens_from_rig(_rig(tilt_deg=15, tilt_axis_deg=60, focal_px=800.0), SIZE, None)
     cosine = np.cos(np.radians(15.0))
     centre = lens.pivot_px + lens.parallax * height * cosine / (cosine - height / 800.0)
     arm = (lens.rectify(_filmed(15.0, 60.0, height=height)) - centre) * [1.0, -1.0]
@@ -95,9 +95,9 @@ def test_what_turns_nearer_to_the_camera_turns_by_the_same_angle_about_a_centre_
 
 def test_distortion_and_tilt_together_are_undone(tmp_path):
     write_calibration(_calibration(), tmp_path / "c.yaml")
-    rig = _rig(calibration="c.yaml", tilt_deg=15, tilt_axis_deg=60)
+    rig = _rig(calibration=str(tmp_path / "c.yaml"), tilt_deg=15, tilt_axis_deg=60)
     pivot = MIDDLE + (PIVOT - MIDDLE) * (1 - 0.15 * ((PIVOT - MIDDLE) ** 2).sum() / 800.0**2)
-    lens = lens_from_rig(rig, tmp_path, SIZE, None).looking_at(pivot)
+    lens = lens_from_rig(rig, SIZE, None).looking_at(pivot)
     np.testing.assert_allclose(lens.pivot_px, PIVOT, atol=1e-6)
     np.testing.assert_allclose(_turned(lens, _filmed(15.0, 60.0, k1=-0.15)), ANGLES, atol=1e-8)
 
@@ -209,13 +209,13 @@ def test_a_file_that_is_no_calibration_is_said_so_in_one_line(tmp_path, text, sa
 def test_a_calibration_of_another_picture_is_refused(tmp_path):
     write_calibration(_calibration(size=(1920, 1080)), tmp_path / "c.yaml")
     with pytest.raises(InputError, match=r"swing.avi: 640×480 px, but .*c.yaml was made for pictures of 1920×1080 px"):
-        lens_from_rig(_rig(calibration="c.yaml"), tmp_path, SIZE, "swing.avi")
+        lens_from_rig(_rig(calibration=str(tmp_path / "c.yaml")), SIZE, "swing.avi")
 
 
 def test_a_distortion_that_turns_back_within_the_picture_is_refused(tmp_path):
     write_calibration(_calibration(-0.9, 400.0), tmp_path / "c.yaml")
     with pytest.raises(RigError, match="cannot be undone at pixel"):
-        lens_from_rig(_rig(calibration="c.yaml"), tmp_path, SIZE, "swing.avi")
+        lens_from_rig(_rig(calibration=str(tmp_path / "c.yaml")), SIZE, "swing.avi")
 
 
 @pytest.mark.parametrize(

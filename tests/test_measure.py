@@ -141,7 +141,7 @@ def test_a_declared_colour_may_be_30_levels_off(tmp_path, rgb):
     measured = measure_clip(_film(tmp_path, look), _rig(look, mouth=Mouth(rgb=rgb)), REST)
     error, _ = _errors(measured.series, SWING)
     assert np.sqrt((error**2).mean()) < 0.03
-    assert np.abs(np.array(measured.colour_rgb) - look.lips_rgb).max() < 15
+    assert np.abs(np.array(measured.sighting.colour_rgb) - look.lips_rgb).max() < 15
 
 
 def test_flicker_and_pale_lips_do_no_harm(tmp_path):
@@ -178,7 +178,7 @@ def test_a_marker_away_from_the_centre_of_rotation_is_reported(tmp_path):
             cv2.circle(frame, (int(x), int(y)), 9, (20, 20, 20), -1, cv2.LINE_AA)
 
     measured = measure_clip(_film(tmp_path, look, edit=paint), _rig(look), REST)
-    assert any("px apart" in note for note in measured.notes)
+    assert any("px apart" in note for note in measured.sighting.notes)
     error, _ = _errors(measured.series, SWING)
     assert np.abs(error).max() < 0.15
 
@@ -205,10 +205,10 @@ def test_what_is_left_of_a_truncated_clip_is_measured_and_the_rest_is_said(tmp_p
     measured = measure_clip(cut, _rig(look), REST)
     read = sum(s != "undecodable" for s in measured.series.status)
     assert 33 < read < 48
-    assert measured.truncated == f"truncated: {read} of {N} frames could be read"
-    error, _ = _errors(measured.series, SWING[: measured.frames])
+    assert measured.sighting.truncated == f"truncated: {read} of {N} frames could be read"
+    error, _ = _errors(measured.series, SWING[: len(measured.series.time)])
     assert np.sqrt((error**2).mean()) < 0.03
-    assert measure_clip(tmp_path / "clip.avi", _rig(look), REST).truncated is None
+    assert measure_clip(tmp_path / "clip.avi", _rig(look), REST).sighting.truncated is None
 
 
 def test_worst_cases_at_the_papers_arms():

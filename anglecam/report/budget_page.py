@@ -158,11 +158,11 @@ def budget_table(budget: Budget) -> Table:
 
 def _scene(clip: Path, measured: Measurement, frame: int) -> Scene | None:
     contour = measured.contours_px[frame]
-    mouth = measured.series.mouth_px
+    mouth, pivot = measured.series.mouth_px, measured.series.pivot_px
     image = next((f.image for f in read_frames(clip) if f.index == frame), None)
-    if image is None or contour is None or mouth is None:
+    if image is None or contour is None or mouth is None or pivot is None:
         return None
-    return Scene(image, contour, mouth[frame], measured.pivot.centre_px)
+    return Scene(image, contour, mouth[frame], pivot[frame])
 
 
 def _shown(title: str, one: FrameBudget, content: dict[str, Any]) -> dict[str, Any]:

@@ -30,8 +30,8 @@ def series_table(measurements: Sequence[Measurement]) -> Table:
             f"{degrees.min():.2f} … {degrees.max():.2f}",
             f"{np.degrees(np.median(series.sigma[ok])):.4f}",
             f"{np.degrees(np.median(series.bounds[6.0][ok])):.2f}",
-            measurement.pivot.source,
-            "mouth" if measurement.angles.registered is None else "whole head",
+            measurement.angles.pivot.source,
+            "whole head" if measurement.why_coarse is None else f"mouth: {measurement.why_coarse}",
         )
     return table
 

@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import av
+import numpy as np
+from av.video.frame import PictureType
 from numpy.typing import NDArray
 
 from anglecam.errors import InputError
@@ -20,6 +22,7 @@ from anglecam.video.container import is_cut_short
 
 Image = NDArray[Any]
 """Bytes, but cv2's type hints do not know it."""
+_PREDICTED = (PictureType.P, PictureType.B)
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,10 @@ class Frame:
     time: float
     """Presentation time, s, on the clip's own clock."""
     image: Image | None
-    """(height, width, 3) blue, green, red; ``None`` where the data cannot be decoded."""
+    """(height, width, 3) blue, green, red, or (height, width, 1) brightness; ``None`` where the data cannot be
+    decoded."""
+    predicted: bool = False
+    """Whether the codec made it from other frames."""
 
 
 @dataclass(frozen=True)
@@ -88,13 +94,15 @@ def inspect_clip(path: Path) -> ClipInfo:
         return ClipInfo(path, stream.width, stream.height, stream.frames, coarse, is_cut_short(path))
 
 
-def read_frames(path: Path) -> Iterator[Frame]:
+def read_frames(path: Path, *, brightness: bool = False) -> Iterator[Frame]:
     """Yield every frame of a clip in the order of presentation; memory does not grow with its length.
 
     Parameters
     ----------
     path : Path
         The film.
+    brightness : bool
+        Give the brightness alone, as the codec stored it, not colours.
 
     Yields
     ------
@@ -107,7 +115,9 @@ def read_frames(path: Path) -> Iterator[Frame]:
         As `inspect_clip`, and where timestamps do not increase or there is no frame at all.
     """
     for index, (time, picture) in enumerate(_decode(path)):
-        yield Frame(index, time, _to_image(picture))
+        image = None if picture is None else _brightness(picture) if brightness else _colours(picture)
+        predicted = picture is not None and picture.pict_type in _PREDICTED
+        yield Frame(index, time, image, predicted)
 
 
 def sample_frames(path: Path, most: int) -> Sample:
@@ -140,7 +150,7 @@ def sample_frames(path: Path, most: int) -> Sample:
         decoded += picture is not None
         if index % stride or picture is None:
             continue
-        kept.append(Frame(index, time, _to_image(picture)))
+        kept.append(Frame(index, time, _colours(picture)))
         if len(kept) > most:
             stride *= 2
             kept = [frame for frame in kept if frame.index % stride == 0]
@@ -252,5 +262,14 @@ def _same_size(picture: av.VideoFrame, stream: av.VideoStream) -> bool:
     return picture.width == stream.width and picture.height == stream.height
 
 
-def _to_image(picture: av.VideoFrame | None) -> Image | None:
-    return None if picture is None else picture.to_ndarray(format="bgr24")
+def _colours(picture: av.VideoFrame) -> Image:
+    return picture.to_ndarray(format="bgr24")
+
+
+def _brightness(picture: av.VideoFrame) -> Image:
+    """Take the brightness as it is stored where it has a plane of its own: colour comes into it by no conversion."""
+    if not picture.format.name.startswith(("yuv", "nv", "gray")) or picture.format.components[0].bits != 8:
+        return picture.to_ndarray(format="gray")[..., None]
+    plane = picture.planes[0]
+    rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
+    return rows[:, : plane.width, None].copy()

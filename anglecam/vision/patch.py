@@ -12,7 +12,7 @@ No compiled function here calls one of another file, so that a cached one is nev
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -32,125 +32,148 @@ _SMOOTH = 1e-2
 
 
 @dataclass(frozen=True)
-class Tile:
-    """A square of the head in the reference frame."""
-
-    corner: Floats
-    """(2,) its upper left corner, px."""
-    side: int
-    """px."""
-
-    @property
-    def knots(self) -> int:
-        """Coefficients along a side."""
-        return round(self.side / STEP_PX) + 3
-
-
-@dataclass(frozen=True)
 class Views:
-    """What several frames show of one tile, pixel by pixel."""
+    """What is shown of tiles, pixel by pixel, in one view after another: a tile in one frame each."""
 
     offsets: Floats
-    """(m, 2) places of the pixels from the pivot, px."""
+    """(m, 2) places of the pixels from the tile's centre of rotation, px."""
     values: NDArray[np.float32]
     """(m, planes) what they show."""
     starts: Ints
-    """(frames + 1,) where each frame's pixels begin."""
+    """(views + 1,) where each view's pixels begin."""
 
 
 @dataclass(frozen=True)
-class Patch:
-    """How a tile looks."""
+class Patches:
+    """How tiles of one size look."""
 
-    tile: Tile
+    corners: Floats
+    """(tiles, 2) upper left corners in the reference frame, px."""
+    side: int
+    """px."""
     coefficients: Floats
-    """(planes, knots, knots), y first."""
+    """(tiles, planes, knots, knots), y first."""
     gains: Floats
-    """(POWERS, 3): constant, x and y, for every power of the angle in rad."""
+    """(tiles, POWERS, 3): constant, x and y, for every power of the angle in rad."""
+
+    def __len__(self) -> int:
+        return len(self.corners)
+
+    def __getitem__(self, part: slice) -> Patches:
+        return Patches(self.corners[part], self.side, self.coefficients[part], self.gains[part])
 
 
-def learn_patch(tile: Tile, views: Views, turns: Floats, pivot: Floats, start: Patch | None = None) -> Patch:
-    """Fit a tile's look to what frames of known turn show of it.
+def learn_patch(
+    corner: Floats, side: int, views: Views, turns: Floats, pivot: Floats, gains: Floats | None = None
+) -> Patches:
+    """Fit one tile's look to what frames of known turn show of it.
 
     Parameters
     ----------
-    tile : Tile
-        Where on the head.
+    corner : ndarray
+        (2,) of the tile, px.
+    side : int
+        Of the tile, px.
     views : Views
-        The pixels.
+        The tile in a number of frames.
     turns : ndarray
-        (frames,) turn of the head from the reference frame, counter-clockwise as seen, rad.
+        (views,) turn of the head from the reference frame, counter-clockwise as seen, rad.
     pivot : ndarray
-        (2,) in the reference frame, px.
-    start : Patch, optional
-        To take the gains from; without it there are none yet.
+        (2,) the tile's centre of rotation in the reference frame, px.
+    gains : ndarray, optional
+        (POWERS, 3) to start from; without it there are none yet.
 
     Returns
     -------
-    Patch
-        Coefficients for those gains, then gains for those coefficients.
+    Patches
+        A single one: coefficients for those gains, then gains for those coefficients.
     """
-    n = tile.knots
-    gains = np.zeros((POWERS, 3)) if start is None else start.gains
-    band, right = _normal_equations(
-        views.offsets, views.values, views.starts, turns, pivot, tile.corner, tile.side, n, gains
-    )
+    n = round(side / STEP_PX) + 3
+    start = np.zeros((POWERS, 3)) if gains is None else gains
+    band, right = _normal_equations(views.offsets, views.values, views.starts, turns, pivot, corner, side, n, start)
     lower = _as_lower_band(band, n) + _SMOOTH * _roughness(n)
     factor = cholesky_banded(lower, lower=True, overwrite_ab=True)
     coefficients = cho_solve_banded((factor, True), right.T).T.reshape(-1, n, n)
     normal, gradient = _gain_equations(
-        views.offsets, views.values, views.starts, turns, pivot, tile.corner, tile.side, coefficients
+        views.offsets, views.values, views.starts, turns, pivot, corner, side, coefficients
     )
-    return Patch(tile, coefficients, np.linalg.lstsq(normal, gradient, rcond=1e-9)[0].reshape(POWERS, 3))
+    found = np.linalg.lstsq(normal, gradient, rcond=1e-9)[0].reshape(1, POWERS, 3)
+    return Patches(corner[None], side, coefficients[None], found)
 
 
 @dataclass(frozen=True)
 class Fit:
-    """What one tile says about one turn: sums over its pixels."""
+    """What each view says about its turn: sums over its pixels."""
 
     normal: Floats
-    """(frames, 3, 3) of the derivatives by turn (rad) and by x and y of the head's place (px)."""
+    """(views, 3, 3) of the derivatives by turn (rad) and by x and y of the head's place (px)."""
     gradient: Floats
-    """(frames, 3) of derivative times residual."""
+    """(views, 3) of derivative times residual."""
     squares: Floats
-    """(frames,) of squared residuals."""
+    """(views,) of squared residuals."""
     count: Ints
-    """(frames,) pixels times colours."""
+    """(views,) pixels times colours."""
+    light: Floats
+    """(views, planes, 2) what gain and offset of brightness the view has beyond the look's."""
+
+    def weighted(self, variance: Floats) -> tuple[Floats, Floats]:
+        """Return normal and gradient over the variances, along the first axis, of what is left over."""
+        whole = (slice(None), *(None,) * (self.gradient.ndim - 1))
+        return self.normal / variance[(*whole, None)], self.gradient / variance[whole]
 
 
-def compare(patch: Patch, views: Views, turns: Floats, pivot: Floats) -> Fit:
-    """Hold a tile's look against what frames show at assumed turns, for a step of Gauss and Newton.
-
-    Each frame's own brightness of the tile (a gain and an offset a colour) is fitted and taken out.
+def levelled(views: Views, light: Floats) -> Views:
+    """Take each view's own brightness out of it, less what all views have in common.
 
     Parameters
     ----------
-    patch : Patch
-        The look.
+    views : Views
+        Of one tile.
+    light : ndarray
+        (views, planes, 2) from a `Fit` to the tile's look.
+
+    Returns
+    -------
+    Views
+        As if all had been lit alike.
+    """
+    own = light - light.mean(axis=0)
+    each = np.repeat(own, np.diff(views.starts), axis=0)
+    return replace(views, values=((views.values - each[..., 1]) / (1.0 + each[..., 0])).astype(np.float32))
+
+
+def compare(patches: Patches, views: Views, turns: Floats, pivots: Floats) -> Fit:
+    """Hold looks against what frames show at assumed turns, for a step of Gauss and Newton.
+
+    Each view's own brightness (a gain and an offset a colour) is fitted and taken out.
+
+    Parameters
+    ----------
+    patches : Patches
+        One, seen in every view; or as many as there are views, each seen in its own.
     views : Views
         The pixels.
     turns : ndarray
-        (frames,) rad.
-    pivot : ndarray
-        (2,) px.
+        (views,) rad.
+    pivots : ndarray
+        (patches, 2) centres of rotation, px.
 
     Returns
     -------
     Fit
-        A row a frame.
+        A row a view.
     """
-    tile = patch.tile
     return Fit(
         *_compare(
             views.offsets,
             views.values,
             views.starts,
             turns,
-            pivot,
-            tile.corner,
-            tile.side,
-            patch.coefficients,
-            patch.gains,
+            pivots,
+            patches.corners,
+            patches.side,
+            patches.coefficients,
+            patches.gains,
         )
     )
 
@@ -271,18 +294,20 @@ def _gain_equations(offsets, values, starts, turns, pivot, corner, side, coeffic
 
 
 @njit(cache=True)
-def _compare(offsets, values, starts, turns, pivot, corner, side, coefficients, gains):  # type: ignore[no-untyped-def]
-    n = coefficients.shape[1]
-    frames = len(turns)
-    normals, gradients = np.zeros((frames, 3, 3)), np.zeros((frames, 3))
-    squares, counts = np.zeros(frames), np.zeros(frames, dtype=np.int64)
+def _compare(offsets, values, starts, turns, pivots, corners, side, looks, all_gains):  # type: ignore[no-untyped-def]
+    views, planes, n = len(turns), looks.shape[1], looks.shape[2]
+    normals, gradients = np.zeros((views, 3, 3)), np.zeros((views, 3))
+    squares, counts = np.zeros(views), np.zeros(views, dtype=np.int64)
+    lights = np.zeros((views, planes, 2))
     wx, wy, dx, dy = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4)
+    slope, bright = np.zeros(3), np.ones(2)
     scale = (n - 3) / side
-    terms = 4 + coefficients.shape[0]
-    slope = np.zeros(terms)
-    for k in range(frames):
+    for k in range(views):
         c, s = np.cos(turns[k]), np.sin(turns[k])
-        whole, pull = np.zeros((terms, terms)), np.zeros(terms)
+        p = k if len(looks) > 1 else 0
+        pivot, corner, coefficients, gains = pivots[p], corners[p], looks[p], all_gains[p]
+        whole, pull = np.zeros((3, 3)), np.zeros(3)
+        light, light_pull, across = np.zeros((planes, 2, 2)), np.zeros((planes, 2)), np.zeros((planes, 2, 3))
         for m in range(starts[k], starts[k + 1]):
             at_x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1]
             at_y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1]
@@ -297,7 +322,7 @@ def _compare(offsets, values, starts, turns, pivot, corner, side, coefficients, 
             _weights(uy - iy, wy)
             _slopes(ux - ix, dx)
             _slopes(uy - iy, dy)
-            for channel in range(coefficients.shape[0]):
+            for channel in range(planes):
                 look, along_x, along_y = 0.0, 0.0, 0.0
                 for j in range(4):
                     for i in range(4):
@@ -310,24 +335,35 @@ def _compare(offsets, values, starts, turns, pivot, corner, side, coefficients, 
                 slope[0] = along_y * (at_x - pivot[0]) - along_x * (at_y - pivot[1])
                 slope[1] = along_x
                 slope[2] = along_y
-                slope[3] = g * look
-                slope[4:] = 0.0
-                slope[4 + channel] = 1.0
+                bright[0] = g * look
                 rest = values[m, channel] - g * look
                 squares[k] += rest * rest
                 counts[k] += 1
-                for a in range(terms):
+                for a in range(3):
                     pull[a] += slope[a] * rest
-                    for b in range(terms):
+                    for b in range(a, 3):
                         whole[a, b] += slope[a] * slope[b]
+                for a in range(2):
+                    light_pull[channel, a] += bright[a] * rest
+                    for b in range(2):
+                        light[channel, a, b] += bright[a] * bright[b]
+                    for b in range(3):
+                        across[channel, a, b] += bright[a] * slope[b]
         if counts[k] < 30:
             counts[k] = 0
             squares[k] = 0.0
             continue
-        # the frame's brightness is fitted along and eliminated
-        light = whole[3:, 3:] + 1e-9 * np.eye(terms - 3)
-        across = np.linalg.solve(light, whole[3:, :3])
-        normals[k] = whole[:3, :3] - whole[:3, 3:] @ across
-        gradients[k] = pull[:3] - across.T @ pull[3:]
-        squares[k] -= pull[3:] @ np.linalg.solve(light, pull[3:])
-    return normals, gradients, squares, counts
+        for a in range(3):
+            for b in range(a):
+                whole[a, b] = whole[b, a]
+        # the view's brightness is fitted along and eliminated
+        for channel in range(planes):
+            known = light[channel] + 1e-9 * np.eye(2)
+            taken = np.linalg.solve(known, across[channel])
+            told = np.linalg.solve(known, light_pull[channel])
+            whole -= across[channel].T @ taken
+            pull -= taken.T @ light_pull[channel]
+            squares[k] -= light_pull[channel] @ told
+            lights[k, channel] = told
+        normals[k], gradients[k] = whole, pull
+    return normals, gradients, squares, counts, lights

@@ -7,7 +7,7 @@ is less red. What is left is told by how often it is seen, how constant it is in
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -80,7 +80,10 @@ class _Track:
 
 
 def find_mouth(
-    images: Sequence[Image], rgb: tuple[int, int, int] | None, near_px: tuple[float, float] | None
+    images: Sequence[Image],
+    rgb: tuple[int, int, int] | None,
+    near_px: Floats | None,
+    placed: Callable[[Floats], Floats],
 ) -> Found | None:
     """Find the mouth and learn its colour from frames spread over a clip.
 
@@ -91,8 +94,10 @@ def find_mouth(
     rgb : tuple of int, optional
         The declared colour, good to some tens of grey levels; without it the mouth is the reddest thing, as
         against skin, that moves.
-    near_px : tuple of float, optional
-        A hint at the pivot.
+    near_px : ndarray, optional
+        (2,) a hint at the pivot, in the plane of motion, px.
+    placed : callable
+        Where points (2,) of the picture lie in the plane of motion, in which paths are circles, px.
 
     Returns
     -------
@@ -109,7 +114,7 @@ def find_mouth(
         level = usual + share * (top - usual)
         if level - usual < _LEAST_CONTRAST / 2.0:
             continue
-        patches = _cut_out(maps, level, usual)
+        patches = _cut_out(maps, level, usual, placed)
         found = [_moving_track(patches, maps, level, near_px)]
         if at_rest:
             found.append(_resting_track(patches, images, level))
@@ -134,7 +139,7 @@ def _hue_range(maps: Sequence[NDArray[Any]], at_rest: bool) -> tuple[float, floa
     return usual, float(np.partition(top, -_TOP_PX)[-_TOP_PX])
 
 
-def _cut_out(maps: Sequence[NDArray[Any]], level: float, usual: float) -> _Patches:
+def _cut_out(maps: Sequence[NDArray[Any]], level: float, usual: float, placed: Callable[[Floats], Floats]) -> _Patches:
     frame, place, area, contrast, label = [], [], [], [], []
     for t, hue in enumerate(maps):
         _, _, stats, centres = cv2.connectedComponentsWithStats((hue > level).astype(np.uint8), connectivity=8)
@@ -145,7 +150,7 @@ def _cut_out(maps: Sequence[NDArray[Any]], level: float, usual: float) -> _Patch
             x, y, w, h = stats[k, :4]
             part = hue[y : y + h, x : x + w]
             frame.append(t)
-            place.append(centres[k])
+            place.append(placed(centres[k]))
             area.append(sizes[k])
             contrast.append(np.percentile(part[part > level], 75) - usual)
             label.append(k)
@@ -158,9 +163,7 @@ def _cut_out(maps: Sequence[NDArray[Any]], level: float, usual: float) -> _Patch
     )
 
 
-def _moving_track(
-    patches: _Patches, maps: Sequence[NDArray[Any]], level: float, near_px: tuple[float, float] | None
-) -> _Track | None:
+def _moving_track(patches: _Patches, maps: Sequence[NDArray[Any]], level: float, hint: Floats | None) -> _Track | None:
     """Find the circle on which one patch of constant size and colour travels, by random triples of poses."""
     frames = len(maps)
     poses = _poses(patches)
@@ -168,7 +171,6 @@ def _moving_track(
         return None
     longest = 1.5 * float(np.hypot(*maps[0].shape))
     rng = np.random.default_rng(0)
-    hint = None if near_px is None else np.array(near_px)
     best: _Track | None = None
     seen: set[tuple[int, ...]] = set()
     for trial in range(_TRIALS):

@@ -1,0 +1,248 @@
+"""The coarse pass over a clip: the mouth in every frame, and the pivot that it turns about.
+
+The first reading keeps a few frames, from which the mouth's colour, its rough path and the pivot's marker are learnt;
+the second finds the mouth in every frame. Places are those in the plane of motion: what lens and tilt do to the
+picture is undone for points, frames stay as they were filmed.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.errors import InputError
+from anglecam.lens import Lens, lens_from_rig
+from anglecam.rig import Rig
+from anglecam.series import OK
+from anglecam.video.frames import ClipInfo, Image, Sample, inspect_clip, read_frames, sample_frames
+from anglecam.vision.circle import Circle
+from anglecam.vision.noise import pixel_noise
+from anglecam.vision.pivot import Marker, Pivot, choose_pivot, find_marker
+from anglecam.vision.search import Found, find_mouth
+from anglecam.vision.segment import Region, find_regions
+from anglecam.vision.track import Track, follow_mouth
+
+Floats = NDArray[np.float64]
+
+_SAMPLE_BYTES = 100_000_000
+"""Memory for the frames of the first pass."""
+_SAMPLES = 32
+_STILL = 9
+"""Frames whose median shows what does not move."""
+_SMALLEST_SHARE = 0.25
+"""Of the mouth's area; a smaller region is no mouth even if partly hidden."""
+_HINT_PX = 10.0
+"""Standard uncertainty of a hint at the pivot."""
+_REACH_PX = (3.0, 40.0)
+"""Limits of the standard uncertainty of the centre of rotation when a marker is looked for about it."""
+_DEPTH = 0.15
+"""Standard uncertainty of the marker's height over the mouth's, as a share of the lever arm."""
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """The mouth through a clip; sequences have an entry a frame."""
+
+    time: Floats
+    """The frames' own stamps, s."""
+    status: tuple[str, ...]
+    regions: tuple[Region | None, ...]
+    """The mouth where it was seen, in the plane of motion."""
+    pivot: Pivot
+    """In the plane of motion."""
+    marker: Marker | None
+    """The round mark at the pivot, as the picture shows it."""
+    circle: Circle | None
+    """Fitted to the mouth's path in the plane of motion, where it moved."""
+    moves: bool
+    lens: Lens
+    """From the picture to the plane of motion."""
+    noise: float
+    """Standard deviation of the pixels, grey levels."""
+    repeated: NDArray[np.bool_]
+    """Frames that are bit by bit the one before."""
+    colour_rgb: tuple[int, int, int]
+    """The mouth's colour in this clip."""
+    size: tuple[int, int]
+    """Width and height of the picture, px."""
+    truncated: str | None
+    """``truncated: 71 of 120 frames could be read`` where the file ends too early."""
+    notes: tuple[str, ...]
+    """What the user should know, a line each."""
+
+
+def sight_clip(path: Path, rig: Rig, progress: Callable[[int, int], None] | None = None) -> Sighting:
+    """Find the mouth in every frame of a clip, and the pivot.
+
+    Parameters
+    ----------
+    path : Path
+        The clip.
+    rig : Rig
+        What is declared about mouth, pivot and camera.
+    progress : callable, optional
+        Called with (frames done, frames in all) after each frame.
+
+    Returns
+    -------
+    Sighting
+        At least one frame of it with status ``ok``.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read, or no frame of it can be measured: one line with file, count and cause.
+    """
+    info = inspect_clip(path)
+    lens = lens_from_rig(rig, (info.width, info.height), path)
+    most = int(np.clip(_SAMPLE_BYTES // max(3 * info.width * info.height, 1), 8, _SAMPLES))
+    sample = sample_frames(path, most)
+    images = [f.image for f in sample.frames if f.image is not None]
+    near = None if rig.pivot.near is None else lens.rectify(rig.pivot.near)
+    found = find_mouth(images, rig.mouth_rgb, near, lens.rectify) if images else None
+    if found is None:
+        raise InputError(_no_mouth(path, sample, rig))
+    time, candidates, decoded, repeated = _read_regions(path, found, sample.count, progress)
+    lens, track, marker, pivot, disagreement = _follow(candidates, time, found, images, rig, lens)
+    status = tuple(s if d else "undecodable" for s, d in zip(track.status, decoded, strict=True))
+    if OK not in status:
+        raise InputError(_nothing_measured(path, status, sample, rig))
+    if pivot is None:
+        raise InputError(f"{path}: no pivot found: the mouth does not move and there is no round marker to see")
+    notes = [disagreement] if disagreement else []
+    if found.circle is None:
+        notes.append("the mouth does not move in this clip")
+    return Sighting(
+        time=time,
+        status=status,
+        regions=track.regions,
+        pivot=pivot,
+        marker=marker,
+        circle=track.circle,
+        moves=found.circle is not None,
+        lens=lens,
+        noise=pixel_noise(images),
+        repeated=repeated,
+        colour_rgb=found.model.mean_rgb,
+        size=(info.width, info.height),
+        truncated=_truncated(info, sample),
+        notes=tuple(notes),
+    )
+
+
+def _follow(
+    candidates: Sequence[Sequence[Region]], time: Floats, found: Found, images: Sequence[Image], rig: Rig, lens: Lens
+) -> tuple[Lens, Track, Marker | None, Pivot | None, str | None]:
+    """Follow the mouth in the plane of motion; where the view is a tilted perspective, once more about its pivot."""
+    for again in (lens.tilt != 0.0 and lens.focal_px is not None, False):
+        placed = [[_in_plane(region, lens) for region in regions] for regions in candidates]
+        track = follow_mouth(placed, time, found)
+        marker = _find_pivot_marker(images, rig, track.circle, lens)
+        pivot, disagreement = choose_pivot(*_reconciled(marker, track.circle, lens))
+        if not again or pivot is None:
+            break
+        centred = lens.looking_at(lens.distort(pivot.centre_px))
+        if found.circle is not None:
+            place, radius = found.circle
+            found = replace(found, circle=(centred.rectify(lens.distort(place)), radius))
+        found = replace(found, place_px=centred.rectify(lens.distort(found.place_px)))
+        lens = centred
+    return lens, track, marker, pivot, disagreement
+
+
+def _in_plane(region: Region, lens: Lens) -> Region:
+    if lens.is_identity:
+        return region
+    J = lens.jacobian(region.centre_px)
+    return replace(
+        region,
+        centre_px=lens.rectify(region.centre_px),
+        area_px2=region.area_px2 * float(np.linalg.det(J)),
+        moments_px2=J @ region.moments_px2 @ J.T,
+        noise_px2=J @ region.noise_px2 @ J.T,
+    )
+
+
+def _reconciled(marker: Marker | None, circle: Circle | None, lens: Lens) -> tuple[Marker | None, Circle | None]:
+    """Bring marker and centre of rotation to where they can be compared: the plane of motion.
+
+    In a tilted view what stands at another height turns about another centre, beside the pivot's along the parallax:
+    there the marker says little about the centre that the mouth turns about. And without a focal length perspective
+    moves the centre of the mouth's circle, unseen (`anglecam.lens`).
+    """
+    if marker is not None and not lens.is_identity:
+        J = lens.jacobian(marker.centre_px)
+        along = lens.parallax * (0.0 if circle is None else _DEPTH * circle.radius_px)
+        covariance = J @ marker.covariance_px2 @ J.T + np.outer(along, along)
+        marker = replace(marker, centre_px=lens.rectify(marker.centre_px), covariance_px2=covariance)
+    if circle is not None and marker is not None and lens.neglects_perspective:
+        circle = None
+    return marker, circle
+
+
+def _read_regions(
+    path: Path, found: Found, count: int, progress: Callable[[int, int], None] | None
+) -> tuple[Floats, list[list[Region]], list[bool], NDArray[np.bool_]]:
+    """Find the regions of the mouth's colour in every frame; tell which frames repeat the one before bit by bit."""
+    time: list[float] = []
+    candidates: list[list[Region]] = []
+    decoded: list[bool] = []
+    repeated: list[bool] = []
+    before = None
+    for frame in read_frames(path):
+        image = frame.image
+        time.append(frame.time)
+        decoded.append(image is not None)
+        repeated.append(image is not None and before is not None and np.array_equal(image, before))
+        regions = [] if image is None else find_regions(image, found.model, _SMALLEST_SHARE * found.area_px2)
+        candidates.append(regions)
+        before = image
+        if progress is not None:
+            progress(frame.index + 1, count)
+    return np.array(time), candidates, decoded, np.array(repeated)
+
+
+def _find_pivot_marker(images: Sequence[Image], rig: Rig, circle: Circle | None, lens: Lens) -> Marker | None:
+    if rig.pivot.marker == "none":
+        return None
+    few = images[:: max(1, len(images) // _STILL)]
+    still = np.median(np.stack(few), axis=0).astype(np.uint8)
+    if rig.pivot.near is not None:
+        return find_marker(still, np.array(rig.pivot.near), _HINT_PX)
+    if circle is None:
+        return find_marker(still, None, 0.0)
+    sigma = float(np.sqrt(np.linalg.eigvalsh(circle.centre_covariance_px2)[-1]))
+    return find_marker(still, lens.distort(circle.centre_px), float(np.clip(sigma, *_REACH_PX)))
+
+
+def _truncated(info: ClipInfo, sample: Sample) -> str | None:
+    if not info.cut_short or 0 < info.declared_frames <= sample.decoded:
+        return None
+    of = f" of {info.declared_frames}" if info.declared_frames else ""
+    return f"truncated: {sample.decoded}{of} frames could be read"
+
+
+def _colour(rig: Rig) -> str:
+    return "auto" if rig.mouth_rgb is None else ",".join(map(str, rig.mouth_rgb))
+
+
+def _no_mouth(path: Path, sample: Sample, rig: Rig) -> str:
+    if not sample.decoded:
+        return f"{path}: none of its {sample.count} frames can be decoded"
+    hint = "" if rig.pivot.near is None else ", turning about the hint at {:g},{:g}".format(*rig.pivot.near)
+    return (
+        f"{path}: no mouth found in {sample.count} of {sample.count} frames (colour {_colour(rig)}{hint});"
+        " is it in the picture?"
+    )
+
+
+def _nothing_measured(path: Path, status: Sequence[str], sample: Sample, rig: Rig) -> str:
+    if set(status) <= {"no_mouth", "undecodable"}:
+        return _no_mouth(path, sample, rig)
+    causes = ", ".join(f"{cause} in {k}" for cause, k in Counter(status).most_common())
+    return f"{path}: none of {len(status)} frames could be measured: {causes}"

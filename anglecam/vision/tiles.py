@@ -1,0 +1,270 @@
+"""Where the head is rigid and has edges: its best tiles, and what a frame shows of them.
+
+All is told in the plane of motion (`anglecam.lens`), in which the head turns without changing its shape. A point of
+the head z nearer to the camera than the pivot turns, in a tilted view, about a centre of its own, z·parallax beside
+the pivot's: a tile has a height.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from anglecam.lens import Lens
+from anglecam.vision.patch import Views
+
+Image = NDArray[Any]
+"""Bytes, but cv2's type hints do not know it."""
+Floats = NDArray[np.float64]
+
+SIDE_PX = 16
+MOST_TILES = 40
+_LOOSE = 6.0
+"""Robust standard deviations of the noise beyond which a place of the stack is not rigid, or not lit alike."""
+_LOOSE_SHARE = 0.1
+_STEADIER = 1.5
+"""Ratio of squared spreads, as filmed over turned back, from which on a tile belongs to the head."""
+_TALLEST = 0.3
+"""Height of a part of the head, as a share of half the picture's diagonal."""
+_HEIGHT_STEP_PX = 0.8
+"""Displacement between neighbouring heights that are tried, px."""
+
+
+@dataclass(frozen=True)
+class Glimpse:
+    """A frame, and where the coarse measurement has the head in it."""
+
+    image: Image
+    turn: float
+    """Counter-clockwise as seen, from the reference, rad."""
+    pivot_px: Floats
+    """(2,) of this frame in the plane of motion, px."""
+    turn_per_row: float = 0.0
+    """What the head turns while the shutter goes on by a row, rad."""
+    row: float = 0.0
+    """To whose exposure ``turn`` refers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """The plane of motion as the pixels of one clip see it."""
+
+    lens: Lens
+    ground: Floats
+    """(height, width, 2) where in the plane each pixel lies, px."""
+    stretch: float
+    """Pixels of the picture that a length of one in the plane spans at most."""
+
+
+@dataclass(frozen=True)
+class Tiles:
+    """Squares of the head in the reference frame."""
+
+    corners: Floats
+    """(tiles, 2) upper left corners, px, the most telling tile first."""
+    heights: Floats
+    """(tiles,) towards the camera, px; zero in a view that is not tilted."""
+
+
+def plane_of(lens: Lens, size: tuple[int, int]) -> Plane:
+    """Lay a picture of (width, height) pixels into the plane of motion."""
+    x, y = np.meshgrid(np.arange(size[0], dtype=float), np.arange(size[1], dtype=float))
+    ground = np.ascontiguousarray(lens.rectify(np.stack([x, y], axis=-1)))
+    steps = [np.hypot(*np.moveaxis(np.diff(ground, axis=axis), -1, 0)).min() for axis in (0, 1)]
+    return Plane(lens, ground, 1.0 / max(min(steps), 0.1))
+
+
+def choose_tiles(glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats, noise: float) -> Tiles:
+    """Find where the head is rigid and has edges.
+
+    Parameters
+    ----------
+    glimpses : sequence of Glimpse
+        Frames at turns that differ.
+    plane : Plane
+        What lies where.
+    pivot_px : ndarray
+        (2,) in the reference frame, px.
+    noise : float
+        Standard deviation of the pixels, grey levels.
+
+    Returns
+    -------
+    Tiles
+        At most `MOST_TILES`.
+    """
+    height, width = glimpses[0].image.shape[:2]
+    heights = _find_heights(glimpses, plane, pivot_px)
+    look, spread, whole = _stack(glimpses, plane, pivot_px, _by_pixel(heights, (height, width)))
+    unturned = _middle_and_spread(np.stack([g.image for g in glimpses]).astype(np.float32))[1]
+    smooth = cv2.GaussianBlur(look, (0, 0), 0.7)
+    along_x, along_y = (
+        cv2.Scharr(smooth, cv2.CV_32F, *axis, scale=1 / 32).reshape(look.shape) for axis in ((1, 0), (0, 1))
+    )
+    y, x = np.mgrid[0:height, 0:width].astype(np.float32)
+    by_turn = along_y * (x - pivot_px[0])[..., None] - along_x * (y - pivot_px[1])[..., None]
+    information = _by_tile((by_turn**2 / (noise**2 + spread**2)).sum(axis=2) * whole)
+    loose = _by_tile(((spread.max(axis=2) > _LOOSE * noise) | ~whole).astype(np.float32))
+    rigid = loose.mean(axis=(1, 3)) < _LOOSE_SHARE
+    # the scenery does not turn: it is steadier as it is filmed
+    as_filmed, turned_back = (_by_tile((part**2).sum(axis=2)).sum(axis=(1, 3)) for part in (unturned, spread))
+    worth = np.where(rigid & (as_filmed > _STEADIER * turned_back), information.sum(axis=(1, 3)), 0.0)
+    best = [k for k in np.argsort(worth, axis=None)[::-1][:MOST_TILES] if worth.flat[k] > 0]
+    corners = SIDE_PX * np.array([[k % worth.shape[1], k // worth.shape[1]] for k in best], dtype=float).reshape(-1, 2)
+    return Tiles(corners, heights.ravel()[best])
+
+
+def look_at(
+    corners: Floats, heights: Floats, glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats
+) -> tuple[Views, Floats]:
+    """Collect what frames show of tiles, and a little around them.
+
+    Parameters
+    ----------
+    corners : ndarray
+        (tiles, 2) in the reference frame, px.
+    heights : ndarray
+        (tiles,) px.
+    glimpses : sequence of Glimpse
+        Of one frame or several.
+    plane : Plane
+        What lies where.
+    pivot_px : ndarray
+        (2,) in the reference frame, px.
+
+    Returns
+    -------
+    views : Views
+        Of every tile in the first frame, then in the second, and so on.
+    centres_px : ndarray
+        (views, 2) the tiles' middles in the picture, px.
+    """
+    offsets, values, starts, centres = [], [], [0], []
+    beside = heights[:, None] * plane.lens.parallax
+    reach = (0.71 * SIDE_PX + 1.5) * plane.stretch
+    for g in glimpses:
+        arm = corners + SIDE_PX / 2 - pivot_px - beside
+        middle = plane.lens.distort(arm @ _turned(g.turn) + g.pivot_px + beside)
+        if g.turn_per_row:
+            early = g.turn_per_row * (middle[:, 1] - g.row)
+            middle = plane.lens.distort(_each_turned(arm, g.turn + early) + g.pivot_px + beside)
+        for one, about, to_side in zip(corners, middle, beside, strict=True):
+            offset, value = _gather(
+                g.image,
+                plane.ground,
+                about,
+                reach,
+                g.pivot_px + to_side,
+                g.turn,
+                g.turn_per_row,
+                g.row,
+                one,
+                SIDE_PX,
+                pivot_px + to_side,
+            )
+            offsets.append(offset)
+            values.append(value)
+            starts.append(starts[-1] + len(offset))
+        centres.append(middle)
+    return Views(np.concatenate(offsets), np.concatenate(values), np.array(starts)), np.concatenate(centres)
+
+
+def _turned(turn: float) -> Floats:
+    """Return the matrix M with which v @ M is v turned counter-clockwise as seen, y down."""
+    c, s = np.cos(turn), np.sin(turn)
+    return np.array([[c, -s], [s, c]])
+
+
+def _each_turned(arms: Floats, turns: Floats) -> Floats:
+    c, s = np.cos(turns), np.sin(turns)
+    return np.column_stack([c * arms[:, 0] + s * arms[:, 1], -s * arms[:, 0] + c * arms[:, 1]])
+
+
+def _find_heights(glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats) -> Floats:
+    """Find the height at which each tile of the picture is steadiest when frames are turned back, px."""
+    height, width = glimpses[0].image.shape[:2]
+    slope = float(np.hypot(*plane.lens.parallax))
+    if slope == 0.0:
+        return np.zeros((height // SIDE_PX, width // SIDE_PX))
+    grey = [replace(g, image=g.image.mean(axis=2, keepdims=True).astype(np.uint8)) for g in glimpses]
+    swing = max(float(np.ptp([g.turn for g in glimpses])) / 2.0, 1e-3)
+    tallest = _TALLEST * float(np.hypot(*(np.array([width, height]) / 2.0)))
+    steps = int(np.clip(tallest * slope * swing / _HEIGHT_STEP_PX, 1, 12))
+    heights = np.linspace(-tallest, tallest, 2 * steps + 1)
+    restless = np.stack([_by_tile(_stack(grey, plane, pivot_px, z)[1][..., 0] ** 2).mean(axis=(1, 3)) for z in heights])
+    # the vertex of the parabola through the steadiest height and its neighbours
+    at = np.clip(restless.argmin(axis=0), 1, len(heights) - 2)
+    before, here, after = (np.take_along_axis(restless, (at + k)[None], axis=0)[0] for k in (-1, 0, 1))
+    bend = np.maximum(before - 2.0 * here + after, 1e-9)
+    return heights[at] + np.clip(0.5 * (before - after) / bend, -1.0, 1.0) * (heights[1] - heights[0])
+
+
+def _stack(
+    glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats, heights: float | Floats
+) -> tuple[Image, Image, NDArray[np.bool_]]:
+    """Turn frames back as what stands at heights (one, or one a pixel) turns; return middle, spread, and what all saw."""
+    height, width = glimpses[0].image.shape[:2]
+    x, y = np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float))
+    beside = np.reshape(heights, (-1, 1)) * plane.lens.parallax
+    arms = np.stack([x, y], axis=-1).reshape(-1, 2) - pivot_px - beside
+    pile, whole = [], np.ones((height, width), bool)
+    for g in glimpses:
+        there = plane.lens.distort(arms @ _turned(g.turn) + g.pivot_px + beside)
+        if g.turn_per_row:
+            early = g.turn_per_row * (there[:, 1] - g.row)
+            there = plane.lens.distort(_each_turned(arms, g.turn + early) + g.pivot_px + beside)
+        at = there.reshape(height, width, 2).astype(np.float32)
+        turned = cv2.remap(g.image, at[..., 0], at[..., 1], cv2.INTER_LINEAR)
+        pile.append(turned.reshape(height, width, -1).astype(np.float32))
+        whole &= (at >= 0).all(axis=2) & (at[..., 0] <= width - 1) & (at[..., 1] <= height - 1)
+    return *_middle_and_spread(np.stack(pile)), whole
+
+
+def _by_pixel(heights: Floats, shape: tuple[int, int]) -> float | Floats:
+    """Give every pixel its tile's height."""
+    if not heights.any():
+        return 0.0
+    rows, columns = (np.minimum(np.arange(n) // SIDE_PX, m - 1) for n, m in zip(shape, heights.shape, strict=True))
+    return heights[np.ix_(rows, columns)]
+
+
+def _middle_and_spread(pile: Image) -> tuple[Image, Image]:
+    middle: Image = np.median(pile, axis=0)
+    spread: Image = 1.4826 * np.median(np.abs(pile - middle), axis=0)
+    return middle, spread
+
+
+def _by_tile(part: Image) -> Image:
+    rows, columns = part.shape[0] // SIDE_PX, part.shape[1] // SIDE_PX
+    return part[: rows * SIDE_PX, : columns * SIDE_PX].reshape(rows, SIDE_PX, columns, SIDE_PX)
+
+
+@njit(cache=True)
+def _gather(image, ground, about, reach, here, turn, per_row, row, corner, side, pivot):  # type: ignore[no-untyped-def]
+    top, bottom = max(0, int(about[1] - reach)), min(image.shape[0], int(about[1] + reach) + 2)
+    left, right = max(0, int(about[0] - reach)), min(image.shape[1], int(about[0] + reach) + 2)
+    room = max(0, bottom - top) * max(0, right - left)
+    offsets, values, count = np.empty((room, 2)), np.empty((room, image.shape[2]), np.float32), 0
+    c, s = np.cos(turn), np.sin(turn)
+    for y in range(top, bottom):
+        # a row that was exposed later shows the head turned further: its pixels are turned back about the pivot
+        late = per_row * (y - row)
+        cl, sl = np.cos(late), np.sin(late)
+        for x in range(left, right):
+            gx, gy = ground[y, x, 0] - here[0], ground[y, x, 1] - here[1]
+            vx, vy = cl * gx - sl * gy, sl * gx + cl * gy
+            at_x = pivot[0] + c * vx - s * vy - corner[0]
+            at_y = pivot[1] + s * vx + c * vy - corner[1]
+            if at_x < -0.5 or at_y < -0.5 or at_x > side + 0.5 or at_y > side + 0.5:
+                continue
+            offsets[count, 0], offsets[count, 1] = vx, vy
+            for channel in range(image.shape[2]):
+                values[count, channel] = image[y, x, channel]
+            count += 1
+    return offsets[:count], values[:count]
