@@ -24,6 +24,8 @@ from anglecam.sighting import Sighting, sight_clip
 
 Floats = NDArray[np.float64]
 
+_CARRIED_PX = 1.0
+"""How far from where the head carries it a mouth may seem to be that is smeared and not hidden."""
 _MOVING = 5.0
 """Standard uncertainties by which the angle must change on both sides of a repeated frame for it to be one."""
 
@@ -74,10 +76,8 @@ def measure_clip(
     """
     seen = sight_clip(path, rig, progress)
     ok = np.array([s == OK for s in seen.status])
-    row_time = rig.camera.row_time_s
-    row = np.full(len(ok), np.nan)
-    row[ok] = seen.lens.distort(np.array([r.centre_px for r, s in zip(seen.regions, ok, strict=True) if s and r]))[:, 1]
-    time = measurement_time(seen.time, row, seen.size[1], row_time)
+    row = _mouth_rows(seen)
+    time = measurement_time(seen.time, row, seen.size[1], rig.camera.row_time_s)
     angles = coarse_angles(seen, ok, time, rig, command)
     why_coarse: str | None = "the mouth does not move"
     if seen.moves:
@@ -85,11 +85,26 @@ def measure_clip(
         registered = register_clip(path, start, seen.lens, progress)
         why_coarse = registered if isinstance(registered, str) else None
         if isinstance(registered, Registered):
-            time = measurement_time(
-                seen.time, np.where(np.isfinite(registered.turn), registered.row, row), seen.size[1], row_time
-            )
+            found = np.isfinite(registered.turn)
+            ok = ok | (found & _carried_along(seen, start, registered, angles))
+            row = np.where(found, registered.row, row)
+            time = measurement_time(seen.time, row, seen.size[1], rig.camera.row_time_s)
+            angles = coarse_angles(seen, ok, time, rig, command)
             angles = fine_angles(angles, registered, np.flatnonzero(ok), time[ok], rig, command)
     return Measurement(_series(path, rig, time, seen, ok, angles), seen, angles, why_coarse)
+
+
+def _mouth_rows(seen: Sighting) -> Floats:
+    """Return the rows of the picture in which the mouth was seen."""
+    places = [np.full(2, np.nan) if r is None else r.centre_px for r in seen.regions]
+    return np.asarray(seen.lens.distort(np.array(places))[:, 1])
+
+
+def _carried_along(seen: Sighting, start: Start, registered: Registered, angles: Angles) -> NDArray[np.bool_]:
+    """Tell in which of the doubtful frames the mouth is where the head carries it: all of it is seen, but smeared."""
+    off = registered.turn - start.turn - start.turn_per_row * (registered.row - start.row)
+    sure = np.isfinite(start.sigma) & np.isfinite(off)
+    return seen.smeared & (np.abs(off - np.median(off[sure])) * np.median(angles.lever_px) < _CARRIED_PX)
 
 
 def _start(seen: Sighting, ok: NDArray[np.bool_], time: Floats, row: Floats, angles: Angles, rig: Rig) -> Start:
@@ -97,8 +112,16 @@ def _start(seen: Sighting, ok: NDArray[np.bool_], time: Floats, row: Floats, ang
     n = len(time)
     turn, sigma, speed = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n)
     turn[ok], sigma[ok] = turns(angles, rig), angles.sigma
-    if rig.camera.row_time_s is not None and ok.sum() > 1:
-        speed[ok] = np.gradient(turn[ok], time[ok])
+    guessed = np.flatnonzero(seen.smeared)
+    if len(guessed):
+        arm = np.array([r.centre_px for i in guessed if (r := seen.regions[i])]) - seen.pivot.centre_px
+        line = np.arctan2(-arm[:, 1], arm[:, 0] if rig.facing == "right" else -arm[:, 0])
+        near = line - np.median(angles.line)
+        near -= 2.0 * np.pi * np.round(near / (2.0 * np.pi))
+        turn[guessed] = near if rig.facing == "right" else -near
+    known = np.isfinite(turn)
+    if rig.camera.row_time_s is not None and known.sum() > 1:
+        speed[known] = np.gradient(turn[known], time[known])
     return Start(
         turn=turn,
         sigma=sigma,
@@ -118,7 +141,7 @@ def _series(
     angles: Angles,
 ) -> AngleSeries:
     """Lay the measured frames among all the clip's frames, less the duplicates."""
-    empty, status = np.full(len(time), np.nan), list(seen.status)
+    empty, status = np.full(len(time), np.nan), [OK if k else s for k, s in zip(ok, seen.status, strict=True)]
     lines, sigmas, levers = empty.copy(), empty.copy(), empty.copy()
     mouths = np.full((len(time), 2), np.nan)
     lines[ok], sigmas[ok], levers[ok] = angles.line, angles.sigma, angles.lever_px

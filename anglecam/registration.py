@@ -12,12 +12,13 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from anglecam.lens import Lens
 from anglecam.video.frames import Image, inspect_clip, read_frames
 from anglecam.vision.noise import pixel_noise
 from anglecam.vision.pivot import Pivot
-from anglecam.vision.register import LOST, Look, Turn, find_turn, learn
+from anglecam.vision.register import LOST, Look, Turn, find_turn, learn, nearest_fit
 from anglecam.vision.tiles import Glimpse, choose_tiles, plane_of
 
 Floats = NDArray[np.float64]
@@ -26,11 +27,15 @@ _LEARNT = 120
 """Frames from which the head is learnt, at most."""
 _BYTES = 300_000_000
 """Memory for them."""
+_POSE = 0.001
+"""Turns closer than this are one pose, rad: a fifth of a pixel at the rim of an ordinary head."""
 _STACK = 15
 """Of those, spread evenly over the turns, that are laid over one another to see what is rigid."""
 _FEWEST = 12
 """A head seen in fewer frames is not learnt."""
 _FEWEST_TILES = 3
+_DOUBT_PX = 10.0
+"""How far off a guess may be."""
 _AGREE = 4.0
 """Times its uncertainty that the coarse angle may typically be off the fine one: beyond, what was learnt is not what
 carries the mouth."""
@@ -45,7 +50,7 @@ class Start:
     turn: Floats
     """Counter-clockwise as seen, from some reference, rad; NaN where it is not known: such a frame is left alone."""
     sigma: Floats
-    """Its standard uncertainty, rad."""
+    """Its standard uncertainty, rad; NaN where the turn is a guess that nothing is learnt from."""
     pivot: Pivot
     """In the plane of motion."""
     pivots_px: Floats
@@ -108,7 +113,7 @@ def register_clip(
         Why not, in a few words, where the head cannot be registered or is no better for it.
     """
     info = inspect_clip(path)
-    n, known = len(start.turn), np.flatnonzero(np.isfinite(start.turn))
+    n, known = len(start.turn), np.flatnonzero(np.isfinite(start.sigma))
     if len(known) < _FEWEST:
         return f"the mouth is seen in {len(known)} frames only"
     plane = plane_of(lens, (info.width, info.height))
@@ -127,7 +132,8 @@ def register_clip(
     )
     if len(tiles.corners) < _FEWEST_TILES:
         return "too little of the head is rigid and has edges"
-    look = learn(glimpses, tiles, plane, start.pivot)
+    with threadpool_limits(limits=1, user_api="blas"):  # small systems: threads only wait for one another
+        look = learn(glimpses, tiles, plane, start.pivot)
     del glimpses
     apart = look.pivot_px - start.pivot.centre_px
     if apart @ np.linalg.solve(look.pivot_covariance_px2 + start.pivot.covariance_px2, apart) > _ASTRAY:
@@ -143,12 +149,14 @@ def register_clip(
                 # at the middle of what is looked at, an error of the speed counts least
                 rows[i] = look.row_of_middle(one)
                 one = replace(one, turn=one.turn + one.turn_per_row * (rows[i] - one.row), row=rows[i])
+            if np.isnan(start.sigma[i]):
+                one = nearest_fit(look, one, _DOUBT_PX)
             found[i] = find_turn(look, one, before if frame.predicted else None)
         before = image
         if progress is not None:
             progress(i + 1, n)
     registered = _gathered(found, rows, look)
-    both = np.isfinite(registered.turn)
+    both = np.isfinite(registered.turn) & np.isfinite(start.sigma)
     if not both.any() or np.median(registered.sigma[both]) > np.median(start.sigma[both]):
         return "the mouth alone is more certain than the head"
     off = registered.turn[both] - start.turn[both] - (start.turn_per_row * (rows - start.row))[both]
@@ -162,10 +170,18 @@ def _glimpse(start: Start, i: int, image: Image) -> Glimpse:
 
 
 def _spread_out(turn: Floats, known: NDArray[np.intp], most: int) -> set[int]:
-    """Choose frames whose turns are spread over all that there are, and over the clip."""
-    by_turn = known[np.argsort(turn[known], kind="stable")]
-    half = np.unique(np.linspace(0, len(known) - 1, max(most // 2, 2)).round().astype(int))
-    return set(by_turn[half].tolist()) | set(known[half].tolist())
+    """Choose frames from every pose alike.
+
+    Frames at rest all show the head in the same place within the pixels: a look that is learnt from many of them
+    agrees with them wherever they are thought to be, and never finds out how they are turned.
+    """
+    mixed = np.random.default_rng(0).permutation(known)
+    pose = np.round(turn[mixed] / _POSE).astype(np.int64)
+    by_pose = np.argsort(pose, kind="stable")
+    first = np.flatnonzero(np.diff(pose[by_pose], prepend=pose.min() - 1))
+    rank = np.empty(len(mixed), np.int64)
+    rank[by_pose] = np.arange(len(mixed)) - np.repeat(first, np.diff(first, append=len(mixed)))
+    return set(mixed[np.argsort(rank, kind="stable")[:most]].tolist())
 
 
 def _gathered(found: list[Turn], rows: Floats, look: Look) -> Registered:

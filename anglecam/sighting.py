@@ -38,8 +38,10 @@ _SMALLEST_SHARE = 0.25
 """Of the mouth's area; a smaller region is no mouth even if partly hidden."""
 _HINT_PX = 10.0
 """Standard uncertainty of a hint at the pivot."""
-_REACH_PX = (3.0, 40.0)
-"""Limits of the standard uncertainty of the centre of rotation when a marker is looked for about it."""
+_REACH = 2.0
+"""Times its stated uncertainty that the centre of rotation may be off when a marker is looked for about it …"""
+_LEAST_REACH_PX = 3.0
+"""… and at least so far."""
 _DEPTH = 0.15
 """Standard uncertainty of the marker's height over the mouth's, as a share of the lever arm."""
 
@@ -53,6 +55,8 @@ class Sighting:
     status: tuple[str, ...]
     regions: tuple[Region | None, ...]
     """The mouth where it was seen, in the plane of motion."""
+    smeared: NDArray[np.bool_]
+    """Frames that are ``occluded`` for all that is known, but may be fast motion's blur."""
     pivot: Pivot
     """In the plane of motion."""
     marker: Marker | None
@@ -113,7 +117,7 @@ def sight_clip(path: Path, rig: Rig, progress: Callable[[int, int], None] | None
     if OK not in status:
         raise InputError(_nothing_measured(path, status, sample, rig))
     if pivot is None:
-        raise InputError(f"{path}: no pivot found: the mouth does not move and there is no round marker to see")
+        raise InputError(f"{path}: no pivot found: the mouth hardly moves and there is no round marker to see")
     notes = [disagreement] if disagreement else []
     if found.circle is None:
         notes.append("the mouth does not move in this clip")
@@ -121,6 +125,7 @@ def sight_clip(path: Path, rig: Rig, progress: Callable[[int, int], None] | None
         time=time,
         status=status,
         regions=track.regions,
+        smeared=track.smeared,
         pivot=pivot,
         marker=marker,
         circle=track.circle,
@@ -213,11 +218,13 @@ def _find_pivot_marker(images: Sequence[Image], rig: Rig, circle: Circle | None,
     few = images[:: max(1, len(images) // _STILL)]
     still = np.median(np.stack(few), axis=0).astype(np.uint8)
     if rig.pivot.near is not None:
-        return find_marker(still, np.array(rig.pivot.near), _HINT_PX)
+        return find_marker(still, np.array(rig.pivot.near), _HINT_PX**2 * np.eye(2))
     if circle is None:
-        return find_marker(still, None, 0.0)
-    sigma = float(np.sqrt(np.linalg.eigvalsh(circle.centre_covariance_px2)[-1]))
-    return find_marker(still, lens.distort(circle.centre_px), float(np.clip(sigma, *_REACH_PX)))
+        return find_marker(still, None, None)
+    # a short arc knows well in which direction its centre lies, and badly how far off
+    values, axes = np.linalg.eigh(np.nan_to_num(circle.centre_covariance_px2, nan=1e12, posinf=1e12))
+    reach = np.clip(_REACH * np.sqrt(np.abs(values)), _LEAST_REACH_PX, 0.5 * float(np.hypot(*still.shape[:2])))
+    return find_marker(still, lens.distort(circle.centre_px), (axes * reach**2) @ axes.T)
 
 
 def _truncated(info: ClipInfo, sample: Sample) -> str | None:

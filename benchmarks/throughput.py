@@ -4,7 +4,8 @@
 
 Time: `measure_clip` without overlay or plot, over PyAV's bare decoding of the same file with the threads that
 `anglecam.video.frames` uses, no colour conversion. The two take turns, so that both meet the same machine; figures are
-medians over the rounds. Where `measure` tells its progress, its readings of the file are told apart by it.
+medians over the rounds. What `measure` tells of its progress parts it into sample (until the mouth is looked for in the
+first frame), coarse (the mouth in every frame), learn (the head) and fine (the head's turn in every frame).
 
 Memory: the highest resident size of a fresh process that measures one clip. The long clips repeat the packets of a
 short one: MJPEG's stand alone, and a swing played forwards and backwards meets its own beginning.

@@ -16,7 +16,7 @@ _GATE = 4.0
 """Robust standard deviations beyond which a point is taken to lie off the circle."""
 _FLOOR_PX = 0.02
 """No film places a mark better than this; keeps the gate open on exact data."""
-_SLOW_PX = 0.02
+_SLOW_PX = 0.04
 """Least standard deviation of a centroid's error that changes slowly along the path, px: what passes behind the
 mark's edge, and chroma at half resolution, shift it by 0.02 to 0.08 px in MJPG films."""
 _SLOW_LENGTHS_PX = (4.0, 16.0)

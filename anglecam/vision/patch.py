@@ -42,6 +42,15 @@ class Views:
     starts: Ints
     """(views + 1,) where each view's pixels begin."""
 
+    def without(self, out: NDArray[np.bool_]) -> Views:
+        """Return these with those views (views,) emptied."""
+        if not out.any():
+            return self
+        length = np.diff(self.starts)
+        kept = np.repeat(~out, length)
+        starts = np.append(0, np.cumsum(np.where(out, 0, length)))
+        return Views(self.offsets[kept], self.values[kept], starts)
+
 
 @dataclass(frozen=True)
 class Patches:
@@ -114,7 +123,19 @@ class Fit:
     count: Ints
     """(views,) pixels times colours."""
     light: Floats
-    """(views, planes, 2) what gain and offset of brightness the view has beyond the look's."""
+    """(views, planes, 3) what gain and offset of brightness, and variance of blur along the path (px²), the view has
+    beyond the look's."""
+
+    def without(self, out: NDArray[np.bool_]) -> Fit:
+        """Return this with those views taken as if they had no pixels."""
+        kept = ~out
+        return replace(
+            self,
+            normal=self.normal * kept[..., None, None],
+            gradient=self.gradient * kept[..., None],
+            squares=self.squares * kept,
+            count=self.count * kept,
+        )
 
     def weighted(self, variance: Floats) -> tuple[Floats, Floats]:
         """Return normal and gradient over the variances, along the first axis, of what is left over."""
@@ -130,7 +151,7 @@ def levelled(views: Views, light: Floats) -> Views:
     views : Views
         Of one tile.
     light : ndarray
-        (views, planes, 2) from a `Fit` to the tile's look.
+        (views, planes, 3) from a `Fit` to the tile's look; blur stays where it is.
 
     Returns
     -------
@@ -145,7 +166,9 @@ def levelled(views: Views, light: Floats) -> Views:
 def compare(patches: Patches, views: Views, turns: Floats, pivots: Floats) -> Fit:
     """Hold looks against what frames show at assumed turns, for a step of Gauss and Newton.
 
-    Each view's own brightness (a gain and an offset a colour) is fitted and taken out.
+    Each view's own brightness (a gain and an offset a colour) is fitted and taken out, and so is what motion during
+    the exposure adds to the second derivative along the path: a sharp look against a blurred view is not merely
+    noisy, it is biased.
 
     Parameters
     ----------
@@ -214,6 +237,14 @@ def _slopes(u, d):  # type: ignore[no-untyped-def]
     d[1] = (3 * u * u - 4 * u) / 2
     d[2] = (-3 * u * u + 2 * u + 1) / 2
     d[3] = u * u / 2
+
+
+@njit(cache=True, inline="always")
+def _bends(u, b):  # type: ignore[no-untyped-def]
+    b[0] = 1 - u
+    b[1] = 3 * u - 2
+    b[2] = 1 - 3 * u
+    b[3] = u
 
 
 @njit(cache=True, inline="always")
@@ -298,16 +329,16 @@ def _compare(offsets, values, starts, turns, pivots, corners, side, looks, all_g
     views, planes, n = len(turns), looks.shape[1], looks.shape[2]
     normals, gradients = np.zeros((views, 3, 3)), np.zeros((views, 3))
     squares, counts = np.zeros(views), np.zeros(views, dtype=np.int64)
-    lights = np.zeros((views, planes, 2))
-    wx, wy, dx, dy = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4)
-    slope, bright = np.zeros(3), np.ones(2)
+    lights = np.zeros((views, planes, 3))
+    wx, wy, dx, dy, bx, by = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4)
+    slope, bright = np.zeros(3), np.ones(3)
     scale = (n - 3) / side
     for k in range(views):
         c, s = np.cos(turns[k]), np.sin(turns[k])
         p = k if len(looks) > 1 else 0
         pivot, corner, coefficients, gains = pivots[p], corners[p], looks[p], all_gains[p]
         whole, pull = np.zeros((3, 3)), np.zeros(3)
-        light, light_pull, across = np.zeros((planes, 2, 2)), np.zeros((planes, 2)), np.zeros((planes, 2, 3))
+        light, light_pull, across = np.zeros((planes, 3, 3)), np.zeros((planes, 3)), np.zeros((planes, 3, 3))
         for m in range(starts[k], starts[k + 1]):
             at_x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1]
             at_y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1]
@@ -322,20 +353,29 @@ def _compare(offsets, values, starts, turns, pivots, corners, side, looks, all_g
             _weights(uy - iy, wy)
             _slopes(ux - ix, dx)
             _slopes(uy - iy, dy)
+            _bends(ux - ix, bx)
+            _bends(uy - iy, by)
+            away_x, away_y = at_x - pivot[0], at_y - pivot[1]
+            from_pivot = max(away_x * away_x + away_y * away_y, 1.0)
             for channel in range(planes):
-                look, along_x, along_y = 0.0, 0.0, 0.0
+                look, along_x, along_y, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
                 for j in range(4):
                     for i in range(4):
                         q = coefficients[channel, iy + j, ix + i]
                         look += wx[i] * wy[j] * q
                         along_x += dx[i] * wy[j] * q
                         along_y += wx[i] * dy[j] * q
+                        xx += bx[i] * wy[j] * q
+                        xy += dx[i] * dy[j] * q
+                        yy += wx[i] * by[j] * q
                 along_x *= g * scale
                 along_y *= g * scale
-                slope[0] = along_y * (at_x - pivot[0]) - along_x * (at_y - pivot[1])
+                slope[0] = along_y * away_x - along_x * away_y
                 slope[1] = along_x
                 slope[2] = along_y
                 bright[0] = g * look
+                bent = away_y * away_y * xx - 2.0 * away_x * away_y * xy + away_x * away_x * yy
+                bright[2] = g * scale * scale * bent / from_pivot
                 rest = values[m, channel] - g * look
                 squares[k] += rest * rest
                 counts[k] += 1
@@ -343,11 +383,10 @@ def _compare(offsets, values, starts, turns, pivots, corners, side, looks, all_g
                     pull[a] += slope[a] * rest
                     for b in range(a, 3):
                         whole[a, b] += slope[a] * slope[b]
-                for a in range(2):
+                for a in range(3):
                     light_pull[channel, a] += bright[a] * rest
-                    for b in range(2):
-                        light[channel, a, b] += bright[a] * bright[b]
                     for b in range(3):
+                        light[channel, a, b] += bright[a] * bright[b]
                         across[channel, a, b] += bright[a] * slope[b]
         if counts[k] < 30:
             counts[k] = 0
@@ -356,9 +395,9 @@ def _compare(offsets, values, starts, turns, pivots, corners, side, looks, all_g
         for a in range(3):
             for b in range(a):
                 whole[a, b] = whole[b, a]
-        # the view's brightness is fitted along and eliminated
+        # the view's brightness and blur are fitted along and eliminated
         for channel in range(planes):
-            known = light[channel] + 1e-9 * np.eye(2)
+            known = light[channel] + 1e-9 * np.eye(3)
             taken = np.linalg.solve(known, across[channel])
             told = np.linalg.solve(known, light_pull[channel])
             whole -= across[channel].T @ taken

@@ -62,7 +62,7 @@ class Pivot:
     """``marker``, ``centre of rotation`` or ``marker and centre of rotation``."""
 
 
-def find_marker(image: Image, about_px: Floats | None, reach_px: float) -> Marker | None:
+def find_marker(image: Image, about_px: Floats | None, covariance_px2: Floats | None) -> Marker | None:
     """Find the round mark nearest to where it is expected.
 
     Parameters
@@ -71,8 +71,8 @@ def find_marker(image: Image, about_px: Floats | None, reach_px: float) -> Marke
         (h, w, 3) blue, green, red; the median of several frames shows what stands still.
     about_px : ndarray, optional
         (2,) where to look, px; without it the whole image is searched.
-    reach_px : float
-        Standard uncertainty of ``about_px``, px; marks beyond three times this are not considered.
+    covariance_px2 : ndarray, optional
+        (2, 2) how sure that is, px²; marks beyond three standard uncertainties are not considered.
 
     Returns
     -------
@@ -81,18 +81,19 @@ def find_marker(image: Image, about_px: Floats | None, reach_px: float) -> Marke
     """
     height, width = image.shape[:2]
     x0, y0, x1, y1 = 0, 0, width, height
-    if about_px is not None:
-        half = 3.0 * reach_px + _RADII_PX[-1] + 4
-        x0, y0 = (max(int(v - half), 0) for v in about_px)
-        x1, y1 = min(int(about_px[0] + half), width), min(int(about_px[1] + half), height)
+    if about_px is not None and covariance_px2 is not None:
+        half = 3.0 * np.sqrt(np.diag(covariance_px2)) + _RADII_PX[-1] + 4
+        x0, y0 = (max(int(v), 0) for v in about_px - half)
+        x1, y1 = (min(int(v), most) for v, most in zip(about_px + half, (width, height), strict=True))
         if x1 - x0 < 12 or y1 - y0 < 12:
             return None
     part = image[y0:y1, x0:x1]
     gx, gy = _gradients(part)
     prior = np.ones(gx.shape)
-    if about_px is not None:
+    if about_px is not None and covariance_px2 is not None:
         yy, xx = np.mgrid[y0:y1, x0:x1]
-        away = ((xx - about_px[0]) ** 2 + (yy - about_px[1]) ** 2) / reach_px**2
+        off = np.stack([xx - about_px[0], yy - about_px[1]], axis=-1)
+        away = np.einsum("...i,ij,...j->...", off, np.linalg.inv(covariance_px2), off)
         prior = np.where(away <= 9.0, np.exp(-away / 8.0), 0.0)
     best, radius, place = 0.0, 0.0, (0, 0)
     for r, coverage in _coverages(part, gx, gy):
@@ -129,7 +130,7 @@ def choose_pivot(marker: Marker | None, circle: Circle | None) -> tuple[Pivot | 
         What to report where they disagree by more than their uncertainties: then the centre of rotation is taken,
         because about it the mouth keeps its distance.
     """
-    if circle is not None and np.sqrt(circle.covariance_px2[2, 2]) > _SURE_RADIUS * circle.radius_px:
+    if circle is not None and not circle.covariance_px2[2, 2] < (_SURE_RADIUS * circle.radius_px) ** 2:
         circle = None
     if circle is None:
         return (None if marker is None else Pivot(marker.centre_px, marker.covariance_px2, "marker")), None

@@ -37,6 +37,16 @@ _TRUST = 3.0
 """Degrees of freedom that the whole clip's scatter has against a single frame's."""
 _HIDDEN = 3.0
 """Times its usual mean square that a tile misfits in a frame where something hides it."""
+_DIMMED = 0.5
+"""Departure of a view's contrast from the look's that no light makes."""
+_BETTER = 0.6
+"""Misfit of another turn over that of the guess below which the guess is wrong."""
+_SOUND = 0.5
+"""Least variance of a tile over the usual one: a smaller one tells of too few views, not of less noise."""
+_LOOKS = 3
+"""Rounds after which it is settled what is hidden."""
+_NOTHING = 1e-9
+"""Information of a frame in which every tile is hidden."""
 _DEPTH = 0.15
 """Standard deviation of the heights of a head's parts, over their distance from the pivot."""
 _COPY = 0.13
@@ -118,7 +128,7 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
     """
     turns = np.array([g.turn for g in glimpses])
     start, heights, parallax = pivot.centre_px, tiles.heights.copy(), plane.lens.parallax
-    error = np.zeros(2)
+    error, hidden = np.zeros(2), np.zeros((len(heights), len(turns)), bool)
     tall = _DEPTH * float(np.median(np.hypot(*(tiles.corners - start).T)))
     prior = _Prior(np.asarray(np.linalg.inv(pivot.covariance_px2), dtype=float), 1.0 / tall**2)
     views = [
@@ -131,36 +141,40 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
     patches: list[Patches] = [
         learn_patch(c, SIDE_PX, v, turns, o) for c, v, o in zip(tiles.corners, views, centres(), strict=True)
     ]
-    for _ in range(_ROUNDS):
-        light = _compare_all(patches, views, turns, centres()).light
-        patches = [
-            learn_patch(p.corners[0], SIDE_PX, levelled(v, own), turns, o, p.gains[0])
-            for p, v, o, own in zip(patches, views, centres(), light, strict=True)
-        ]
+    for done in range(_ROUNDS):
         fits = _compare_all(patches, views, turns, centres())
+        hidden = _hidden(fits) if done < _LOOKS else hidden
+        patches = [
+            learn_patch(p.corners[0], SIDE_PX, levelled(v, light).without(out), turns, o, p.gains[0])
+            for p, v, o, light, out in zip(patches, views, centres(), fits.light, hidden, strict=True)
+        ]
+        fits = _compare_all(patches, views, turns, centres()).without(hidden)
         variance = fits.squares.sum(axis=1) / np.maximum(fits.count.sum(axis=1), 1)
-        told = fits.weighted(variance)
-        moved, raised, covariance = _centres_error(*told, turns, prior, error, heights, parallax)
+        variance = np.maximum(variance, _SOUND * np.median(variance))
+        equations = _centre_equations(*fits.weighted(variance), turns, parallax)
+        moved, raised, covariance = _centres_error(*equations, prior, error, heights)
         error, heights = error + moved, heights + raised
         shifts = moved + raised[:, None] * parallax
         views = [replace(v, offsets=v.offsets - shift) for v, shift in zip(views, shifts, strict=True)]
-        normal, gradient = _compare_all(patches, views, turns, centres()).weighted(variance)
-        turns = turns + gradient.sum(axis=0)[:, 0] / normal.sum(axis=0)[:, 0, 0]
+        normal, gradient = _compare_all(patches, views, turns, centres()).without(hidden).weighted(variance)
+        turns = turns + gradient.sum(axis=0)[:, 0] / np.maximum(normal.sum(axis=0)[:, 0, 0], _NOTHING)
         if np.hypot(*shifts.T).max() < _SETTLED_PX:
             break
-    normal, gradient = _compare_all(patches, views, turns, centres()).weighted(variance)
+    normal, gradient = _compare_all(patches, views, turns, centres()).without(hidden).weighted(variance)
     groups = _groups(tiles.corners)
     total, freedom = _scatter(normal, gradient, groups)
     # two witnesses: groups that disagree about the turn, and a head that seems to leave its pivot
     witnesses = (total / max(freedom - len(turns), 1), _restlessness(normal.sum(axis=0), gradient.sum(axis=0)))
     birge = max(1.0, float(np.sqrt(max(witnesses))))
+    scores = _centre_equations(normal, gradient, turns, parallax)[1]
+    unlike = max(birge**2, _disagreement(covariance, scores, groups))
     told = normal[:, :, 0, 0].sum(axis=1)
     return Look(
         patches=_one_by_one(patches),
         heights=heights,
         plane=plane,
         pivot_px=start + error,
-        pivot_covariance_px2=birge**2 * covariance,
+        pivot_covariance_px2=unlike * covariance[:2, :2],
         variance=variance,
         groups=groups,
         birge=birge,
@@ -193,7 +207,7 @@ def find_turn(look: Look, glimpse: Glimpse, before: Image | None = None) -> Turn
         mean_square = np.where(fit.count > 0, fit.squares / np.maximum(fit.count, 1), np.inf)
         # motion blur and the like spoil all tiles alike, a hand or a hair only some
         usual = float(np.median(mean_square / look.variance))
-        clear = mean_square < _HIDDEN * max(usual, 1.0) * look.variance
+        clear = (mean_square < _HIDDEN * max(usual, 1.0) * look.variance) & ~_covered(fit)
         if not clear.any() or not np.isfinite(usual):
             return LOST
         each = fit.weighted(np.where(clear, look.variance * max(usual, 1.0), np.inf))
@@ -215,6 +229,39 @@ def find_turn(look: Look, glimpse: Glimpse, before: Image | None = None) -> Turn
     return Turn(float(turn), noise, float(np.sqrt(pose2)), pull)
 
 
+def nearest_fit(look: Look, glimpse: Glimpse, reach_px: float) -> Glimpse:
+    """Try turns about a doubtful one, a pixel apart at the tiles' middle, and start from the one that fits best.
+
+    Parameters
+    ----------
+    look : Look
+        From `learn`.
+    glimpse : Glimpse
+        With a turn that may be wrong.
+    reach_px : float
+        How far to try to either side, px.
+
+    Returns
+    -------
+    Glimpse
+        With another turn.
+    """
+    centres = look.pivot_px + look.heights[:, None] * look.plane.lens.parallax
+    step = 1.0 / float(np.hypot(*(look.middle_px - look.pivot_px)))
+    tries = [replace(glimpse, turn=glimpse.turn + k * step) for k in range(-int(reach_px), int(reach_px) + 1)]
+
+    def misfit(one: Glimpse) -> float:
+        views, _ = look_at(look.patches.corners, look.heights, [one], look.plane, look.pivot_px)
+        fit = compare(look.patches, views, np.full(len(look.patches), one.turn), centres)
+        seen = fit.count > 0
+        return float(np.median(fit.squares[seen] / fit.count[seen] / look.variance[seen])) if seen.any() else np.inf
+
+    misfits = [misfit(one) for one in tries]
+    best = int(np.argmin(misfits))
+    # a smeared head fits nowhere well: there the guess is not overruled
+    return tries[best] if misfits[best] < _BETTER * misfits[len(tries) // 2] else glimpse
+
+
 def _compare_all(patches: Sequence[Patches], views: Sequence[Views], turns: Floats, centres: Floats) -> Fit:
     """Compare every tile with every frame: rows are tiles, columns frames."""
     fits = [compare(p, v, turns, c[None]) for p, v, c in zip(patches, views, centres, strict=True)]
@@ -227,42 +274,71 @@ def _compare_all(patches: Sequence[Patches], views: Sequence[Views], turns: Floa
     )
 
 
-def _centres_error(
-    normal: Floats,
-    gradient: Floats,
-    turns: Floats,
-    prior: _Prior,
-    so_far: Floats,
-    heights: Floats,
-    parallax: Floats,
-) -> tuple[Floats, Floats, Floats]:
-    """Find the errors of pivot and heights from the way in which turned tiles seem displaced: t = (1 − R)·(e + p·h).
+def _hidden(fits: Fit) -> NDArray[np.bool_]:
+    """Tell in which frames a tile is seen badly: what passes before it is not learnt."""
+    mean_square = fits.squares / np.maximum(fits.count, 1)
+    usual = np.median(mean_square, axis=1, keepdims=True)
+    # motion blur and the like spoil all tiles alike
+    spoilt = np.maximum(np.median(mean_square / usual, axis=0, keepdims=True), 1.0)
+    return np.asarray((mean_square > _HIDDEN * spoilt * usual) | _covered(fits))
 
-    Every frame's turn is free: it is eliminated.
+
+def _covered(fits: Fit) -> NDArray[np.bool_]:
+    """Tell which views show something else, however flat: it fits any look that is dimmed to nothing."""
+    return np.asarray((np.abs(fits.light[..., 0]) > _DIMMED).any(axis=-1))
+
+
+def _centre_equations(normal: Floats, gradient: Floats, turns: Floats, parallax: Floats) -> tuple[Floats, Floats]:
+    """Return what tiles say of the errors of pivot and heights: information, and every tile's score.
+
+    A turned tile seems displaced by t = (1 − R)·(e + p·h). Every frame's turn is free: it is eliminated. Where there
+    is no parallax, heights do not count.
     """
     c, s = np.cos(turns), np.sin(turns)
     moved = np.eye(2) - np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
-    place = np.einsum("kai,tkab,kbj->tkij", moved, normal[..., 1:, 1:], moved)
+    place = np.einsum("kai,tkab,kbj->tij", moved, normal[..., 1:, 1:], moved)
     cross = np.einsum("kai,tka->tki", moved, normal[..., 1:, 0])
-    pull = np.einsum("kai,tka->tki", moved, gradient[..., 1:])
-    by_turn, turn_pull = normal[..., 0, 0].sum(axis=0), gradient[..., 0].sum(axis=0)
-    tall = bool(parallax.any())
-    size = 2 + (len(heights) if tall else 0)
-    information, right, crossed = np.zeros((size, size)), np.zeros(size), np.zeros((len(turns), size))
-    information[:2, :2] = prior.pivot + place.sum(axis=(0, 1))
-    right[:2] = pull.sum(axis=(0, 1)) - prior.pivot @ so_far
-    crossed[:, :2] = cross.sum(axis=0)
-    if tall:
-        own = place.sum(axis=1) @ parallax
+    pull = np.einsum("kai,tka->ti", moved, gradient[..., 1:])
+    by_turn, tiles = np.maximum(normal[..., 0, 0].sum(axis=0), _NOTHING), len(normal)
+    size = 2 + (tiles if parallax.any() else 0)
+    information, scores, crossed = np.zeros((size, size)), np.zeros((tiles, size)), np.zeros((len(turns), size))
+    information[:2, :2], scores[:, :2], crossed[:, :2] = place.sum(axis=0), pull, cross.sum(axis=0)
+    if size > 2:
+        own = place @ parallax
         information[2:, :2], information[:2, 2:] = own, own.T
-        information[2:, 2:] = np.diag(own @ parallax + prior.height)
-        right[2:] = pull.sum(axis=1) @ parallax - prior.height * heights
+        information[2:, 2:] = np.diag(own @ parallax)
+        scores[:, 2:] = np.diag(pull @ parallax)
         crossed[:, 2:] = (cross @ parallax).T
     information -= (crossed.T / by_turn) @ crossed
-    right -= crossed.T @ (turn_pull / by_turn)
-    covariance = np.asarray(np.linalg.inv(information), dtype=float)
+    scores -= (gradient[..., 0] / by_turn) @ crossed
+    return information, scores
+
+
+def _centres_error(
+    information: Floats, scores: Floats, prior: _Prior, so_far: Floats, heights: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Solve for the errors of pivot and heights; return the covariance too, all in units of the pixels' noise."""
+    known, right = information.copy(), scores.sum(axis=0)
+    known[:2, :2] += prior.pivot
+    right[:2] -= prior.pivot @ so_far
+    tall = len(known) > 2
+    if tall:
+        known[2:, 2:] += prior.height * np.eye(len(heights))
+        right[2:] -= prior.height * heights
+    covariance = np.asarray(np.linalg.inv(known), dtype=float)
     found = covariance @ right
-    return found[:2], found[2:] if tall else np.zeros(len(heights)), covariance[:2, :2]
+    return found[:2], found[2:] if tall else np.zeros(len(heights)), covariance
+
+
+def _disagreement(covariance: Floats, scores: Floats, groups: NDArray[np.intp]) -> float:
+    """Ratio of the pivot's variance as groups of tiles disagree about it to what noise alone makes it.
+
+    The cluster-robust sandwich (Liang & Zeger 1986), a cluster a group.
+    """
+    names = np.unique(groups)
+    told = np.stack([scores[groups == group].sum(axis=0) for group in names]) @ covariance
+    variance = float((told[:, :2] ** 2).sum()) * len(names) / max(len(names) - 2, 1)
+    return variance / float(np.trace(covariance[:2, :2]))
 
 
 def _scatter(normal: Floats, gradient: Floats, groups: NDArray[np.intp]) -> tuple[float, int]:
@@ -281,6 +357,8 @@ def _scatter(normal: Floats, gradient: Floats, groups: NDArray[np.intp]) -> tupl
 
 def _restlessness(normal: Floats, gradient: Floats) -> float:
     """Mean square of the displacement that a head on a fixed pivot cannot have, in units of its noise."""
+    seen = normal[:, 0, 0] > _NOTHING
+    normal, gradient = normal[seen], gradient[seen]
     place = normal[:, 1:, 1:] - normal[:, 1:, :1] * normal[:, :1, 1:] / normal[:, :1, :1]
     shift = gradient[:, 1:] - normal[:, 1:, 0] * (gradient[:, :1] / normal[:, :1, 0])
     return float(np.einsum("ni,nij,nj->n", shift, np.linalg.inv(place), shift).mean() / 2.0)

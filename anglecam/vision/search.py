@@ -42,6 +42,10 @@ _TOP_PX = 40
 """The most mouth-like hue is that of the 40th pixel, past the codec's outliers."""
 _MOST_NOISE = 0.15
 """Standard deviation of the surroundings' fraction of mouth above which they and the mouth are one."""
+_BENT_PX = 0.5
+"""Distance from a straight line from which on a way is surely none."""
+_STRAIGHT = 0.1
+"""What a straight way counts against a bent one: a mouth that hardly moves has no other."""
 _PER_FRAME = 12
 _TRIALS = 600
 _HUE_TOLERANCE = np.radians(25.0)
@@ -237,13 +241,22 @@ def _follow(
     extent = float(np.hypot(*np.ptp(place, axis=0)))
     if extent < _MOVED_PX or len(members) < 3:
         return None
+    # what goes to and fro on a straight line turns about nothing that could be seen
+    bent = 1.0 - np.exp(-((_off_a_line(place) / _BENT_PX) ** 2))
     return _Track(
-        _score(patches, members, frames, extent) * np.exp(-np.mean((off[members] / _TOLERANCE_PX) ** 2)),
+        _score(patches, members, frames, extent)
+        * np.exp(-np.mean((off[members] / _TOLERANCE_PX) ** 2))
+        * (_STRAIGHT + (1.0 - _STRAIGHT) * bent),
         level,
         members,
         patches,
         (centre, radius),
     )
+
+
+def _off_a_line(place: Floats) -> float:
+    """Root mean square distance of places from the straight line that fits them best, px."""
+    return float(np.sqrt(max(np.linalg.eigvalsh(np.cov(place.T))[0], 0.0)))
 
 
 def _score(patches: _Patches, members: NDArray[np.int64], frames: int, extent: float) -> float:

@@ -32,7 +32,7 @@ _STEADIER = 1.5
 """Ratio of squared spreads, as filmed over turned back, from which on a tile belongs to the head."""
 _TALLEST = 0.3
 """Height of a part of the head, as a share of half the picture's diagonal."""
-_HEIGHT_STEP_PX = 0.8
+_HEIGHT_STEP_PX = 1.0
 """Displacement between neighbouring heights that are tried, px."""
 
 
@@ -192,10 +192,10 @@ def _find_heights(glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats) -
     slope = float(np.hypot(*plane.lens.parallax))
     if slope == 0.0:
         return np.zeros((height // SIDE_PX, width // SIDE_PX))
-    grey = [replace(g, image=g.image.mean(axis=2, keepdims=True).astype(np.uint8)) for g in glimpses]
+    grey = [replace(g, image=g.image.mean(axis=2, keepdims=True).astype(np.uint8)) for g in glimpses[::2]]
     swing = max(float(np.ptp([g.turn for g in glimpses])) / 2.0, 1e-3)
     tallest = _TALLEST * float(np.hypot(*(np.array([width, height]) / 2.0)))
-    steps = int(np.clip(tallest * slope * swing / _HEIGHT_STEP_PX, 1, 12))
+    steps = int(np.clip(tallest * slope * swing / _HEIGHT_STEP_PX, 1, 10))
     heights = np.linspace(-tallest, tallest, 2 * steps + 1)
     restless = np.stack([_by_tile(_stack(grey, plane, pivot_px, z)[1][..., 0] ** 2).mean(axis=(1, 3)) for z in heights])
     # the vertex of the parabola through the steadiest height and its neighbours
@@ -208,7 +208,7 @@ def _find_heights(glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats) -
 def _stack(
     glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats, heights: float | Floats
 ) -> tuple[Image, Image, NDArray[np.bool_]]:
-    """Turn frames back as what stands at heights (one, or one a pixel) turns; return middle, spread, and what all saw."""
+    """Turn frames back as what stands at a height, or each pixel at its own, turns; return middle and spread."""
     height, width = glimpses[0].image.shape[:2]
     x, y = np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float))
     beside = np.reshape(heights, (-1, 1)) * plane.lens.parallax

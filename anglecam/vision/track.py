@@ -30,6 +30,8 @@ _ROBUST = 6.0
 _LEAST_SHARE = 0.04
 """Of the mouth's area: where this much is hidden, the centroid moves by up to that share of the mouth's half length,
 some tenths of a pixel."""
+_FAST_PX = 4.0
+"""Way from frame to frame that can smear a mouth beyond recognition."""
 _LEAST_OFF_PX = 0.4
 """A distance from the circle that no whole mouth shows."""
 
@@ -44,6 +46,8 @@ class Track:
     """``ok``, ``no_mouth``, ``occluded`` or ``ambiguous``."""
     circle: Circle | None
     """Fitted to the places in the frames that are ok; ``None`` where the mouth is at rest."""
+    smeared: NDArray[np.bool_]
+    """(n,) frames that are ``occluded`` by the looks of the mouth, but it moves so fast that this may be its blur."""
 
 
 def follow_mouth(candidates: Sequence[Sequence[Region]], time: Floats, found: Found) -> Track:
@@ -67,7 +71,7 @@ def follow_mouth(candidates: Sequence[Sequence[Region]], time: Floats, found: Fo
     likely = [_near(regions, centre, radius, gate, 0.5, 2.0, found.area_px2) for regions in candidates]
     single = [r[0] for r in likely if len(r) == 1 and r[0].whole] or [q for r in likely for q in r]
     if not single:
-        return Track((None,) * len(candidates), (ABSENT,) * len(candidates), None)
+        return Track((None,) * len(candidates), (ABSENT,) * len(candidates), None, np.zeros(len(candidates), bool))
     area = float(np.median([r.area_px2 for r in single]))
     if found.circle is not None:
         circle = fit_circle(np.array([r.centre_px for r in single]), start=found.circle)
@@ -83,8 +87,9 @@ def follow_mouth(candidates: Sequence[Sequence[Region]], time: Floats, found: Fo
             if circle is not None:
                 centre, radius = circle.centre_px, circle.radius_px
         _mark_hidden(chosen, status, time, centre, radius, circle)
+    smeared = _smeared(chosen, status, time)
     _join_hidden(status)
-    return Track(tuple(chosen), tuple(status), circle)
+    return Track(tuple(chosen), tuple(status), circle, smeared)
 
 
 def _near(
@@ -207,6 +212,19 @@ def _mark_hidden(
         off |= (d > max(_ROBUST * circle.scatter_px, _LEAST_OFF_PX)) & (moved > 0.5 * d)
     for i, bad in zip(rows, off | ~whole, strict=True):
         status[i] = HIDDEN if bad else SEEN
+
+
+def _smeared(chosen: Sequence[Region | None], status: Sequence[str], time: Floats) -> NDArray[np.bool_]:
+    """Tell which whole but ill-shaped mouths move fast."""
+    found = np.zeros(len(chosen), bool)
+    rows = [i for i, r in enumerate(chosen) if r is not None and status[i] in (SEEN, HIDDEN)]
+    if not rows:
+        return found
+    way = _speed(np.array([chosen[i].centre_px for i in rows]), time[rows])  # type: ignore[union-attr]
+    for i, px in zip(rows, way, strict=True):
+        region = chosen[i]
+        found[i] = status[i] == HIDDEN and px > _FAST_PX and region is not None and region.whole
+    return found
 
 
 def _join_hidden(status: list[str]) -> None:

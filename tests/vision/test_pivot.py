@@ -45,7 +45,7 @@ def test_the_centre_is_good_to_a_tenth_of_a_pixel_with_a_hint_12_px_off(rings, r
         centre = np.array([80.0, 60.0]) + rng.uniform(-5, 5, 2)
         away = rng.uniform(0, 2 * np.pi)
         found = find_marker(
-            _scene(centre, rings, seed, relief), centre + 12 * np.array([np.cos(away), np.sin(away)]), 10.0
+            _scene(centre, rings, seed, relief), centre + 12 * np.array([np.cos(away), np.sin(away)]), 100.0 * np.eye(2)
         )
         off = found.centre_px - centre
         assert np.hypot(*off) < 0.1
@@ -54,7 +54,7 @@ def test_the_centre_is_good_to_a_tenth_of_a_pixel_with_a_hint_12_px_off(rings, r
 
 
 def test_no_marker_is_found_where_there_is_none():
-    assert find_marker(_scene((80, 60), []), np.array([80.0, 60.0]), 10.0) is None
+    assert find_marker(_scene((80, 60), []), np.array([80.0, 60.0]), 100.0 * np.eye(2)) is None
 
 
 def _path(centre):

@@ -1,0 +1,333 @@
+"""Which parts of the picture are scenery, and how they move where the camera does not stand still.
+
+Small windows with edges are followed from the first of a few frames into the others (Lucas & Kanade 1981, through a
+pyramid of ever smaller pictures). The scenery is the group of windows that keep their places among one another in all
+frames: one shift and one roll a frame carry them all. A nodding head keeps its shape too; of such groups the one that
+turns less is the scenery.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.vision.noise import pixel_noise
+
+Image = NDArray[Any]
+"""Bytes, but cv2's type hints do not know it."""
+Floats = NDArray[np.float64]
+
+SIDE_PX = 20
+"""Of a window."""
+_HALVINGS = 3
+"""Of the picture: shifts of some twenty pixels are found."""
+_LOCAL_PX = 15
+"""Brightness is told from its mean over a square of this side, so that flicker moves nothing."""
+_LEAST_SLOPE = 1.0
+"""Root mean square slope of a window's brightness over the pixels' noise, px⁻¹: its place is good to 1/20 px."""
+_EDGE = 0.05
+"""Ratio of a window's lesser to its greater information below which it is a straight edge and tells only across."""
+_GATE_PX = 0.3
+"""Distance from where the motion has it at which a window is half lost; Lucas and Kanade err by a tenth of that."""
+_FAR = 9.0
+"""Squared gates from which on farther off is no worse."""
+_SEEN = 0.7
+"""Least share of the frames in which a window must go along: something may hide it in the others."""
+_ENOUGH = 12
+"""Windows; where so many go along in more of the frames, so must all."""
+_FEWEST = 5
+"""Windows that make scenery."""
+_SHARE = 0.25
+"""Of the weight of the group that keeps its shape best, enough for one that turns less."""
+_ALIKE, _ALIKE_ROLL = 1.5, 0.001
+"""Groups turn alike whose rolls scatter by this ratio, or by so little, rad."""
+_CELL_PX = 80
+"""The best corner of every such square is tried as a seed."""
+_BASELINE_PX = 60.0
+"""Least distance of two windows that tell a roll."""
+_STRETCH_PX = 0.5
+"""Change of the distance of two windows that are not of one body."""
+_MOST_ROLL = np.radians(4.0)
+"""From the first frame to any other; a stand that sags more is a mechanism."""
+_WINDOW_PX, _ROLL = 0.1, 0.01
+"""Standard deviations of a window's place, px, and of the roll before any is seen, rad."""
+_STILL_PX = 0.05
+"""Root mean square displacement up to which a camera stands still."""
+_SURE = 3.0
+"""Standard uncertainties by which it must be more."""
+_PICTURE_PX = 300.0
+"""From the origin to where a centre of roll is looked for."""
+_ROUNDS = 8
+_HALF = 0.5
+"""Of what the windows tell in any direction, to be seen in a frame: less may agree by chance."""
+_STEPS = 3
+"""Of weighted least squares, from the best guess."""
+
+
+@dataclass(frozen=True)
+class Scenery:
+    """The windows that stand still but for the camera, and how it carries them."""
+
+    centres_px: Floats
+    """(windows, 2) in the first frame, px."""
+    metric: Floats
+    """(windows, 2, 2) with which a distance counts: 1 across the main edge, less or nothing along it."""
+    information: Floats
+    """(windows,) mean square slope of brightness across the main edge, (grey levels/px)²."""
+    origin_px: Floats
+    """(2,) about which the picture is taken to roll, px."""
+    shifts_px: Floats
+    """(frames, 2) of the origin, from the first frame, px; NaN where most of the scenery is hidden."""
+    rolls: Floats
+    """(frames,) counter-clockwise as seen, rad; NaN likewise."""
+    scatter_px: float
+    """Standard deviation of the windows about their places, px."""
+
+    @property
+    def shakes(self) -> bool:
+        """Whether no point of the picture stays where it is: a mere roll about one does not count. In doubt, not."""
+        seen = np.isfinite(self.rolls)
+        shifts, rolls = self.shifts_px[seen], self.rolls[seen]
+        corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+        none, x, y = carried(corners, np.zeros((1, 2)), rolls)
+        lever = np.stack([x - none, y - none], axis=-1)
+        lever, shifts = lever - lever.mean(axis=0), shifts - shifts.mean(axis=0)
+        ridge = (_STILL_PX / _PICTURE_PX) ** 2 * len(shifts) * np.eye(2)
+        centre = np.linalg.solve(np.einsum("kai,kaj->ij", lever, lever) + ridge, -np.einsum("kai,ka->i", lever, shifts))
+        rms = np.sqrt(((shifts + lever @ centre) ** 2).mean(axis=0))
+        place = self.scatter_px**2 * np.linalg.inv(self.metric.sum(axis=0))
+        return bool((rms > _STILL_PX + _SURE * np.sqrt(np.diag(place))).any())
+
+
+def find_scenery(pictures: Sequence[Image]) -> Scenery | None:
+    """Find what keeps its shape and turns least.
+
+    Parameters
+    ----------
+    pictures : sequence of ndarray
+        (h, w) brightness of frames from all over a clip.
+
+    Returns
+    -------
+    Scenery or None
+        ``None`` where too little goes together.
+    """
+    levelled = [level(picture) for picture in pictures]
+    centres, tensor = _windows(pictures[0], pixel_noise(levelled))
+    if len(centres) < _FEWEST or len(pictures) < 2:
+        return None
+    moved = np.stack([follow(levelled[0], one, centres) for one in levelled], axis=1)
+    metric, information = _metric(tensor)
+    seeds = _seeds(centres, tensor)
+    still = _best((moved[seed] for seed in seeds), moved, metric)
+    turned = _best(_motions_of_two(centres, moved, seeds), moved, metric)
+    origin, rolls, off = _quietest([_grow(centres, moved, metric, one) for one in (still, turned) if one is not None])
+    share = (off < 1.0).mean(axis=1)
+    group = share >= max(_SEEN, float(np.sort(share)[-min(_ENOUGH, len(share))]))
+    if group.sum() < _FEWEST:
+        return None
+    close = off[group][off[group] < 1.0]
+    scatter = _GATE_PX * float(np.sqrt(close.mean()))
+    found = Scenery(centres[group], metric[group], information[group], origin, np.empty((0, 2)), rolls, scatter)
+    each = [locate(found, moved[group, k]) for k in range(len(pictures))]
+    found = replace(found, shifts_px=np.array([shift for shift, _ in each]), rolls=np.array([roll for _, roll in each]))
+    seen = np.isfinite(found.rolls)
+    return found if seen.mean() > _SEEN and np.abs(found.rolls[seen]).max() < _MOST_ROLL else None
+
+
+def locate(scenery: Scenery, moved: Floats) -> tuple[Floats, float]:
+    """Find one frame's motion from its windows' displacements, most of which are right.
+
+    Parameters
+    ----------
+    scenery : Scenery
+        Whose rolls are those to be expected.
+    moved : ndarray
+        (windows, 2) from `follow`, px.
+
+    Returns
+    -------
+    tuple
+        Shift (2,) of the origin, px, and roll, rad; NaN where not enough of the windows go along with any.
+    """
+    arms, moved = scenery.centres_px - scenery.origin_px, moved[:, None]
+    low, high = float(np.nanmin(scenery.rolls)), float(np.nanmax(scenery.rolls))
+    step = _GATE_PX / float(np.hypot(*arms.T).max())
+    tried = np.repeat(np.linspace(low, high, 1 + int((high - low) / step)), len(arms))
+    shifts = np.tile(moved[:, 0], (len(tried) // len(arms), 1)) - np.concatenate(
+        [carried(arms, np.zeros((1, 2)), tried[k : k + 1])[:, 0] for k in range(0, len(tried), len(arms))]
+    )
+    off = squared_gates(moved - carried(arms, shifts, tried), scenery.metric)
+    best = int(np.exp(-np.minimum(off, _FAR)).sum(axis=0).argmax())
+    shift, roll = shifts[best : best + 1], tried[best : best + 1]
+    for _ in range(_STEPS):
+        off = squared_gates(moved - carried(arms, shift, roll), scenery.metric)
+        shift, roll = fit_motion(arms, moved, scenery.metric, np.exp(-np.minimum(off, _FAR)), shift, roll)
+    off = squared_gates(moved - carried(arms, shift, roll), scenery.metric)
+    along = (off[:, 0] < 1.0)[:, None, None] * scenery.metric
+    if np.linalg.eigvals(np.linalg.solve(scenery.metric.sum(axis=0), along.sum(axis=0))).min() < _HALF:
+        return np.full(2, np.nan), float("nan")
+    return shift[0], float(roll[0])
+
+
+def level(picture: Image) -> Image:
+    """Tell brightness (h, w) from its local mean."""
+    mean = cv2.boxFilter(picture, -1, (_LOCAL_PX, _LOCAL_PX))
+    return cv2.addWeighted(picture, 1.0, mean, -1.0, 128.0)
+
+
+def follow(first: Image, other: Image, centres_px: Floats) -> Floats:
+    """Find by how much windows of a levelled picture are displaced in another one.
+
+    Parameters
+    ----------
+    first, other : ndarray
+        (h, w) from `level`.
+    centres_px : ndarray
+        (n, 2) of the windows in the first picture, px.
+
+    Returns
+    -------
+    ndarray
+        (n, 2) px, good to some hundredths; anything where the window is not to be seen.
+    """
+    start = centres_px.astype(np.float32)[:, None]
+    found, _, _ = cv2.calcOpticalFlowPyrLK(
+        first,
+        other,
+        start,
+        None,
+        winSize=(SIDE_PX + 1, SIDE_PX + 1),
+        maxLevel=_HALVINGS,
+        criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 15, 0.01),
+        minEigThreshold=1e-6,
+    )
+    return np.asarray((found - start)[:, 0], dtype=float)
+
+
+def carried(arms_px: Floats, shifts_px: Floats, rolls: Floats) -> Floats:
+    """Displace points (n, 2), given from the origin, by shifts (m, 2) and rolls (m,): (n, m, 2) px."""
+    x, y = arms_px[:, :1], arms_px[:, 1:]
+    c, s = np.cos(rolls) - 1.0, np.sin(rolls)
+    return np.stack([x * c + y * s, y * c - x * s], axis=-1) + shifts_px
+
+
+def fit_motion(
+    arms_px: Floats, moved: Floats, metric: Floats, weight: Floats, shifts_px: Floats, rolls: Floats
+) -> tuple[Floats, Floats]:
+    """Improve shifts and rolls by one weighted step of Gauss and Newton.
+
+    Parameters
+    ----------
+    arms_px : ndarray
+        (n, 2) windows from the origin, px.
+    moved : ndarray
+        (n, m, 2) their displacements in each frame, px.
+    metric : ndarray
+        (n, 2, 2) as in `Scenery`.
+    weight : ndarray
+        (n, m).
+    shifts_px, rolls : ndarray
+        (m, 2) px and (m,) rad so far.
+
+    Returns
+    -------
+    tuple of ndarray
+        Both, improved.
+    """
+    rest = moved - carried(arms_px, shifts_px, rolls)
+    by_roll = np.stack([arms_px[:, 1], -arms_px[:, 0]], axis=-1)
+    J = np.concatenate([np.broadcast_to(np.eye(2), (len(arms_px), 2, 2)), by_roll[..., None]], axis=-1)
+    MJ = metric @ J / _WINDOW_PX**2
+    normal = np.einsum("nk,nai,naj->kij", weight, J, MJ) + np.diag([1e-6, 1e-6, 1.0 / _ROLL**2])
+    right = np.einsum("nk,nka,nai->ki", weight, rest, MJ)
+    right[:, 2] -= rolls / _ROLL**2
+    step = np.linalg.solve(normal, right[..., None])[..., 0]
+    return shifts_px + step[:, :2], rolls + step[:, 2]
+
+
+def squared_gates(rest: Floats, metric: Floats) -> Floats:
+    """Square distances (n, m, 2) across edges, in gates."""
+    return np.einsum("nka,nab,nkb->nk", rest, metric, rest) / _GATE_PX**2
+
+
+def _windows(picture: Image, noise: float) -> tuple[Floats, Floats]:
+    """Cut the picture into squares; return those with edges, (n, 2), and their structure tensors, (n, 2, 2)."""
+    smooth = cv2.GaussianBlur(picture, (0, 0), 0.7)
+    gx, gy = (cv2.Scharr(smooth, cv2.CV_32F, *axis, scale=1 / 32) for axis in ((1, 0), (0, 1)))
+    half = SIDE_PX // 2
+    inner = np.s_[SIDE_PX:-half:SIDE_PX, SIDE_PX:-half:SIDE_PX]
+    xx, xy, yy = (cv2.boxFilter(part, -1, (SIDE_PX, SIDE_PX))[inner] for part in (gx * gx, gx * gy, gy * gy))
+    tensor = np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-2).astype(float)
+    row, column = np.nonzero(np.linalg.eigvalsh(tensor)[..., 1] > (_LEAST_SLOPE * max(noise, 1.0)) ** 2)
+    return SIDE_PX * (np.column_stack([column, row]) + 1.0), tensor[row, column]
+
+
+def _metric(tensor: Floats) -> tuple[Floats, Floats]:
+    """Scale structure tensors to 1 across the main edge, which is returned too; straight edges say nothing along."""
+    values, vectors = np.linalg.eigh(tensor)
+    most = values[:, 1]
+    along = np.where(values[:, 0] < _EDGE * most, 0.0, values[:, 0] / most)
+    scale = np.stack([along, np.ones(len(most))], axis=-1)
+    return np.einsum("nai,ni,nbi->nab", vectors, scale, vectors), most
+
+
+def _seeds(centres: Floats, tensor: Floats) -> NDArray[np.intp]:
+    """Pick the best corner of every part of the picture: they are known in both directions."""
+    corner = np.linalg.eigvalsh(tensor)[:, 0]
+    order = np.argsort(-corner)
+    _, first = np.unique((centres[order] // _CELL_PX).astype(int), axis=0, return_index=True)
+    return order[first]
+
+
+def _motions_of_two(centres: Floats, moved: Floats, seeds: NDArray[np.intp]) -> Iterator[Floats]:
+    """Yield the motion of the picture with every two seeds that keep their distance: (windows, frames, 2) px."""
+    for a, b in itertools.combinations(seeds, 2):
+        apart = centres[b] - centres[a]
+        now = apart + moved[b] - moved[a]
+        length = float(np.hypot(*apart))
+        if length < _BASELINE_PX or np.mean(np.abs(np.hypot(*now.T) - length) < _STRETCH_PX) < _SEEN:
+            continue
+        rolls = np.arctan2(apart[1] * now[:, 0] - apart[0] * now[:, 1], now @ apart)
+        if np.quantile(np.abs(rolls), _SEEN) < _MOST_ROLL:
+            yield carried(centres - (centres[a] + centres[b]) / 2.0, (moved[a] + moved[b]) / 2.0, rolls)
+
+
+def _best(motions: Iterable[Floats], moved: Floats, metric: Floats) -> Floats | None:
+    return max(motions, key=lambda motion: _along(squared_gates(moved - motion, metric)).sum(), default=None)
+
+
+def _quietest(groups: list[tuple[Floats, Floats, Floats]]) -> tuple[Floats, Floats, Floats]:
+    """Choose of the groups that weigh enough the one that turns least; of those that turn alike the heaviest."""
+    weights = [_along(off).sum() for _, _, off in groups]
+    heavy = [(w, one) for w, one in zip(weights, groups, strict=True) if w >= _SHARE * max(weights)]
+    least = min(float(np.std(rolls)) for _, (_, rolls, _) in heavy)
+    quiet = [(w, one) for w, one in heavy if np.std(one[1]) <= _ALIKE * least + _ALIKE_ROLL]
+    return max(quiet, key=lambda pair: pair[0])[1]
+
+
+def _along(off: Floats) -> Floats:
+    """Tell from its squared gates how well each window goes along: (windows,) between 0 and 1."""
+    return np.exp(-np.minimum(off, _FAR).mean(axis=1))
+
+
+def _grow(centres: Floats, moved: Floats, metric: Floats, start: Floats) -> tuple[Floats, Floats, Floats]:
+    """Let all windows that go along tell the motion; return origin, rolls, and every window's squared gates."""
+    start = np.broadcast_to(start, moved.shape)
+    off = squared_gates(moved - start, metric)
+    weight = _along(off)
+    origin = weight @ centres / weight.sum()
+    arms = centres - origin
+    shifts, rolls = np.einsum("n,nka->ka", weight, start) / weight.sum(), np.zeros(moved.shape[1])
+    for _ in range(_ROUNDS):
+        each = weight[:, None] * np.exp(-np.minimum(off, _FAR))
+        shifts, rolls = fit_motion(arms, moved, metric, each, shifts, rolls)
+        off = squared_gates(moved - carried(arms, shifts, rolls), metric)
+        weight = _along(off)
+    return origin, rolls, off
