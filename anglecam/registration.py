@@ -27,6 +27,10 @@ _LEARNT = 120
 """Frames from which the head is learnt, at most."""
 _BYTES = 300_000_000
 """Memory for them."""
+_LEAST_LEARNT = 30
+"""And at least, as long as there are so many."""
+_PER_POSE = 2
+"""Frames of one pose, unless there are too few poses."""
 _POSE = 0.001
 """Turns closer than this are one pose, rad: a fifth of a pixel at the rim of an ordinary head."""
 _STACK = 15
@@ -181,7 +185,8 @@ def _spread_out(turn: Floats, known: NDArray[np.intp], most: int) -> set[int]:
     first = np.flatnonzero(np.diff(pose[by_pose], prepend=pose.min() - 1))
     rank = np.empty(len(mixed), np.int64)
     rank[by_pose] = np.arange(len(mixed)) - np.repeat(first, np.diff(first, append=len(mixed)))
-    return set(mixed[np.argsort(rank, kind="stable")[:most]].tolist())
+    enough = max(int((rank < _PER_POSE).sum()), _LEAST_LEARNT)
+    return set(mixed[np.argsort(rank, kind="stable")[: min(most, enough)]].tolist())
 
 
 def _gathered(found: list[Turn], rows: Floats, look: Look) -> Registered:

@@ -29,6 +29,8 @@ POWERS = 3
 """Of the angle in the gain."""
 _SMOOTH = 1e-2
 """Weight of the spline's second differences against one observation: it only decides where there is none."""
+_RIDGE = 1e-6
+"""Keeps the equations regular where nothing was seen at all."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,7 @@ def learn_patch(
     start = np.zeros((POWERS, 3)) if gains is None else gains
     band, right = _normal_equations(views.offsets, views.values, views.starts, turns, pivot, corner, side, n, start)
     lower = _as_lower_band(band, n) + _SMOOTH * _roughness(n)
+    lower[0] += _RIDGE
     factor = cholesky_banded(lower, lower=True, overwrite_ab=True)
     coefficients = cho_solve_banded((factor, True), right.T).T.reshape(-1, n, n)
     normal, gradient = _gain_equations(

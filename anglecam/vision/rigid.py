@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from itertools import combinations
 
 import cv2
 import numpy as np
@@ -27,6 +27,8 @@ Floats = NDArray[np.float64]
 
 LOST, HIDDEN, UNDECODABLE = "no_mouth", "occluded", "undecodable"
 
+_LEARNT = 16
+"""Samples from which the head is learnt, at most: they are compared in pairs."""
 _FEATURES = 1000
 _FEATURE_CONTRAST = 0.015
 """SIFT's own threshold is 0.04; skin has little contrast."""
@@ -43,18 +45,40 @@ _FEWEST = 10
 _LEAST_TURN = np.radians(1.0)
 _KEY_EVERY = np.radians(8.0)
 _MOST_KEYS = 15
+_BLURRED_KEY_EVERY = np.radians(25.0)
+_SHARP_SHARE = 0.9
+"""Of the sharpest frame's fine detail; with less a frame is blurred by its motion, and a key only where it must be."""
+_ROUNDS = 20
 _CORNERS = 400
-_APART_PX = 7.0
+_APART_PX = 6.0
+_CORNER_SHARE = 0.002
+"""Of the best corner's strength; what is too faint to be followed back again is left out later."""
 _MARGIN_PX = 32
 """Around a key's points, in which they are sought."""
+_RETURN_PX = 0.5
+"""A point that is followed there and back comes home to within this."""
 _AGREE_SHARE = 0.3
 """Of a key's points that must be seen, as one body, for a frame to be measured."""
 _GROUPS = 8
+_TRUST = 4.0
+"""Degrees of freedom that the whole clip's scatter between groups has against a single frame's."""
 _TRIALS = 200
 """Of two points each."""
+_FLOOR_PX = 0.02
+"""No point is followed better, even in a key itself."""
+_SHARED_PX = 0.025
+"""Standard uncertainty of a key's place that no number of points improves: light, interpolation."""
+_BLUR_SHARE = 0.025
+"""Standard uncertainty for each radian that the head turns from frame to frame. Levels are no measure of light (gamma),
+so a blurred edge seems to move towards its dark side, and a dark back of a head and a bright face move alike: measured
+0.03 with gamma 2.2 and a shutter open for a third of the time."""
+_ALIKE = 5.0
+"""Neighbours among the 30 turns at which the centre of rotation is told: light, codec and blur err alike in them."""
 _OUTLYING = 4.0
 """Times the usual distance from a fit beyond which a point is left out."""
-_LK = {"winSize": (17, 17), "maxLevel": 3}
+_LEVELS = 3
+_WINDOW_PX = 17
+"""Of Lucas and Kanade."""
 _AGAIN = np.radians(1.0)
 """A patch turned by more than this is not followed exactly: turn the frame back by what was found, and repeat."""
 _WITNESSES = 5
@@ -84,7 +108,9 @@ class RigidMotion:
 @dataclass(frozen=True)
 class _Features:
     points: Floats
-    descriptors: NDArray[Any]
+    """(k, 2) px."""
+    descriptors: NDArray[np.float32]
+    """Of unit length."""
 
 
 @dataclass(frozen=True)
@@ -137,17 +163,17 @@ def follow_head(frames: Iterator[Frame], samples: Sequence[Image], noise: float)
     learnt = _learn([cv2.cvtColor(s, cv2.COLOR_BGR2GRAY) for s in samples], noise)
     if isinstance(learnt, str):
         return learnt
-    head, keys = learnt
+    head, keys, spread = learnt
     poses, information, grouped, status = [], [], [], []
     before: list[tuple[float, Floats]] = []
-    middle = np.mean(np.concatenate([_move(np.linalg.inv(k.pose), k.points) for k in keys]), axis=0)
+    middle = np.concatenate([_move(_back(k.pose), k.points) for k in keys]).mean(axis=0)
     for frame in frames:
         seen, key, partly = None, keys[0], False
         if frame.image is not None:
             grey = cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY)
             for guess in _guesses(before, frame.time, head, grey):
-                key = min(keys, key=lambda k: abs(_turn(guess @ np.linalg.inv(k.pose))))
-                seen = _hold_against(key, grey, guess @ np.linalg.inv(key.pose))
+                key = min(keys, key=lambda k: abs(_turn(guess @ _back(k.pose))))
+                seen = _hold_against(key, grey, guess @ _back(key.pose))
                 if seen is not None and seen.inlier.sum() >= _AGREE_SHARE * len(key.points):
                     break
                 partly = partly or seen is not None
@@ -161,19 +187,19 @@ def follow_head(frames: Iterator[Frame], samples: Sequence[Image], noise: float)
             continue
         pose = seen.motion @ key.pose
         before = [*before[-1:], (frame.time, pose)]
-        rigid = _move(np.linalg.inv(key.pose), key.points[seen.inlier])
+        rigid = _move(_back(key.pose), key.points[seen.inlier])
         poses.append(pose)
         information.append(_information(pose, rigid - middle) / seen.variance)
         grouped.append(seen.grouped)
         status.append(OK)
-    return _about_one_centre(np.array(poses), np.array(information), np.array(grouped), tuple(status), middle)
+    return _about_one_centre(np.array(poses), np.array(information), np.array(grouped), tuple(status), middle, spread)
 
 
 def _guesses(before: list[tuple[float, Floats]], time: float, head: _Features, grey: Image) -> Iterator[Floats]:
     """Yield poses to start from: the motion goes on, it pauses, the head is found anew."""
     if len(before) == 2:
         (t0, first), (t1, last) = before
-        step = last @ np.linalg.inv(first)
+        step = last @ _back(first)
         yield np.linalg.matrix_power(step, max(1, round((time - t1) / (t1 - t0)))) @ last
     if before:
         yield before[-1][1]
@@ -184,15 +210,16 @@ def _guesses(before: list[tuple[float, Floats]], time: float, head: _Features, g
         yield found[0]
 
 
-def _learn(samples: Sequence[Image], noise: float) -> tuple[_Features, list[_Key]] | str:
+def _learn(samples: Sequence[Image], noise: float) -> tuple[_Features, list[_Key], float] | str:
     """Find what turns, and frames to hold the others against."""
     images = _unlike(samples, noise)
+    images = [images[i] for i in np.unique(np.linspace(0, len(images) - 1, _LEARNT).round().astype(int))]
     if len(images) < 2:
         return "nothing moves"
     features = [_describe(image) for image in images]
     turning = [np.zeros(len(f.points)) for f in features]
     matched = [np.zeros(len(f.points)) for f in features]
-    for i, j in ((i, j) for i in range(len(images)) for j in range(i)):
+    for i, j in combinations(range(len(images)), 2):
         pairs = _match(features[i], features[j])
         inlier = _turning_body(features[i].points[pairs[:, 0]], features[j].points[pairs[:, 1]])
         if inlier is not None:
@@ -205,16 +232,16 @@ def _learn(samples: Sequence[Image], noise: float) -> tuple[_Features, list[_Key
     if of_head.sum() < _FEWEST:
         return "nothing rigid is seen to turn"
     head = _Features(features[reference].points[of_head], features[reference].descriptors[of_head])
-    poses: dict[int, tuple[Floats, Floats]] = {}
+    poses: dict[int, Floats] = {}
     for i, there in enumerate(features):
         pairs = _match(head, there)
         found = _consensus(head.points[pairs[:, 0]], there.points[pairs[:, 1]], _COARSE_PX)
         if found is not None:
-            poses[i] = found[0], there.points[pairs[found[1], 1]]
-    if np.ptp([_turn(pose) for pose, _ in poses.values()]) < _LEAST_TURN:
+            poses[i] = found[0]
+    if np.ptp([_turn(pose) for pose in poses.values()]) < _LEAST_TURN:
         return "nothing rigid is seen to turn"
-    keys = _choose_keys(images, poses, reference)
-    return (head, keys) if keys else "too little of what turns can be followed"
+    keys, spread = _choose_keys(images, poses, head.points)
+    return (head, keys, spread) if keys else "too little of what turns can be followed"
 
 
 def _unlike(samples: Sequence[Image], noise: float) -> list[Image]:
@@ -229,41 +256,73 @@ def _unlike(samples: Sequence[Image], noise: float) -> list[Image]:
     return kept
 
 
-def _choose_keys(images: Sequence[Image], poses: dict[int, tuple[Floats, Floats]], reference: int) -> list[_Key]:
-    """Keep the sharpest frames at turns that differ, with the corners that move with the head in other samples."""
-    turns = {i: _turn(pose) for i, (pose, _) in poses.items()}
+def _choose_keys(images: Sequence[Image], poses: dict[int, Floats], head: Floats) -> tuple[list[_Key], float]:
+    """Keep sharp frames at turns that differ, with the corners that move with the head in other samples."""
+    turns = {i: _turn(pose) for i, pose in poses.items()}
+    hulls = {i: _hull(images[i], _move(pose, head)) for i, pose in poses.items()}
+    sharp = {i: _sharpness(images[i], hulls[i]) for i in poses}
+    enough = _SHARP_SHARE * max(sharp.values())
     apart = max(_LEAST_TURN, np.ptp(list(turns.values())) / 6)
     keys: dict[int, _Key] = {}
-    for i in sorted(poses, key=lambda i: (i != reference, -len(poses[i][1]))):
-        if len(keys) == _MOST_KEYS or any(abs(turns[i] - turns[k]) < _KEY_EVERY for k in keys):
+    for i in sorted(poses, key=lambda i: -sharp[i]):
+        gap = _KEY_EVERY if sharp[i] >= enough else _BLURRED_KEY_EVERY
+        if len(keys) == _MOST_KEYS or any(abs(turns[i] - turns[k]) < gap for k in keys):
             continue
-        pose, on_head = poses[i]
-        key = _key(images[i], pose, on_head)
-        witnesses = [k for k in turns if abs(turns[k] - turns[i]) >= apart]
-        spread = np.unique(np.linspace(0, len(witnesses) - 1, _WITNESSES).round().astype(int)) if witnesses else []
+        key = _key(images[i], poses[i], hulls[i])
+        witnesses = sorted((k for k in turns if abs(turns[k] - turns[i]) >= apart), key=lambda k: turns[k])
         votes, asked = np.zeros(len(key.points)), 0
-        for k in sorted(witnesses, key=lambda k: turns[k])[:: max(1, len(witnesses) // max(1, len(spread)))]:
-            seen = _hold_against(key, images[k], poses[k][0] @ np.linalg.inv(pose))
+        for k in witnesses[:: max(1, len(witnesses) // _WITNESSES)]:
+            seen = _hold_against(key, images[k], poses[k] @ _back(poses[i]))
             if seen is not None:
                 votes, asked = votes + seen.inlier, asked + 1
         kept = votes > 0.5 * asked
-        if kept.sum() < _FEWEST:
-            continue
-        key = replace(key, points=key.points[kept], group=_groups(key.points[kept]))
-        if reference in keys:
-            # every key's place is measured from the reference itself, not along a chain
-            seen = _hold_against(keys[reference], images[i], pose)
-            key = key if seen is None else replace(key, pose=seen.motion)
-        keys[i] = key
-    return list(keys.values())
+        if kept.sum() >= _FEWEST:
+            keys[i] = replace(key, points=key.points[kept], group=_groups(key.points[kept]))
+    return _hold_together(list(keys.values()), [images[i] for i in keys])
 
 
-def _key(image: Image, pose: Floats, on_head: Floats) -> _Key:
+def _hull(image: Image, points: Floats) -> Image:
     hull = np.zeros(image.shape, np.uint8)
-    cv2.fillConvexPoly(hull, cv2.convexHull(on_head.astype(np.float32)).round().astype(np.int32), 255)
-    hull = cv2.dilate(hull, np.ones((_MARGIN_PX, _MARGIN_PX), np.uint8))
-    points = cv2.goodFeaturesToTrack(image, _CORNERS, 0.005, _APART_PX, mask=hull, blockSize=5)
-    points = np.zeros((0, 2)) if points is None else points[:, 0].astype(float)
+    cv2.fillConvexPoly(hull, cv2.convexHull(points.astype(np.float32)).round().astype(np.int32), 255)
+    return cv2.dilate(hull, np.ones((_MARGIN_PX, _MARGIN_PX), np.uint8))
+
+
+def _sharpness(image: Image, hull: Image) -> float:
+    return float(cv2.Laplacian(cv2.GaussianBlur(image, (0, 0), 1.5), cv2.CV_32F)[hull > 0].std())
+
+
+def _hold_together(keys: list[_Key], images: Sequence[Image]) -> tuple[list[_Key], float]:
+    """Measure every key against every other, and give it the mean of what they say of its pose.
+
+    Returns
+    -------
+    keys : list
+        With better poses.
+    spread : float
+        Standard deviation of one key's word on the turn of another, rad.
+    """
+    pairs: dict[tuple[int, int], Floats] = {}
+    for i, key in enumerate(keys):
+        for j, other in enumerate(keys):
+            seen = None if i == j else _hold_against(key, images[j], other.pose @ _back(key.pose))
+            if seen is not None:
+                pairs[i, j] = seen.motion
+    poses, said = [key.pose for key in keys], np.zeros(0)
+    for _ in range(_ROUNDS if pairs else 0):
+        off = {(i, j): motion @ poses[i] @ _back(poses[j]) for (i, j), motion in pairs.items()}
+        said = np.array([_turn(o) for o in off.values()])
+        for j in range(1, len(keys)):
+            about = keys[j].points
+            votes = [_move(o, about) for (_, of), o in off.items() if of == j]
+            if votes:
+                poses[j] = _rigid(about, np.mean([about, *votes], axis=0)) @ poses[j]
+    spread = float(np.sqrt(np.mean(said**2))) if len(said) else 0.0
+    return [replace(key, pose=pose) for key, pose in zip(keys, poses, strict=True)], spread
+
+
+def _key(image: Image, pose: Floats, hull: Image) -> _Key:
+    corners = cv2.goodFeaturesToTrack(image, _CORNERS, _CORNER_SHARE, _APART_PX, mask=hull, blockSize=5)
+    points = np.zeros((0, 2)) if corners is None else np.array(corners, dtype=float)[:, 0]
     if not len(points):
         return _Key(pose, np.zeros(2), image[:0], points, np.zeros(0, np.intp))
     low = np.maximum(np.floor(points.min(axis=0)).astype(int) - _MARGIN_PX, 0)
@@ -282,7 +341,7 @@ def _hold_against(key: _Key, grey: Image, guess: Floats) -> _Seen | None:
     """
     if len(key.points) < _FEWEST:
         return None
-    at = (key.points - key.corner).astype(np.float32)[:, None]
+    at = (key.points - key.corner).astype(np.float32)
     seen = None
     for _ in range(3):
         from_part = guess @ np.array([[1.0, 0.0, key.corner[0]], [0.0, 1.0, key.corner[1]], [0.0, 0.0, 1.0]])
@@ -290,12 +349,12 @@ def _hold_against(key: _Key, grey: Image, guess: Floats) -> _Seen | None:
         turned = cv2.warpAffine(
             grey, from_part[:2], key.image.shape[::-1], flags=flags, borderMode=cv2.BORDER_REPLICATE
         )
-        there, forth, _ = cv2.calcOpticalFlowPyrLK(key.image, turned, at, None, **_LK)
-        back, home, _ = cv2.calcOpticalFlowPyrLK(turned, key.image, there, None, **_LK)
-        found = _move(from_part, there[:, 0].astype(float))
+        there, forth = _follow(key.image, turned, at)
+        back, home = _follow(turned, key.image, there)
+        found = _move(from_part, there.astype(float))
         height, width = grey.shape
         inside = ((found >= 0) & (found <= [width - 1, height - 1])).all(axis=1)
-        followed = (forth[:, 0] == 1) & (home[:, 0] == 1) & (np.hypot(*(back - at)[:, 0].T) < 0.5) & inside
+        followed = forth & home & inside & (np.hypot(*(back - at).T) < _RETURN_PX)
         body = _consensus(key.points[followed], found[followed], _FINE_PX)
         if body is None:
             return None
@@ -303,16 +362,24 @@ def _hold_against(key: _Key, grey: Image, guess: Floats) -> _Seen | None:
         inlier = np.zeros(len(key.points), bool)
         inlier[np.flatnonzero(followed)[among]] = True
         seen = _Seen(motion, inlier, *_scatter(motion, key.points[inlier], found[inlier], key.group[inlier]))
-        if abs(_turn(motion @ np.linalg.inv(guess))) < _AGAIN:
+        if abs(_turn(motion @ _back(guess))) < _AGAIN:
             break
         guess = motion
     return seen
 
 
+def _follow(here: Image, there: Image, points: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    window = (_WINDOW_PX, _WINDOW_PX)
+    found, status, _ = cv2.calcOpticalFlowPyrLK(  # type: ignore[call-overload]
+        here, there, points[:, None], None, winSize=window, maxLevel=_LEVELS
+    )
+    return found[:, 0], status[:, 0] == 1
+
+
 def _scatter(motion: Floats, start: Floats, end: Floats, group: NDArray[np.intp]) -> tuple[float, float]:
     """Return the variance of a point's place, and how much more than that groups of neighbours scatter in turn."""
     off = end - _move(motion, start)
-    variance = float((off**2).sum() / (2 * len(off) - 3))
+    variance = max(float((off**2).sum() / (2 * len(off) - 3)), _FLOOR_PX**2)
     arm = end - end.mean(axis=0)
     pull = off[:, 0] * arm[:, 1] - off[:, 1] * arm[:, 0]
     by_group = np.bincount(group, pull)
@@ -320,7 +387,7 @@ def _scatter(motion: Floats, start: Floats, end: Floats, group: NDArray[np.intp]
 
 
 def _about_one_centre(
-    poses: Floats, information: Floats, grouped: Floats, status: tuple[str, ...], middle: Floats
+    poses: Floats, information: Floats, grouped: Floats, status: tuple[str, ...], middle: Floats, spread: float
 ) -> RigidMotion | str:
     """Fit a centre of rotation that all frames share, and find the turns again about it.
 
@@ -333,7 +400,10 @@ def _about_one_centre(
     turn = np.arctan2(poses[:, 0, 1], poses[:, 0, 0])
     turn[ok] = np.unwrap(turn[ok])
     shift = np.einsum("nij,j->ni", poses[:, :2, :2], middle) + poses[:, :2, 2] - middle
-    covariance = np.linalg.inv(information[ok]) * max(1.0, float(np.median(grouped[ok])))
+    # a frame that motion blurs scatters more than others, as far as so few groups can tell
+    usual = max(1.0, float(np.median(grouped[ok])))
+    more = (_TRUST * usual + _GROUPS * grouped[ok]) / (_TRUST + _GROUPS)
+    covariance = np.linalg.inv(information[ok]) * np.maximum(more, 1.0)[:, None, None]
     place, arm, arm_covariance, wander = _fit_centre(turn[ok], shift[ok], covariance[:, 1:, 1:])
     covariance[:, 1:, 1:] += wander**2 * np.eye(2)
     weight = np.linalg.inv(covariance)
@@ -348,7 +418,9 @@ def _about_one_centre(
     median = float(np.median(about))
     turns, sigma = np.full(len(turn), np.nan), np.full(len(turn), np.nan)
     turns[ok] = about - median
-    sigma[ok] = 1.0 / np.sqrt(np.einsum("ni,ni->n", gain, pull))
+    blur = _BLUR_SHARE * np.abs(np.gradient(about))
+    reach = float(np.sqrt(np.median(information[ok, 0, 0] / information[ok, 1, 1])))
+    sigma[ok] = np.sqrt(1.0 / np.einsum("ni,ni->n", gain, pull) + spread**2 + (_SHARED_PX / reach) ** 2 + blur**2)
     if np.ptp(turns[ok]) < _LEAST_TURN:
         return "nothing rigid is seen to turn"
     pivot = middle + place - arm
@@ -383,7 +455,7 @@ def _fit_centre(turn: Floats, shift: Floats, noise: Floats) -> tuple[Floats, Flo
     left = right - design @ solution
     variance = float(left @ left) / max(len(left) - 4, 1)
     to_centre = np.hstack([np.eye(2), -np.eye(2)])
-    covariance = variance * to_centre @ np.linalg.pinv(design.T @ design) @ to_centre.T
+    covariance = _ALIKE * variance * to_centre @ np.linalg.pinv(design.T @ design) @ to_centre.T
     every = shift - (solution[:2] + (_rotations(turn) - np.eye(2)) @ solution[2:])
     excess = np.median((every**2).sum(axis=1)) - np.median(np.trace(noise, axis1=1, axis2=2))
     # the median of the square of a distance in the plane is 2 ln 2 of the variance of either coordinate
@@ -466,6 +538,10 @@ def _turn(motion: Floats) -> float:
     return float(np.arctan2(motion[0, 1], motion[0, 0]))
 
 
+def _back(motion: Floats) -> Floats:
+    return np.asarray(np.linalg.inv(motion), dtype=float)
+
+
 def _move(motion: Floats, points: Floats) -> Floats:
     return points @ motion[:2, :2].T + motion[:2, 2]
 
@@ -474,19 +550,26 @@ def _describe(grey: Image) -> _Features:
     reduction = max(1, -(-grey.shape[1] // _SIFT_WIDTH_PX))
     if reduction > 1:
         grey = cv2.resize(grey, None, fx=1 / reduction, fy=1 / reduction, interpolation=cv2.INTER_AREA)
-    marks, descriptors = cv2.SIFT_create(_FEATURES, contrastThreshold=_FEATURE_CONTRAST).detectAndCompute(grey, None)
+    sift = cv2.SIFT_create(_FEATURES, contrastThreshold=_FEATURE_CONTRAST)  # type: ignore[attr-defined]
+    marks, descriptors = sift.detectAndCompute(grey, None)
     points = np.array([mark.pt for mark in marks]).reshape(-1, 2)
-    descriptors = np.zeros((0, 128), np.float32) if descriptors is None else descriptors
-    return _Features((points + 0.5) * reduction - 0.5, descriptors)
+    if descriptors is None:
+        return _Features(points, np.zeros((0, 128), np.float32))
+    return _Features((points + 0.5) * reduction - 0.5, descriptors / np.linalg.norm(descriptors, axis=1, keepdims=True))
 
 
 def _match(one: _Features, other: _Features) -> NDArray[np.intp]:
     """Return (k, 2) numbers of features that are each other's likeness, and nobody else's."""
     if len(one.points) < 2 or len(other.points) < 2:
         return np.zeros((0, 2), np.intp)
-    best = cv2.BFMatcher().knnMatch(one.descriptors, other.descriptors, 2)
-    pairs = [(m.queryIdx, m.trainIdx) for m, n in best if m.distance < _DISTINCT * n.distance]
-    return np.array(pairs, np.intp).reshape(-1, 2)
+    likeness = one.descriptors @ other.descriptors.T
+    rows = np.arange(len(likeness))
+    best = likeness.argmax(axis=1)
+    first = likeness[rows, best]
+    likeness[rows, best] = -1.0
+    # unit vectors: the square of a distance is 2 − 2·likeness
+    distinct = 1.0 - first < _DISTINCT**2 * (1.0 - likeness.max(axis=1))
+    return np.column_stack([rows, best])[distinct]
 
 
 def _groups(points: Floats) -> NDArray[np.intp]:

@@ -47,8 +47,10 @@ _SHARE = 0.25
 """Of the weight of the group that keeps its shape best, enough for one that turns less."""
 _ALIKE, _ALIKE_ROLL = 1.5, 0.001
 """Groups turn alike whose rolls scatter by this ratio, or by so little, rad."""
-_CELL_PX = 80
-"""The best corner of every such square is tried as a seed."""
+_MOST = 300
+"""Windows; of more, every so many are taken."""
+_CELLS = 6
+"""Squares across the picture, in each of which the best corner is tried as a seed."""
 _BASELINE_PX = 60.0
 """Least distance of two windows that tell a roll."""
 _STRETCH_PX = 0.5
@@ -124,7 +126,7 @@ def find_scenery(pictures: Sequence[Image]) -> Scenery | None:
         return None
     moved = np.stack([follow(levelled[0], one, centres) for one in levelled], axis=1)
     metric, information = _metric(tensor)
-    seeds = _seeds(centres, tensor)
+    seeds = _seeds(centres, tensor, pictures[0].shape[1] / _CELLS)
     still = _best((moved[seed] for seed in seeds), moved, metric)
     turned = _best(_motions_of_two(centres, moved, seeds), moved, metric)
     origin, rolls, off = _quietest([_grow(centres, moved, metric, one) for one in (still, turned) if one is not None])
@@ -266,7 +268,8 @@ def _windows(picture: Image, noise: float) -> tuple[Floats, Floats]:
     xx, xy, yy = (cv2.boxFilter(part, -1, (SIDE_PX, SIDE_PX))[inner] for part in (gx * gx, gx * gy, gy * gy))
     tensor = np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-2).astype(float)
     row, column = np.nonzero(np.linalg.eigvalsh(tensor)[..., 1] > (_LEAST_SLOPE * max(noise, 1.0)) ** 2)
-    return SIDE_PX * (np.column_stack([column, row]) + 1.0), tensor[row, column]
+    thin = np.s_[:: 1 + len(row) // _MOST]
+    return SIDE_PX * (np.column_stack([column, row])[thin] + 1.0), tensor[row, column][thin]
 
 
 def _metric(tensor: Floats) -> tuple[Floats, Floats]:
@@ -278,11 +281,11 @@ def _metric(tensor: Floats) -> tuple[Floats, Floats]:
     return np.einsum("nai,ni,nbi->nab", vectors, scale, vectors), most
 
 
-def _seeds(centres: Floats, tensor: Floats) -> NDArray[np.intp]:
-    """Pick the best corner of every part of the picture: they are known in both directions."""
+def _seeds(centres: Floats, tensor: Floats, cell_px: float) -> NDArray[np.intp]:
+    """Pick the best corner of every cell of the picture: they are known in both directions."""
     corner = np.linalg.eigvalsh(tensor)[:, 0]
     order = np.argsort(-corner)
-    _, first = np.unique((centres[order] // _CELL_PX).astype(int), axis=0, return_index=True)
+    _, first = np.unique((centres[order] // cell_px).astype(int), axis=0, return_index=True)
     return order[first]
 
 

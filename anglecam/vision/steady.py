@@ -16,23 +16,37 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
+from threadpoolctl import threadpool_limits
 
-from anglecam.vision.patch import Fit, Patches, Views, compare, learn_patch, levelled
+from anglecam.vision.patch import STEP_PX, Patches, Views, compare, learn_patch, levelled
 from anglecam.vision.scenery import SIDE_PX, Image, Scenery, carried, find_scenery, follow, level, locate
 
 Floats = NDArray[np.float64]
 
 _TILES = 24
 """The most telling ones."""
-_ROUNDS = 4
-"""Of learning looks and motions in turn."""
+_BLURRED_ROUNDS, _SHARP_ROUNDS = 2, 2
+"""Of learning looks and motions in turn. A motion that is wrong by a function of its fraction of a pixel fits nearly as
+well as the true one, by looks that are wobbly with the pixels' period; blurred looks cannot be."""
+_BLUR = (0.25, 0.5, 0.25)
+"""Of neighbouring knots, half a pixel apart: nothing of the pixels' period is left."""
 _STEPS = 4
 """Of Gauss and Newton, at most; from a few hundredths of a pixel one is nearly enough."""
-_SETTLED_PX = 1e-3
+_SETTLED_PX = 5e-3
 _HIDDEN = 3.0
 """Times its usual mean square that a tile misfits where something hides it."""
-_HALF = 0.3
+_PART_PX = 64
+"""Of the picture, whose tiles are heard together about how much they disagree with others."""
+_LEAST = 0.3
 """Of what the tiles tell in any direction, to be seen in a frame."""
+_RESTLESS = 5.0
+"""Times the median misfit that a tile has in which something moves."""
+_FEWEST = 8
+"""Frames to learn from."""
+_COPY = 0.13
+"""What a codec's copies hide of a motion, as a share of that whose change of the picture equals the tiles' misfit (see
+`anglecam.vision.register`); all tiles alike, so that they cannot tell."""
 _ROLLS = 9.0
 """Mean square of the rolls in the frames learnt from, in units of their variance, from which on the camera rolls."""
 _MARGIN_PX = 2
@@ -87,15 +101,18 @@ class Steady:
     rolls: bool
     """Whether the camera rolls more than can be chance."""
     unlike: Floats
-    """(3,) ratios of the standard uncertainties of roll, x and y to what noise alone would make them; at least 1."""
+    """(3, 3) ratio of the covariance of roll, x and y to what noise alone would make it, L: L·unlike·Lᵀ is the whole
+    of what in noise would be L·Lᵀ; at least 1."""
 
-    def at(self, image: Image) -> CameraMove:
+    def at(self, image: Image, predicted: bool = False) -> CameraMove:
         """Find how a frame is displaced.
 
         Parameters
         ----------
         image : ndarray
-            (h, w, 3) blue, green, red.
+            (h, w, 3) blue, green, red, or (h, w) brightness.
+        predicted : bool
+            Whether the codec made the frame from others.
 
         Returns
         -------
@@ -104,30 +121,43 @@ class Steady:
         """
         picture, origin = brightness(image), self.scenery.origin_px
         shift, roll = locate(self.scenery, follow(self.picture, level(picture), self.scenery.centres_px))
-        roll = roll if self.rolls else 0.0 * roll
-        lost = CameraMove(origin, np.full(2, np.nan), float("nan"), np.full((3, 3), np.nan))
+        if not np.isfinite(roll):
+            return _lost(origin)
+        roll = roll if self.rolls else 0.0
+        cuts = _cut([picture], self.scenery, shift[None], np.array([roll]))
+        rolls, origins = np.empty(len(self.patches)), np.broadcast_to(origin, (len(self.patches), 2))
         for _ in range(_STEPS):
-            if not np.isfinite(shift).all():
-                return lost
-            fit, seen = _look(self.patches, picture, origin, shift, roll)
-            mean_square = fit.squares / np.maximum(fit.count, 1)
-            seen &= fit.count > 0
+            rolls[:] = roll
+            views = _views(cuts.pixels[0] - origin - shift, cuts.values[0])
+            fit = compare(self.patches, views, rolls, origins)
+            seen = cuts.whole[0] & (fit.count > 0)
             if not seen.any():
-                return lost
-            usual = max(1.0, float(np.median((mean_square / self.variance)[seen])))
-            seen &= mean_square < _HIDDEN * usual * self.variance
-            normal, gradient = fit.weighted(np.where(seen, self.variance * usual, np.inf))
-            if not _enough(normal.sum(axis=0), fit.weighted(self.variance * usual)[0].sum(axis=0)):
-                return lost
-            step, covariance = _solve(normal.sum(axis=0), gradient.sum(axis=0), self.rolls)
-            shift, roll = shift - step[1:] @ _turned(roll), roll + step[0]
+                return _lost(origin)
+            misfit = fit.squares / np.maximum(fit.count, 1) / self.variance
+            # motion blur spoils all tiles alike, a passer-by only some
+            usual = max(1.0, float(np.median(misfit[seen])))
+            seen &= misfit < _HIDDEN * usual
+            normals, gradients = fit.weighted(self.variance * usual)
+            normal = normals[seen].sum(axis=0)
+            if np.linalg.eigvals(np.linalg.solve(normals.sum(axis=0)[1:, 1:], normal[1:, 1:])).min() < _LEAST:
+                return _lost(origin)
+            step, covariance = _solve(normal, gradients[seen].sum(axis=0), self.rolls)
+            shift, roll = shift - step[1:] @ _turned(roll), roll + float(step[0])
             if np.abs(step[1:]).max() < _SETTLED_PX:
                 break
-        covariance = self.unlike[:, None] * covariance * self.unlike
+        hidden = _COPY**2 * float(fit.count[seen].sum()) if predicted else 0.0
+        lower = np.zeros((3, 3))
+        free = _free(self.rolls)
+        lower[free, free] = np.linalg.cholesky(covariance[free, free])
         turn = np.eye(3)
         turn[1:, 1:] = _turned(roll)
-        covariance = turn.T @ covariance @ turn
-        return CameraMove(origin, shift, float(roll), covariance[np.ix_([1, 2, 0], [1, 2, 0])])
+        covariance = turn.T @ lower @ (self.unlike + hidden * np.eye(3)) @ lower.T @ turn
+        last = [1, 2, 0]
+        return CameraMove(origin, shift, roll, covariance[np.ix_(last, last)])
+
+
+def _lost(origin: Floats) -> CameraMove:
+    return CameraMove(origin, np.full(2, np.nan), float("nan"), np.full((3, 3), np.nan))
 
 
 def shakes(images: Sequence[Image]) -> bool:
@@ -165,24 +195,174 @@ def learn_steady(images: Sequence[Image]) -> Steady | None:
     if scenery is None or not scenery.shakes:
         return None
     known = np.flatnonzero(np.isfinite(scenery.rolls))
-    best = np.argsort(-scenery.information)[:_TILES]
-    shifts, rolls = scenery.shifts_px[known].copy(), scenery.rolls[known].copy()
-    scenery = replace(
-        scenery, centres_px=scenery.centres_px[best], metric=scenery.metric[best], information=scenery.information[best]
-    )
-    return _learn(level(pictures[0]), [pictures[k] for k in known], scenery, shifts, rolls)
+    if len(known) < _FEWEST:
+        return None
+    with threadpool_limits(limits=1, user_api="blas"):  # small systems: threads only wait for one another
+        return _learn(scenery, [pictures[k] for k in known], scenery.shifts_px[known], scenery.rolls[known])
 
 
 def brightness(image: Image) -> Image:
     """Weigh blue, green, red (h, w, 3) into grey (h, w): what codecs store at full resolution."""
-    return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    planes = 1 if image.ndim == 2 else image.shape[2]
+    return image.reshape(image.shape[:2]) if planes == 1 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
 
 
-def _learn(first: Image, pictures: Sequence[Image], scenery: Scenery, shifts: Floats, rolls: Floats) -> Steady:
-    origin = scenery.origin_px
-    corners = scenery.centres_px - SIDE_PX / 2
-    each = [_views(corners, picture, origin, s, r) for picture, s, r in zip(pictures, shifts, rolls, strict=True)]
-    raise NotImplementedError
+@dataclass(frozen=True)
+class _Cuts:
+    """What frames show of the tiles, and a little around them."""
+
+    pixels: Floats
+    """(frames, tiles, m, 2) px."""
+    values: NDArray[np.float32]
+    """(frames, tiles, m)."""
+    whole: NDArray[np.bool_]
+    """(frames, tiles) whether all of it is in the picture."""
+
+
+@dataclass(frozen=True)
+class _Learnt:
+    patches: Patches
+    variance: Floats
+    shifts_px: Floats
+    rolls: Floats
+    normal: Floats
+    """(frames, 3, 3) of roll, x and y, over the variances."""
+    unlike: Floats
+
+
+def _learn(scenery: Scenery, pictures: Sequence[Image], shifts: Floats, rolls: Floats) -> Steady:
+    """Learn with rolls; then, where these are chance, without, and without the tiles in which something moves."""
+    tiles = _part_of(scenery, np.argsort(-scenery.information)[:_TILES])
+    cuts = _cut(pictures, tiles, shifts, rolls)
+    learnt = _in_turn(cuts, tiles, shifts, rolls, rounds=_BLURRED_ROUNDS, sharp=0, rolling=True)
+    by_roll = 1.0 / np.linalg.inv(learnt.normal)[:, 0, 0]
+    rolling = bool(np.var(learnt.rolls) * by_roll.mean() > _ROLLS * learnt.unlike[0, 0])
+    tiles = _part_of(tiles, np.flatnonzero(learnt.variance < _RESTLESS * np.median(learnt.variance)))
+    shifts, rolls = learnt.shifts_px, learnt.rolls if rolling else 0.0 * rolls
+    cuts = _cut(pictures, tiles, shifts, rolls)
+    rounds = _BLURRED_ROUNDS + _SHARP_ROUNDS
+    learnt = _in_turn(cuts, tiles, shifts, rolls, rounds=rounds, sharp=_SHARP_ROUNDS, rolling=rolling)
+    return Steady(level(pictures[0]), tiles, learnt.patches, learnt.variance, rolling, learnt.unlike)
+
+
+def _part_of(scenery: Scenery, some: NDArray[np.intp]) -> Scenery:
+    return replace(
+        scenery,
+        centres_px=scenery.centres_px[some],
+        metric=scenery.metric[some],
+        information=scenery.information[some],
+    )
+
+
+def _in_turn(
+    cuts: _Cuts, scenery: Scenery, shifts: Floats, rolls: Floats, *, rounds: int, sharp: int, rolling: bool
+) -> _Learnt:
+    """Learn looks and motions in turn."""
+    origin, corners = scenery.origin_px, scenery.centres_px - SIDE_PX / 2.0
+    clear = cuts.whole.copy()
+    # of the frames' own noise the looks have learnt this share by heart
+    spent = 1.0 / (STEP_PX**2 * len(shifts))
+    light: list[Floats | None] = [None] * len(corners)
+    patches: list[Patches] = []
+    for left in reversed(range(rounds)):
+        offsets = cuts.pixels - (origin + shifts)[:, None, None]
+        patches, fits = [], []
+        for t, corner in enumerate(corners):
+            own = light[t]
+            views = _views(offsets[clear[:, t], t], cuts.values[clear[:, t], t])
+            views = views if own is None else levelled(views, own[clear[:, t]])
+            look = learn_patch(corner, SIDE_PX, views, rolls[clear[:, t]], origin)
+            # light does not fall otherwise on scenery
+            look = replace(look, gains=0.0 * look.gains)
+            if left >= sharp:
+                look = replace(look, coefficients=_blurred(look.coefficients))
+            patches.append(look)
+            fits.append(compare(look, _views(offsets[:, t], cuts.values[:, t]), rolls, origin[None]))
+            light[t] = fits[-1].light
+        mean_square = np.stack([f.squares / np.maximum(f.count, 1) for f in fits])
+        usual = np.median(mean_square, axis=1)
+        clear = cuts.whole & (mean_square < _HIDDEN * usual[:, None]).T
+        variance = np.array([m[ok].mean() for m, ok in zip(mean_square, clear.T, strict=True)]) / (1.0 - spent)
+        weight = clear.T / variance[:, None]
+        normals = np.stack([f.normal for f in fits]) * weight[..., None, None]
+        gradients = np.stack([f.gradient for f in fits]) * weight[..., None]
+        if left:
+            for k in range(len(shifts)):
+                step, _ = _solve(normals[:, k].sum(axis=0), gradients[:, k].sum(axis=0), rolling)
+                shifts = shifts - np.eye(len(shifts))[k][:, None] * (step[1:] @ _turned(rolls[k]))
+                rolls = rolls + np.eye(len(rolls))[k] * step[0]
+    return _Learnt(
+        Patches(
+            corners,
+            SIDE_PX,
+            np.concatenate([p.coefficients for p in patches]),
+            np.concatenate([p.gains for p in patches]),
+        ),
+        variance,
+        shifts,
+        rolls,
+        normals.sum(axis=0),
+        _disagreement(normals, gradients, scenery.centres_px, rolling) * (1.0 + spent) / (1.0 - spent),
+    )
+
+
+def _blurred(coefficients: Floats) -> Floats:
+    return np.asarray(convolve1d(convolve1d(coefficients, _BLUR, axis=-1), _BLUR, axis=-2))
+
+
+def _disagreement(normals: Floats, gradients: Floats, places: Floats, rolling: bool) -> Floats:
+    """Compare what parts of the scenery say against the common motion with their noise.
+
+    The cluster-robust sandwich (Liang & Zeger 1986): neighbouring tiles share a codec's blocks and err together.
+    """
+    _, part = np.unique((places // _PART_PX).astype(int), axis=0, return_inverse=True)
+    member = (part[:, None] == np.arange(part.max() + 1)).astype(float)
+    free = _free(rolling)
+    ratios = []
+    for normal, gradient in zip(normals.swapaxes(0, 1), gradients.swapaxes(0, 1), strict=True):
+        step, covariance = _solve(normal.sum(axis=0), gradient.sum(axis=0), rolling)
+        lower = np.linalg.cholesky(covariance[free, free])
+        said = (member.T @ (gradient - normal @ step))[:, free] @ lower
+        seen = np.count_nonzero(said.any(axis=1))
+        ratios.append(said.T @ said * seen / max(seen - 2, 1))
+    values, vectors = np.linalg.eigh(np.mean(ratios, axis=0))
+    unlike = np.eye(3)
+    unlike[free, free] = vectors @ np.diag(np.maximum(values, 1.0)) @ vectors.T
+    return unlike
+
+
+def _free(rolling: bool) -> slice:
+    """Say which of roll, x and y are looked for."""
+    return slice(0 if rolling else 1, 3)
+
+
+def _solve(normal: Floats, gradient: Floats, rolling: bool) -> tuple[Floats, Floats]:
+    """Solve for roll, x and y of the tiles' places, or for x and y alone; return the covariance too."""
+    free = _free(rolling)
+    step, covariance = np.zeros(3), np.zeros((3, 3))
+    covariance[free, free] = np.linalg.inv(normal[free, free])
+    step[free] = covariance[free, free] @ gradient[free]
+    return step, covariance
+
+
+def _cut(pictures: Sequence[Image], scenery: Scenery, shifts: Floats, rolls: Floats) -> _Cuts:
+    """Cut squares out of the frames, each by whole pixels about where its tile is."""
+    side = SIDE_PX + 2 * _MARGIN_PX
+    y, x = np.mgrid[0:side, 0:side].reshape(2, -1)
+    height, width = pictures[0].shape
+    arms = scenery.centres_px - scenery.origin_px
+    middles = scenery.centres_px + carried(arms, shifts, rolls).swapaxes(0, 1)
+    corners = np.round(middles - (side - 1) / 2.0).astype(int)
+    whole = ((corners >= 0) & (corners <= [width - side, height - side])).all(axis=-1)
+    corners = np.clip(corners, 0, [width - side, height - side])
+    pixels = corners[:, :, None] + np.stack([x, y], axis=-1)
+    values = np.stack([p[at[..., 1], at[..., 0]] for p, at in zip(pictures, pixels, strict=True)])
+    return _Cuts(pixels.astype(float), values.astype(np.float32), whole)
+
+
+def _views(offsets: Floats, values: NDArray[np.float32]) -> Views:
+    count, each = values.shape
+    return Views(offsets.reshape(-1, 2), values.reshape(-1, 1), np.arange(count + 1) * each)
 
 
 def _turned(roll: float) -> Floats:

@@ -1,0 +1,149 @@
+"""Clips that make trouble: every row is right within its sigma, or says why it is not there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+from anglecam.measure import Measurement, measure_clip
+from anglecam.rig import read_rig
+from anglecam.session import read_command
+from synth.motion import move
+from synth.session import render
+from synth.spec import read_spec
+
+SWING = {"kind": "triangle", "amplitude_deg": 18, "period_s": 1.6}
+STAIRS = {"kind": "stairs", "levels_deg": [12, -10, 15, 0], "tread_s": 0.5}
+
+
+def _measure(folder: Path, seconds: float = 2.4, command: dict = SWING, **spec) -> tuple[Measurement, np.ndarray]:
+    """Film a clip, measure it, and return what is true at the times that it states, in degrees."""
+    path = folder / "spec.yaml"
+    recordings = [{"name": "clip", "duration_s": seconds, "command": command}]
+    path.write_text(yaml.safe_dump({"seed": 3, "recordings": recordings} | spec))
+    render(path, folder / "session", folder / "truth")
+    if "calibration" in spec.get("declare", {}).get("camera", {}):
+        _write_calibration(folder)
+    session = folder / "session"
+    clip = next(p for p in session.iterdir() if p.suffix in (".avi", ".mp4"))
+    measured = measure_clip(clip, read_rig(session / "rig.yaml"), read_command(session / "clip.command.csv"))
+    spec_read = read_spec(path)
+    rows = np.loadtxt(session / "clip.command.csv", delimiter=",", skiprows=1)
+    motion = move(spec_read, spec_read.recordings[0], rows, seconds + 0.2)
+    return measured, np.degrees(motion.angle(measured.series.time))
+
+
+def _write_calibration(folder: Path) -> None:
+    camera = yaml.safe_load((folder / "truth" / "truth.json").read_text())["camera"]
+    (x, y), f = camera["lens_px"], camera["focal_px"]
+    store = cv2.FileStorage(str(folder / "session" / "lens.yaml"), cv2.FILE_STORAGE_WRITE)
+    store.write("camera_matrix", np.array([[f, 0.0, x], [0.0, f, y], [0.0, 0.0, 1.0]]))
+    store.write("distortion_coefficients", np.array([[camera.get("k1") or 0.0, 0.0, 0.0, 0.0, 0.0]]))
+    store.release()
+
+
+def _errors(measured: Measurement, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    ok = measured.series.ok
+    return np.degrees(measured.series.angle[ok]) - truth[ok], np.degrees(measured.series.sigma[ok])
+
+
+def _all_right(measured: Measurement, truth: np.ndarray, rms_deg: float) -> None:
+    error, sigma = _errors(measured, truth)
+    assert measured.series.ok.all()
+    assert np.sqrt((error**2).mean()) < rms_deg
+    # neutral's error is one draw for the clip, so only the scatter is held against sigma closely
+    assert 0.4 < np.std(error / sigma) < 1.5
+    assert np.abs(np.mean(error / sigma)) < 2.5
+    assert (np.abs(error) < np.degrees(measured.series.bounds[6.0])).all()
+
+
+CODECS = {
+    "ffv1": ({"codec": "ffv1"}, 0.001),
+    "mjpeg 4:2:0": ({"chroma": 420}, 0.003),
+    "h264 crf 18": ({"codec": "h264"}, 0.01),
+}
+
+
+@pytest.mark.parametrize("codec", CODECS)
+def test_the_angle_is_right_whatever_the_codec(tmp_path, codec):
+    camera, limit = CODECS[codec]
+    measured, truth = _measure(tmp_path, camera=camera)
+    assert measured.why_coarse is None
+    _all_right(measured, truth, limit)
+
+
+def test_a_swaying_mug_vignetting_and_flicker_do_no_harm(tmp_path):
+    measured, truth = _measure(
+        tmp_path,
+        camera={"flicker": {"share": 0.1}, "vignetting": 0.4},
+        scene={"distractor": {"at_px": [520, 150], "width_px": 70, "sway_px": 30}},
+    )
+    _all_right(measured, truth, 0.003)
+
+
+def test_only_what_is_hidden_is_occluded_and_no_wrong_row_is_ok(tmp_path):
+    measured, truth = _measure(tmp_path, seconds=3.0, scene={"occluders": [{"from_s": 1.2, "for_s": 0.5}]})
+    status = np.array(measured.series.status)
+    assert set(status) == {"ok", "occluded"}
+    assert 8 <= (status == "occluded").sum() <= 16
+    assert np.ptp(np.flatnonzero(status == "occluded")) < 18
+    error, _ = _errors(measured, truth)
+    assert np.abs(error).max() < 0.01
+
+
+def test_an_exposure_of_60_percent_of_the_interval_costs_no_row_of_a_swing(tmp_path):
+    measured, truth = _measure(tmp_path, camera={"exposure_s": 0.02})
+    error, _ = _errors(measured, truth)
+    assert measured.series.ok.all()
+    assert np.sqrt((error**2).mean()) < 0.02
+
+
+def test_a_calibrated_lens_is_undone(tmp_path):
+    measured, truth = _measure(
+        tmp_path,
+        camera={"codec": "ffv1", "distance_m": 0.6},
+        effects={"lens_distortion": {"k1": -0.15}},
+        declare={"camera": {"calibration": "lens.yaml"}},
+    )
+    _all_right(measured, truth, 0.002)
+    bare = measure_clip(tmp_path / "session" / "clip.avi", read_rig(_bare(tmp_path)), None)
+    off = np.degrees(bare.series.angle) - truth
+    assert np.std(off) > 0.005
+
+
+def _bare(folder: Path) -> Path:
+    path = folder / "bare.yaml"
+    path.write_text("")
+    return path
+
+
+def test_a_declared_tilt_is_undone_for_parts_at_every_height(tmp_path):
+    measured, truth = _measure(
+        tmp_path,
+        camera={"codec": "ffv1"},
+        effects={"camera_tilt": {"tilt_deg": 15.0}},
+        declare={"camera": {"tilt_deg": 15.0, "calibration": "lens.yaml"}},
+    )
+    error, _ = _errors(measured, truth)
+    assert measured.why_coarse is None
+    assert measured.series.ok.all()
+    assert np.sqrt((error**2).mean()) < 0.02
+
+
+def test_a_declared_rolling_shutter_moves_the_time_of_each_row(tmp_path):
+    measured, truth = _measure(
+        tmp_path,
+        camera={"codec": "ffv1"},
+        effects={"rolling_shutter": {"row_time_s": 3e-5}},
+        declare={"camera": {"row_time_s": 3e-5}},
+    )
+    error, _ = _errors(measured, truth)
+    late = measured.series.time - measured.sighting.time
+    assert 2e-4 < np.ptp(late) < 1e-2
+    # undone by the stamps alone it would be a tenth of a degree
+    assert np.median(np.abs(error)) < 0.002
+    assert np.sqrt((error**2).mean()) < 0.02
