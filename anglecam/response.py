@@ -132,8 +132,10 @@ def _rests(t: Floats, y: Floats, s: Floats, band: float) -> list[_Rest]:
         # its first half may still hold the last of a swing
         settled = slice((first + last) // 2, last + 1)
         count = settled.stop - settled.start
-        scatter = max(float(np.std(y[settled])), float(np.median(s[settled])))
-        rests.append(_Rest(first, last, float(y[settled].mean()), scatter / np.sqrt(count)))
+        # a median, since its last frames may be on the way already
+        level = float(np.median(y[settled]))
+        scatter = max(1.4826 * float(np.median(np.abs(y[settled] - level))), float(np.median(s[settled])))
+        rests.append(_Rest(first, last, level, scatter * np.sqrt(0.5 * np.pi / count)))
     return rests
 
 

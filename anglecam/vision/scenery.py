@@ -40,7 +40,9 @@ _FAR = 9.0
 _SEEN = 0.7
 """Least share of the frames in which a window must go along: something may hide it in the others."""
 _ENOUGH = 12
-"""Windows; where so many go along in more of the frames, so must all."""
+"""Windows; where so many go along in more of the frames, so must all, but for a few frames."""
+_LESS = 0.1
+"""Share of those few."""
 _FEWEST = 5
 """Windows that make scenery."""
 _SHARE = 0.25
@@ -130,8 +132,10 @@ def find_scenery(pictures: Sequence[Image]) -> Scenery | None:
     still = _best((moved[seed] for seed in seeds), moved, metric)
     turned = _best(_motions_of_two(centres, moved, seeds), moved, metric)
     origin, rolls, off = _quietest([_grow(centres, moved, metric, one) for one in (still, turned) if one is not None])
-    share = (off < 1.0).mean(axis=1)
-    group = share >= max(_SEEN, float(np.sort(share)[-min(_ENOUGH, len(share))]))
+    weight = _along(off)
+    open_frames = weight @ (off < 1.0) > _HALF * weight.sum()
+    share = (off[:, open_frames] < 1.0).mean(axis=1) if open_frames.any() else np.zeros(len(off))
+    group = share >= max(_SEEN, float(np.sort(share)[-min(_ENOUGH, len(share))]) - _LESS)
     if group.sum() < _FEWEST:
         return None
     close = off[group][off[group] < 1.0]

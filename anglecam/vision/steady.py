@@ -40,6 +40,10 @@ _PART_PX = 64
 """Of the picture, whose tiles are heard together about how much they disagree with others."""
 _LEAST = 0.3
 """Of what the tiles tell in any direction, to be seen in a frame."""
+_GAIN = 0.4
+"""Most by which light changes."""
+_SPOILT = 4.0
+"""Times its usual mean square that all tiles may misfit in a frame."""
 _RESTLESS = 5.0
 """Times the median misfit that a tile has in which something moves."""
 _FEWEST = 8
@@ -130,12 +134,13 @@ class Steady:
             rolls[:] = roll
             views = _views(cuts.pixels[0] - origin - shift, cuts.values[0])
             fit = compare(self.patches, views, rolls, origins)
-            seen = cuts.whole[0] & (fit.count > 0)
+            # the edge of something else may fit in shape, not in strength
+            seen = cuts.whole[0] & (fit.count > 0) & (np.abs(fit.light[:, 0, 0]) < _GAIN)
             if not seen.any():
                 return _lost(origin)
             misfit = fit.squares / np.maximum(fit.count, 1) / self.variance
             # motion blur spoils all tiles alike, a passer-by only some
-            usual = max(1.0, float(np.median(misfit[seen])))
+            usual = float(np.clip(np.median(misfit[seen]), 1.0, _SPOILT))
             seen &= misfit < _HIDDEN * usual
             normals, gradients = fit.weighted(self.variance * usual)
             normal = normals[seen].sum(axis=0)

@@ -197,7 +197,9 @@ def _find_heights(glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats) -
     tallest = _TALLEST * float(np.hypot(*(np.array([width, height]) / 2.0)))
     steps = int(np.clip(tallest * slope * swing / _HEIGHT_STEP_PX, 1, 10))
     heights = np.linspace(-tallest, tallest, 2 * steps + 1)
-    restless = np.stack([_by_tile(_stack(grey, plane, pivot_px, z)[1][..., 0] ** 2).mean(axis=(1, 3)) for z in heights])
+    restless = np.stack(
+        [_by_tile(_stack(grey, plane, pivot_px, z, 2)[1][..., 0] ** 2, SIDE_PX // 2).mean(axis=(1, 3)) for z in heights]
+    )
     # the vertex of the parabola through the steadiest height and its neighbours
     at = np.clip(restless.argmin(axis=0), 1, len(heights) - 2)
     before, here, after = (np.take_along_axis(restless, (at + k)[None], axis=0)[0] for k in (-1, 0, 1))
@@ -206,22 +208,25 @@ def _find_heights(glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats) -
 
 
 def _stack(
-    glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats, heights: float | Floats
+    glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats, heights: float | Floats, step: int = 1
 ) -> tuple[Image, Image, NDArray[np.bool_]]:
-    """Turn frames back as what stands at a height, or each pixel at its own, turns; return middle and spread."""
+    """Turn frames back as what stands at a height turns, or each pixel at its own; return middle, spread, what all saw.
+
+    Of the pixels only each ``step``-th one along both axes is looked at.
+    """
     height, width = glimpses[0].image.shape[:2]
-    x, y = np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float))
+    x, y = np.meshgrid(np.arange(0.0, width, step), np.arange(0.0, height, step))
     beside = np.reshape(heights, (-1, 1)) * plane.lens.parallax
     arms = np.stack([x, y], axis=-1).reshape(-1, 2) - pivot_px - beside
-    pile, whole = [], np.ones((height, width), bool)
+    pile, whole = [], np.ones(x.shape, bool)
     for g in glimpses:
         there = plane.lens.distort(arms @ _turned(g.turn) + g.pivot_px + beside)
         if g.turn_per_row:
             early = g.turn_per_row * (there[:, 1] - g.row)
             there = plane.lens.distort(_each_turned(arms, g.turn + early) + g.pivot_px + beside)
-        at = there.reshape(height, width, 2).astype(np.float32)
+        at = there.reshape(*x.shape, 2).astype(np.float32)
         turned = cv2.remap(g.image, at[..., 0], at[..., 1], cv2.INTER_LINEAR)
-        pile.append(turned.reshape(height, width, -1).astype(np.float32))
+        pile.append(turned.reshape(*x.shape, -1).astype(np.float32))
         whole &= (at >= 0).all(axis=2) & (at[..., 0] <= width - 1) & (at[..., 1] <= height - 1)
     return *_middle_and_spread(np.stack(pile)), whole
 
@@ -240,9 +245,9 @@ def _middle_and_spread(pile: Image) -> tuple[Image, Image]:
     return middle, spread
 
 
-def _by_tile(part: Image) -> Image:
-    rows, columns = part.shape[0] // SIDE_PX, part.shape[1] // SIDE_PX
-    return part[: rows * SIDE_PX, : columns * SIDE_PX].reshape(rows, SIDE_PX, columns, SIDE_PX)
+def _by_tile(part: Image, side: int = SIDE_PX) -> Image:
+    rows, columns = part.shape[0] // side, part.shape[1] // side
+    return part[: rows * side, : columns * side].reshape(rows, side, columns, side)
 
 
 @njit(cache=True)

@@ -1,0 +1,152 @@
+"""Rise, overshoot, settling from samples, against the exact response of second-order systems and a least-jerk nod."""
+
+import numpy as np
+import pytest
+
+from anglecam.response import responses
+from support.series import noise
+from synth.motion.nod import nod
+from synth.spec.commands import Nod
+
+DAMPED, SETTLING_S = (22.9, 0.57), 0.2561
+"""ω_n (rad/s) and ζ of the paper's neck; the settling time is from the step, to 2 %."""
+
+
+def step_response(time, omega, zeta):
+    damped, t = omega * np.sqrt(1 - zeta**2), np.maximum(time, 0.0)
+    swing = np.cos(damped * t) + zeta / np.sqrt(1 - zeta**2) * np.sin(damped * t)
+    return 1 - np.exp(-zeta * omega * t) * swing
+
+
+def exact(omega, zeta):
+    """Return rise, overshoot, settling from the step, and peak speed of a unit step."""
+    t = np.arange(0.0, 4.0, 1e-5)
+    y = step_response(t, omega, zeta)
+    rise = t[np.argmax(y >= 0.9)] - t[np.argmax(y >= 0.1)]
+    return rise, np.exp(-np.pi * zeta / np.sqrt(1 - zeta**2)), t[np.abs(y - 1) > 0.02][-1], np.gradient(y, t).max()
+
+
+def film(rng, rate_hz, sigma_deg, omega, zeta, height_deg=15.0):
+    """Return a step up at 0.71 s and back at 3.5 s, frames at a random phase."""
+    time = np.arange(0.0, 6.0, 1 / rate_hz) + rng.uniform(0, 1 / rate_hz)
+    angle = height_deg * (step_response(time - 0.71, omega, zeta) - step_response(time - 3.5, omega, zeta))
+    return time, np.radians(angle + noise(rng, len(time), sigma_deg)), np.full(len(time), np.radians(sigma_deg))
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "sigma_deg", "omega", "zeta", "within"),
+    [
+        # of rise (s), overshoot, settling (s): RMS over films
+        (30, 0.02, *DAMPED, (0.002, 0.003, 0.008)),
+        (60, 0.02, *DAMPED, (0.0006, 0.002, 0.004)),
+        (120, 0.02, *DAMPED, (0.0004, 0.002, 0.003)),
+        (30, 0.005, 9.0, 0.3, (0.001, 0.003, 0.008)),
+    ],
+)
+def test_figures_are_those_of_the_exact_response_and_their_sigma_is_true(rate_hz, sigma_deg, omega, zeta, within):
+    rng = np.random.default_rng(5)
+    rise, overshoot, settling, speed = exact(omega, zeta)
+    errors, sigmas = [], []
+    for _ in range(6):
+        found = responses(*film(rng, rate_hz, sigma_deg, omega, zeta), changes=(0.71, 3.5))
+        assert len(found) == 2
+        for one, change in zip(found, (0.71, 3.5), strict=True):
+            assert one.start.value == change
+            figures = (one.rise_time, one.overshoot, one.settling_time, one.peak_speed)
+            true = (rise, overshoot, settling, np.radians(15) * speed)
+            errors.append([f.value - t for f, t in zip(figures, true, strict=True)])
+            sigmas.append([f.sigma for f in figures])
+    errors, sigmas = np.array(errors), np.array(sigmas)
+    assert (np.sqrt((errors[:, :3] ** 2).mean(axis=0)) < within).all()
+    ratio = np.sqrt(((errors / sigmas) ** 2).mean(axis=0))
+    # four frames a rise: what the angle did between them can only be bounded
+    assert (ratio > 0.2).all()
+    assert (ratio < 3.0).all()
+    assert np.median(ratio) < 1.6
+
+
+def test_without_a_command_the_start_is_where_the_angle_leaves_its_rest():
+    found = responses(*film(np.random.default_rng(2), 60, 0.02, *DAMPED))
+    t = np.arange(0.0, 1.0, 1e-5)
+    leaves = t[np.argmax(step_response(t, *DAMPED) >= 0.02)]
+    assert abs(found[0].start.value - 0.71 - leaves) < 0.003
+    assert found[0].settling_time.value == pytest.approx(SETTLING_S - leaves, abs=0.005)
+    assert np.degrees(found[0].to_angle.value) == pytest.approx(15.0, abs=4 * np.degrees(found[0].to_angle.sigma))
+
+
+def nod_series(rate_hz, sigma_deg, seed=1, until=3.0, **command):
+    rng = np.random.default_rng(seed)
+    # a variable frame rate: every interval up to 10 % off
+    time = np.cumsum(rng.uniform(0.9, 1.1, int(until * rate_hz))) / rate_hz
+    angle = nod(Nod(kind="nod", **command), time)[0]
+    return time, angle + noise(rng, len(time), np.radians(sigma_deg)), np.full(len(time), np.radians(sigma_deg))
+
+
+@pytest.mark.parametrize(("rate_hz", "rise_within"), [(30, 0.006), (60, 0.0025), (240, 0.001)])
+def test_a_nod_up_and_back_is_two_responses_without_overshoot(rate_hz, rise_within):
+    found = responses(*nod_series(rate_hz, 0.02, from_deg=-25.0))
+    assert len(found) == 2
+    way = np.arange(0.0, 1.0, 1e-5)
+    share = way**3 * (10 - 15 * way + 6 * way**2)
+    rise, settling = (
+        0.3 * np.ptp(way[(share > 0.1) & (share < 0.9)]),
+        0.3 * np.ptp(way[(share > 0.02) & (share < 0.98)]),
+    )
+    for one, ends in zip(found, ((-25, 45), (45, -25)), strict=True):
+        np.testing.assert_allclose(np.degrees([one.from_angle.value, one.to_angle.value]), ends, atol=0.03)
+        assert abs(one.rise_time.value - rise) < rise_within
+        assert abs(one.settling_time.value - settling) < 3 * rise_within
+        assert one.overshoot.value < 0.004
+        assert abs(np.degrees(one.peak_speed.value) - 437.5) < 15
+
+
+def test_a_pause_too_short_to_settle_does_not_end_a_response():
+    time = np.arange(0.0, 3.0, 1 / 60)
+    halves = [nod(Nod(kind="nod", rise_deg=20.0, hold_s=9.0, rest_s=at), time)[0] for at in (0.7, 1.08)]
+    rng = np.random.default_rng(3)
+    angle = sum(halves) + noise(rng, len(time), np.radians(0.02))
+    found = responses(time, angle, np.full(len(time), np.radians(0.02)))
+    assert [round(np.degrees(f.to_angle.value - f.from_angle.value)) for f in found] == [40]
+
+
+@pytest.mark.parametrize("sigma_deg", [0.002, 0.05, 0.3])
+@pytest.mark.parametrize(
+    "motion",
+    [
+        lambda t: 20 * np.sin(6 * t),
+        lambda t: 20 * np.sin(t),
+        lambda t: 0.0 * t,
+        lambda t: 20 * np.abs(t % 2 - 1),
+        lambda t: 3.0 * t,
+        lambda t: 20 * np.exp(-0.1 * t) * np.cos(7 * t),
+        lambda t: 8 * np.sin(2 * np.pi * (0.3 * t + 0.2 * t**2)),
+        lambda t: 0.3 * np.sin(3 * t),
+    ],
+    ids=["swing", "slow swing", "still", "triangle", "ramp", "dying swing", "chirp", "faint swing"],
+)
+def test_no_response_is_invented(motion, sigma_deg):
+    time = np.arange(0.0, 10.0, 1 / 30)
+    for seed in range(5):
+        angle = motion(time) + noise(np.random.default_rng(seed), len(time), sigma_deg)
+        assert responses(time, np.radians(angle), np.full(len(time), np.radians(sigma_deg))) == ()
+
+
+def test_figures_that_lie_in_a_gap_are_not_guessed():
+    time, angle, sigma = nod_series(60, 0.02)
+    angle[(time > 0.77) & (time < 0.95)] = np.nan
+    up, down = responses(time, angle, sigma)
+    assert np.isnan([up.rise_time.value, up.overshoot.value, up.peak_speed.value]).all()
+    assert np.degrees(up.to_angle.value) == pytest.approx(70, abs=0.03)
+    assert np.isfinite([down.rise_time.value, down.overshoot.value, down.settling_time.value]).all()
+
+
+def test_a_film_that_ends_on_the_way_has_no_response_there():
+    time, angle, sigma = nod_series(60, 0.02, until=0.9)
+    assert responses(time, angle, sigma) == ()
+
+
+def test_a_series_without_sigma_tells_its_own_noise():
+    time, angle, sigma = nod_series(60, 0.05)
+    with_it, without = responses(time, angle, sigma), responses(time, angle, np.full(len(time), np.nan))
+    assert len(without) == 2
+    assert without[0].rise_time.value == pytest.approx(with_it[0].rise_time.value, abs=0.003)
