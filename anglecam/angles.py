@@ -20,6 +20,7 @@ from anglecam.session import Command
 from anglecam.sighting import Sighting
 from anglecam.uncertainty import Tilt
 from anglecam.vision.pivot import Pivot
+from anglecam.vision.rigid import RigidMotion
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -94,6 +95,8 @@ def coarse_angles(seen: Sighting, ok: NDArray[np.bool_], time: Floats, rig: Rig,
     Angles
         Without registration.
     """
+    if seen.head is not None:
+        return _angles_of_head(seen, seen.head, ok, time, rig, command)
     regions = [r for r, counts in zip(seen.regions, ok, strict=True) if counts and r is not None]
     mouth, pivot, circle = np.array([r.centre_px for r in regions]), seen.pivot, seen.circle
     arm = mouth - pivot.centre_px
@@ -116,6 +119,24 @@ def coarse_angles(seen: Sighting, ok: NDArray[np.bool_], time: Floats, rig: Rig,
     known = angle_sigma(mouth, pivot.centre_px, pivot.covariance_px2, errors, resting)
     sigma = np.sqrt(known**2 + view.sigma**2 + aside**2)
     return Angles(line, sigma, mouth, pivot, neutral, resting, errors, view)
+
+
+def _angles_of_head(
+    seen: Sighting, head: RigidMotion, ok: Flags, time: Floats, rig: Rig, command: Command | None
+) -> Angles:
+    """Read angles from the rigid head: of the line from the pivot to its middle."""
+    turn, sigma = head.turn[ok], head.sigma[ok]
+    arm = seen.lens.rectify(head.centre_px) - seen.pivot.centre_px
+    c, s = np.cos(turn), np.sin(turn)
+    mouth = seen.pivot.centre_px + np.column_stack([c * arm[0] + s * arm[1], -s * arm[0] + c * arm[1]])
+    signed = turn if rig.facing == "right" else -turn
+    line = float(np.arctan2(-arm[1], _ahead(arm[:1], rig)[0])) + signed
+    lever = np.full(len(turn), float(np.hypot(*arm)))
+    neutral, resting = _neutral(rig, command, time[ok], line, lever)
+    errors = PlaceErrors(sigma * lever, 0.0)
+    view = _view_errors(seen.lens, mouth, seen.pivot.centre_px, line, neutral, resting, rig)
+    known = angle_sigma(mouth, seen.pivot.centre_px, seen.pivot.covariance_px2, errors, resting)
+    return Angles(line, np.hypot(known, view.sigma), mouth, seen.pivot, neutral, resting, errors, view)
 
 
 def turns(angles: Angles, rig: Rig) -> Floats:

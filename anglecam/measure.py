@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -85,6 +85,8 @@ def measure_clip(
         registered = register_clip(path, start, seen.lens, progress)
         why_coarse = registered if isinstance(registered, str) else None
         if isinstance(registered, Registered):
+            registered = replace(registered, turn=registered.turn - _rolls(seen))
+            start = replace(start, turn=start.turn - _rolls(seen))
             found = np.isfinite(registered.turn)
             ok = ok | (found & _carried_along(seen, start, registered, angles))
             row = np.where(found, registered.row, row)
@@ -94,17 +96,30 @@ def measure_clip(
     return Measurement(_series(path, rig, time, seen, ok, angles), seen, angles, why_coarse)
 
 
+def _rolls(seen: Sighting) -> Floats:
+    """Return how far the camera rolled in each frame, rad."""
+    return np.zeros(len(seen.time)) if seen.shakes is None else np.array([move.roll for move in seen.shakes])
+
+
 def _mouth_rows(seen: Sighting) -> Floats:
     """Return the rows of the picture in which the mouth was seen."""
-    places = [np.full(2, np.nan) if r is None else r.centre_px for r in seen.regions]
-    return np.asarray(seen.lens.distort(np.array(places))[:, 1])
+    nowhere = np.full(2, np.nan)
+    places = np.array([nowhere if r is None else r.centre_px for r in seen.regions])
+    if seen.head is not None:
+        places = np.where(np.isfinite(seen.head.turn)[:, None], seen.lens.rectify(seen.head.centre_px), nowhere)
+    return np.asarray(seen.in_picture(places)[:, 1])
 
 
 def _carried_along(seen: Sighting, start: Start, registered: Registered, angles: Angles) -> NDArray[np.bool_]:
     """Tell in which of the doubtful frames the mouth is where the head carries it: all of it is seen, but smeared."""
     off = registered.turn - start.turn - start.turn_per_row * (registered.row - start.row)
-    sure = np.isfinite(start.sigma) & np.isfinite(off)
-    return seen.smeared & (np.abs(off - np.median(off[sure])) * np.median(angles.lever_px) < _CARRIED_PX)
+    sure, lever = np.isfinite(start.sigma) & np.isfinite(off), float(np.median(angles.lever_px))
+    nowhere = np.full(2, np.nan)
+    places = np.array([nowhere if r is None else r.centre_px for r in seen.regions])
+    outward = np.hypot(*(places - seen.pivot.centre_px).T) - lever
+    along = (off - np.median(off[sure])) * lever
+    with np.errstate(invalid="ignore"):
+        return np.asarray(seen.smeared & (np.hypot(along, outward) < _CARRIED_PX))
 
 
 def _start(seen: Sighting, ok: NDArray[np.bool_], time: Floats, row: Floats, angles: Angles, rig: Rig) -> Start:
@@ -122,11 +137,18 @@ def _start(seen: Sighting, ok: NDArray[np.bool_], time: Floats, row: Floats, ang
     known = np.isfinite(turn)
     if rig.camera.row_time_s is not None and known.sum() > 1:
         speed[known] = np.gradient(turn[known], time[known])
+    pivots, wander = np.broadcast_to(seen.pivot.centre_px, (n, 2)), None
+    if seen.shakes is not None:
+        pivots = seen.lens.rectify(seen.in_picture(pivots))
+        filmed = seen.lens.distort(seen.pivot.centre_px)
+        wander = np.array([move.place_covariance(filmed) for move in seen.shakes])
+        turn = turn + _rolls(seen)
     return Start(
         turn=turn,
         sigma=sigma,
         pivot=seen.pivot,
-        pivots_px=np.broadcast_to(seen.pivot.centre_px, (n, 2)),
+        pivots_px=pivots,
+        wander_px2=wander,
         turn_per_row=speed * (rig.camera.row_time_s or 0.0),
         row=row,
     )
@@ -145,7 +167,9 @@ def _series(
     lines, sigmas, levers = empty.copy(), empty.copy(), empty.copy()
     mouths = np.full((len(time), 2), np.nan)
     lines[ok], sigmas[ok], levers[ok] = angles.line, angles.sigma, angles.lever_px
-    mouths[ok] = seen.lens.distort(angles.mouth_px)
+    mouths[ok] = angles.mouth_px
+    pivots = np.broadcast_to(angles.pivot.centre_px, (len(time), 2))
+    mouths, pivots = seen.in_picture(mouths), seen.in_picture(pivots)
     for i in _duplicates(lines, sigmas, seen.repeated):
         status[i] = "duplicate"
         lines[i] = sigmas[i] = levers[i] = np.nan
@@ -158,7 +182,7 @@ def _series(
         status=tuple(status),
         line=lines,
         mouth_px=mouths,
-        pivot_px=np.where(np.isfinite(lines)[:, None], seen.lens.distort(angles.pivot.centre_px), np.nan),
+        pivot_px=np.where(np.isfinite(lines)[:, None], pivots, np.nan),
         bounds={r: worst_case(r, levers) for r in {*CONTRACT_RADII_PX, *rig.pixel_error_px}},
     )
 

@@ -63,6 +63,8 @@ class Start:
     """What the head turns while the shutter goes on by a row, rad."""
     row: Floats
     """Row of the picture to whose exposure ``turn`` refers."""
+    wander_px2: Floats | None = None
+    """(n, 2, 2) covariance of ``pivots_px`` against each other, px²; ``None`` where the camera stands still."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +172,10 @@ def register_clip(
 
 
 def _glimpse(start: Start, i: int, image: Image) -> Glimpse:
-    return Glimpse(image, float(start.turn[i]), start.pivots_px[i], float(start.turn_per_row[i]), float(start.row[i]))
+    wander = None if start.wander_px2 is None else start.wander_px2[i]
+    return Glimpse(
+        image, float(start.turn[i]), start.pivots_px[i], float(start.turn_per_row[i]), float(start.row[i]), wander
+    )
 
 
 def _spread_out(turn: Floats, known: NDArray[np.intp], most: int) -> set[int]:

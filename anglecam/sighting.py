@@ -1,8 +1,9 @@
 """The coarse pass over a clip: the mouth in every frame, and the pivot that it turns about.
 
 The first reading keeps a few frames, from which the mouth's colour, its rough path and the pivot's marker are learnt;
-the second finds the mouth in every frame. Places are those in the plane of motion: what lens and tilt do to the
-picture is undone for points, frames stay as they were filmed.
+the second finds the mouth in every frame. Places are those in the plane of motion: what lens, tilt and a shaking stand
+do to the picture is undone for points, frames stay as they were filmed. Where there is no mouth to see, a head that turns
+as one rigid body will do: a face in profile as it is.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,8 +25,10 @@ from anglecam.video.frames import ClipInfo, Image, Sample, inspect_clip, read_fr
 from anglecam.vision.circle import Circle
 from anglecam.vision.noise import pixel_noise
 from anglecam.vision.pivot import Marker, Pivot, choose_pivot, find_marker
+from anglecam.vision.rigid import RigidMotion, follow_head
 from anglecam.vision.search import Found, find_mouth
 from anglecam.vision.segment import Region, find_regions
+from anglecam.vision.steady import LOST, CameraMove, Steady, learn_steady
 from anglecam.vision.track import Track, follow_mouth
 
 Floats = NDArray[np.float64]
@@ -65,12 +69,16 @@ class Sighting:
     """Fitted to the mouth's path in the plane of motion, where it moved."""
     moves: bool
     lens: Lens
-    """From the picture to the plane of motion."""
+    """From the picture of a camera at rest to the plane of motion."""
+    shakes: tuple[CameraMove, ...] | None
+    """What the camera did in each frame; ``None`` where it stood still."""
+    head: RigidMotion | None
+    """The rigid head where there is no mouth; ``regions`` are empty then."""
     noise: float
     """Standard deviation of the pixels, grey levels."""
     repeated: NDArray[np.bool_]
     """Frames that are bit by bit the one before."""
-    colour_rgb: tuple[int, int, int]
+    colour_rgb: tuple[int, int, int] | None
     """The mouth's colour in this clip."""
     size: tuple[int, int]
     """Width and height of the picture, px."""
@@ -78,6 +86,13 @@ class Sighting:
     """``truncated: 71 of 120 frames could be read`` where the file ends too early."""
     notes: tuple[str, ...]
     """What the user should know, a line each."""
+
+    def in_picture(self, places_px: Floats) -> Floats:
+        """Return where the frames, one after another, show places (frames, 2) of the plane of motion, px."""
+        filmed = self.lens.distort(places_px)
+        if self.shakes is None:
+            return filmed
+        return np.array([move.to_frame(place) for move, place in zip(self.shakes, filmed, strict=True)])
 
 
 def sight_clip(path: Path, rig: Rig, progress: Callable[[int, int], None] | None = None) -> Sighting:
@@ -107,31 +122,52 @@ def sight_clip(path: Path, rig: Rig, progress: Callable[[int, int], None] | None
     most = int(np.clip(_SAMPLE_BYTES // max(3 * info.width * info.height, 1), 8, _SAMPLES))
     sample = sample_frames(path, most)
     images = [f.image for f in sample.frames if f.image is not None]
+    noise = pixel_noise(images)
+    steady = learn_steady(images)
+    moves = [] if steady is None else [steady.at(image) for image in images]
     near = None if rig.pivot.near is None else lens.rectify(rig.pivot.near)
-    found = find_mouth(images, rig.mouth_rgb, near, lens.rectify) if images else None
+
+    def placed(i: int, point: Floats) -> Floats:
+        return lens.rectify(moves[i].to_reference(point) if moves else point)
+
+    found = find_mouth(images, rig.mouth_rgb, near, placed) if images else None
     if found is None:
+        if rig.mouth_rgb is None and images:
+            return _sight_head(path, rig, lens, sample, images, info)
         raise InputError(_no_mouth(path, sample, rig))
-    time, candidates, decoded, repeated = _read_regions(path, found, sample.count, progress)
+    time, filmed, decoded, repeated, shakes = _read_regions(path, found, sample.count, steady, progress)
+    candidates = filmed if shakes is None else [_unshaken(r, move) for r, move in zip(filmed, shakes, strict=True)]
+    images = [_levelled(image, move) for image, move in zip(images, moves, strict=True)] if moves else images
     lens, track, marker, pivot, disagreement = _follow(candidates, time, found, images, rig, lens)
-    status = tuple(s if d else "undecodable" for s, d in zip(track.status, decoded, strict=True))
+    hidden = np.zeros(len(time), bool) if shakes is None else np.array([not move.known for move in shakes])
+    status = tuple(
+        "undecodable" if not d else "occluded" if h else s
+        for s, d, h in zip(track.status, decoded, hidden, strict=True)
+    )
     if OK not in status:
         raise InputError(_nothing_measured(path, status, sample, rig))
     if pivot is None:
         raise InputError(f"{path}: no pivot found: the mouth hardly moves and there is no round marker to see")
     notes = [disagreement] if disagreement else []
+    if shakes is not None:
+        notes.append(
+            f"the camera shakes by {_restlessness(shakes):.2f} px RMS; the scenery tells how, and it is undone"
+        )
     if found.circle is None:
         notes.append("the mouth does not move in this clip")
     return Sighting(
         time=time,
         status=status,
         regions=track.regions,
-        smeared=track.smeared,
+        smeared=track.smeared & ~hidden,
         pivot=pivot,
         marker=marker,
         circle=track.circle,
         moves=found.circle is not None,
         lens=lens,
-        noise=pixel_noise(images),
+        shakes=shakes,
+        head=None,
+        noise=noise,
         repeated=repeated,
         colour_rgb=found.model.mean_rgb,
         size=(info.width, info.height),
@@ -158,6 +194,73 @@ def _follow(
         found = replace(found, place_px=centred.rectify(lens.distort(found.place_px)))
         lens = centred
     return lens, track, marker, pivot, disagreement
+
+
+def _sight_head(path: Path, rig: Rig, lens: Lens, sample: Sample, images: Sequence[Image], info: ClipInfo) -> Sighting:
+    """Find the rigid head where there is no mouth."""
+    noise = pixel_noise(images)
+    head = follow_head(read_frames(path), images, noise)
+    if isinstance(head, str):
+        raise InputError(f"{_no_mouth(path, sample, rig)}; nor can the head be followed without one: {head}")
+    stamps, repeated, before = [], [], None
+    for frame in read_frames(path):
+        stamps.append(frame.time)
+        same = frame.image is not None and before is not None and np.array_equal(frame.image, before)
+        repeated.append(same)
+        before = frame.image
+    lever = float(np.hypot(*(head.centre_px - head.pivot_px)))
+    turned = Circle(
+        head.pivot_px,
+        lever,
+        head.wander_px,
+        np.pad(head.pivot_covariance_px2, (0, 1)) + np.diag([0.0, 0.0, float(np.trace(head.pivot_covariance_px2))]),
+        np.ones(len(stamps), bool),
+    )
+    marker = _find_pivot_marker(images, rig, turned, lens)
+    pivot, disagreement = choose_pivot(*_reconciled(marker, turned, lens))
+    if pivot is None or OK not in head.status:
+        raise InputError(f"{path}: no centre of rotation found: the head hardly turns")
+    notes = ["no mouth to see: the rigid head alone is measured", *([disagreement] if disagreement else [])]
+    return Sighting(
+        time=np.array(stamps),
+        status=head.status,
+        regions=(None,) * len(stamps),
+        smeared=np.zeros(len(stamps), bool),
+        pivot=pivot,
+        marker=marker,
+        circle=None,
+        moves=True,
+        lens=lens,
+        shakes=None,
+        head=head,
+        noise=noise,
+        repeated=np.array(repeated),
+        colour_rgb=None,
+        size=(info.width, info.height),
+        truncated=_truncated(info, sample),
+        notes=tuple(notes),
+    )
+
+
+def _unshaken(regions: Sequence[Region], move: CameraMove) -> list[Region]:
+    """Bring a frame's regions to where a camera at rest would show them; none where that is not known."""
+    return [replace(r, centre_px=move.to_reference(r.centre_px)) for r in regions] if move.known else []
+
+
+def _levelled(image: Image, move: CameraMove) -> Image:
+    """Bring a frame to where a camera at rest would show it, for what is sought in the middle of many frames."""
+    if not move.known:
+        return image
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    to_frame = move.to_frame(corners)
+    matrix = np.column_stack([to_frame[1] - to_frame[0], to_frame[2] - to_frame[0], to_frame[0]])
+    size = (image.shape[1], image.shape[0])
+    return np.asarray(cv2.warpAffine(image, matrix, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP))
+
+
+def _restlessness(moves: Sequence[CameraMove]) -> float:
+    shifts = np.array([move.shift_px for move in moves if move.known])
+    return float(np.sqrt(((shifts - shifts.mean(axis=0)) ** 2).mean())) if len(shifts) else 0.0
 
 
 def _in_plane(region: Region, lens: Lens) -> Region:
@@ -191,16 +294,22 @@ def _reconciled(marker: Marker | None, circle: Circle | None, lens: Lens) -> tup
 
 
 def _read_regions(
-    path: Path, found: Found, count: int, progress: Callable[[int, int], None] | None
-) -> tuple[Floats, list[list[Region]], list[bool], NDArray[np.bool_]]:
-    """Find the regions of the mouth's colour in every frame; tell which frames repeat the one before bit by bit."""
+    path: Path, found: Found, count: int, steady: Steady | None, progress: Callable[[int, int], None] | None
+) -> tuple[Floats, list[list[Region]], list[bool], NDArray[np.bool_], tuple[CameraMove, ...] | None]:
+    """Find the regions of the mouth's colour in every frame, and how the camera moved if it did.
+
+    Tell too which frames repeat the one before bit by bit.
+    """
     time: list[float] = []
     candidates: list[list[Region]] = []
     decoded: list[bool] = []
     repeated: list[bool] = []
+    moves: list[CameraMove] = []
     before = None
     for frame in read_frames(path):
         image = frame.image
+        if steady is not None:
+            moves.append(LOST if image is None else steady.at(image, frame.predicted))
         time.append(frame.time)
         decoded.append(image is not None)
         repeated.append(image is not None and before is not None and np.array_equal(image, before))
@@ -209,7 +318,7 @@ def _read_regions(
         before = image
         if progress is not None:
             progress(frame.index + 1, count)
-    return np.array(time), candidates, decoded, np.array(repeated)
+    return np.array(time), candidates, decoded, np.array(repeated), tuple(moves) if steady is not None else None
 
 
 def _find_pivot_marker(images: Sequence[Image], rig: Rig, circle: Circle | None, lens: Lens) -> Marker | None:

@@ -32,9 +32,8 @@ def registered(clip):
     """Register once for all tests of this file."""
     found = []
 
-    def once(path, turn, sigma, pivot, noise, _, *more):
-        # this film's codec is one that is refused; its numbers serve as well as another's
-        found.append(found[0] if found else register_clip(path, turn, sigma, pivot, noise, False, *more))
+    def once(*arguments):
+        found.append(found[0] if found else register_clip(*arguments))
         return found[0]
 
     return once

@@ -79,7 +79,9 @@ def test_angles_are_right_and_sigma_is_true_beside_a_second_red_object(tmp_path,
     assert series.status == ("ok",) * len(truth.angle_deg)
     error, sigma = _errors(series, truth.angle_deg)
     assert np.sqrt((error**2).mean()) < limit
-    assert ratio[0] < np.sqrt(((error / sigma) ** 2).mean()) < ratio[1]
+    # neutral's error is one draw for the whole clip: the scatter is held against sigma closely, the mean loosely
+    assert ratio[0] < np.std(error / sigma) < ratio[1]
+    assert np.abs(np.mean(error / sigma)) < 2.5
     # Against the centroid's own place: the distractor never won.
     assert np.hypot(*(series.mouth_px - truth.mouth_px).T).max() < 1.0
     six = np.degrees(series.bounds[6.0])

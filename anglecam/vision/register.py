@@ -163,8 +163,10 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
     normal, gradient = _compare_all(patches, views, turns, centres()).without(hidden).weighted(variance)
     groups = _groups(tiles.corners)
     total, freedom = _scatter(normal, gradient, groups)
-    # two witnesses: groups that disagree about the turn, and a head that seems to leave its pivot
-    witnesses = (total / max(freedom - len(turns), 1), _restlessness(normal.sum(axis=0), gradient.sum(axis=0)))
+    # two witnesses: groups that disagree about the turn, and a head that seems to leave its pivot, if that stands still
+    witnesses = [total / max(freedom - len(turns), 1)]
+    if glimpses[0].wander_px2 is None:
+        witnesses.append(_restlessness(normal.sum(axis=0), gradient.sum(axis=0)))
     birge = max(1.0, float(np.sqrt(max(witnesses))))
     scores = _centre_equations(normal, gradient, turns, parallax)[1]
     unlike = max(birge**2, _disagreement(covariance, scores, groups))
@@ -212,6 +214,8 @@ def find_turn(look: Look, glimpse: Glimpse, before: Image | None = None) -> Turn
             return LOST
         each = fit.weighted(np.where(clear, look.variance * max(usual, 1.0), np.inf))
         normal, gradient = each[0].sum(axis=0), each[1].sum(axis=0)
+        if glimpse.wander_px2 is not None:
+            normal, gradient = _wandering(normal, gradient, glimpse.wander_px2)
         step = gradient[0] / normal[0, 0]
         turn += step
         if abs(step) < _SETTLED:
@@ -227,6 +231,20 @@ def find_turn(look: Look, glimpse: Glimpse, before: Image | None = None) -> Turn
         misfit = noise * np.sqrt(fit.count[clear].sum())
         pose2 += (_COPY * _copied(glimpse.image, before, places[clear]) * misfit) ** 2
     return Turn(float(turn), noise, float(np.sqrt(pose2)), pull)
+
+
+def _wandering(normal: Floats, gradient: Floats, covariance_px2: Floats) -> tuple[Floats, Floats]:
+    """Let the pivot lie where the frame wants it, as far as is known where it is: eliminate its displacement.
+
+    Its covariance is taken to be the same in all directions, so that the head's turn does not matter.
+    """
+    free = normal[1:, 1:] + np.eye(2) / max(float(np.trace(covariance_px2)) / 2.0, 1e-9)
+    taken = np.linalg.solve(free, np.column_stack([normal[1:, :1], gradient[1:]]))
+    told = normal.copy()
+    told[0, 0] -= normal[0, 1:] @ taken[:, 0]
+    pulled = gradient.copy()
+    pulled[0] -= normal[0, 1:] @ taken[:, 1]
+    return told, pulled
 
 
 def nearest_fit(look: Look, glimpse: Glimpse, reach_px: float) -> Glimpse:

@@ -41,7 +41,7 @@ _SEEN = 0.7
 """Least share of the frames in which a window must go along: something may hide it in the others."""
 _ENOUGH = 12
 """Windows; where so many go along in more of the frames, so must all, but for a few frames."""
-_LESS = 0.1
+_LESS = 0.05
 """Share of those few."""
 _FEWEST = 5
 """Windows that make scenery."""
@@ -136,7 +136,7 @@ def find_scenery(pictures: Sequence[Image]) -> Scenery | None:
     open_frames = weight @ (off < 1.0) > _HALF * weight.sum()
     share = (off[:, open_frames] < 1.0).mean(axis=1) if open_frames.any() else np.zeros(len(off))
     group = share >= max(_SEEN, float(np.sort(share)[-min(_ENOUGH, len(share))]) - _LESS)
-    if group.sum() < _FEWEST:
+    if group.sum() < _FEWEST or np.linalg.eigvalsh(metric[group].sum(axis=0))[0] < 1.0:
         return None
     close = off[group][off[group] < 1.0]
     scatter = _GATE_PX * float(np.sqrt(close.mean()))
@@ -208,7 +208,7 @@ def follow(first: Image, other: Image, centres_px: Floats) -> Floats:
         first,
         other,
         start,
-        None,
+        start.copy(),
         winSize=(SIDE_PX + 1, SIDE_PX + 1),
         maxLevel=_HALVINGS,
         criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 15, 0.01),
@@ -268,18 +268,19 @@ def _windows(picture: Image, noise: float) -> tuple[Floats, Floats]:
     smooth = cv2.GaussianBlur(picture, (0, 0), 0.7)
     gx, gy = (cv2.Scharr(smooth, cv2.CV_32F, *axis, scale=1 / 32) for axis in ((1, 0), (0, 1)))
     half = SIDE_PX // 2
-    inner = np.s_[SIDE_PX:-half:SIDE_PX, SIDE_PX:-half:SIDE_PX]
+    inner = np.s_[SIDE_PX : -half - 1 : SIDE_PX, SIDE_PX : -half - 1 : SIDE_PX]
     xx, xy, yy = (cv2.boxFilter(part, -1, (SIDE_PX, SIDE_PX))[inner] for part in (gx * gx, gx * gy, gy * gy))
     tensor = np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-2).astype(float)
     row, column = np.nonzero(np.linalg.eigvalsh(tensor)[..., 1] > (_LEAST_SLOPE * max(noise, 1.0)) ** 2)
     thin = np.s_[:: 1 + len(row) // _MOST]
-    return SIDE_PX * (np.column_stack([column, row])[thin] + 1.0), tensor[row, column][thin]
+    centres = np.asarray(SIDE_PX * (np.column_stack([column, row])[thin] + 1.0), dtype=float)
+    return centres, tensor[row, column][thin]
 
 
 def _metric(tensor: Floats) -> tuple[Floats, Floats]:
     """Scale structure tensors to 1 across the main edge, which is returned too; straight edges say nothing along."""
     values, vectors = np.linalg.eigh(tensor)
-    most = values[:, 1]
+    most: Floats = values[:, 1]
     along = np.where(values[:, 0] < _EDGE * most, 0.0, values[:, 0] / most)
     scale = np.stack([along, np.ones(len(most))], axis=-1)
     return np.einsum("nai,ni,nbi->nab", vectors, scale, vectors), most

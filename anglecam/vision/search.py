@@ -87,7 +87,7 @@ def find_mouth(
     images: Sequence[Image],
     rgb: tuple[int, int, int] | None,
     near_px: Floats | None,
-    placed: Callable[[Floats], Floats],
+    placed: Callable[[int, Floats], Floats],
 ) -> Found | None:
     """Find the mouth and learn its colour from frames spread over a clip.
 
@@ -101,7 +101,7 @@ def find_mouth(
     near_px : ndarray, optional
         (2,) a hint at the pivot, in the plane of motion, px.
     placed : callable
-        Where points (2,) of the picture lie in the plane of motion, in which paths are circles, px.
+        Where a point (2,) of the i-th picture lies in the plane of motion, in which paths are circles, px.
 
     Returns
     -------
@@ -143,7 +143,9 @@ def _hue_range(maps: Sequence[NDArray[Any]], at_rest: bool) -> tuple[float, floa
     return usual, float(np.partition(top, -_TOP_PX)[-_TOP_PX])
 
 
-def _cut_out(maps: Sequence[NDArray[Any]], level: float, usual: float, placed: Callable[[Floats], Floats]) -> _Patches:
+def _cut_out(
+    maps: Sequence[NDArray[Any]], level: float, usual: float, placed: Callable[[int, Floats], Floats]
+) -> _Patches:
     frame, place, area, contrast, label = [], [], [], [], []
     for t, hue in enumerate(maps):
         _, _, stats, centres = cv2.connectedComponentsWithStats((hue > level).astype(np.uint8), connectivity=8)
@@ -154,7 +156,7 @@ def _cut_out(maps: Sequence[NDArray[Any]], level: float, usual: float, placed: C
             x, y, w, h = stats[k, :4]
             part = hue[y : y + h, x : x + w]
             frame.append(t)
-            place.append(placed(centres[k]))
+            place.append(placed(t, centres[k]))
             area.append(sizes[k])
             contrast.append(np.percentile(part[part > level], 75) - usual)
             label.append(k)

@@ -48,6 +48,7 @@ _RESTLESS = 5.0
 """Times the median misfit that a tile has in which something moves."""
 _FEWEST = 8
 """Frames to learn from."""
+_FEWEST_TILES = 4
 _COPY = 0.13
 """What a codec's copies hide of a motion, as a share of that whose change of the picture equals the tiles' misfit (see
 `anglecam.vision.register`); all tiles alike, so that they cannot tell."""
@@ -88,6 +89,10 @@ class CameraMove:
         x, y = point_px - self.origin_px
         J = np.array([[1.0, 0.0, y], [0.0, 1.0, -x]])
         return np.asarray(J @ self.covariance @ J.T)
+
+
+LOST = CameraMove(np.zeros(2), np.full(2, np.nan), float("nan"), np.full((3, 3), np.nan))
+"""Of a frame that shows nothing."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +198,7 @@ def learn_steady(images: Sequence[Image]) -> Steady | None:
     Returns
     -------
     Steady or None
-        ``None`` where the camera stands still, or may do so.
+        ``None`` where the camera stands still, or may do so, or too little is seen of the scenery to say how it moves.
     """
     pictures = [brightness(image) for image in images]
     scenery = find_scenery(pictures)
@@ -235,9 +240,13 @@ class _Learnt:
     unlike: Floats
 
 
-def _learn(scenery: Scenery, pictures: Sequence[Image], shifts: Floats, rolls: Floats) -> Steady:
+def _learn(scenery: Scenery, pictures: Sequence[Image], shifts: Floats, rolls: Floats) -> Steady | None:
     """Learn with rolls; then, where these are chance, without, and without the tiles in which something moves."""
-    tiles = _part_of(scenery, np.argsort(-scenery.information)[:_TILES])
+    tiles = _part_of(
+        scenery, _most_telling(scenery, pictures[0].shape[1::-1], np.quantile(np.abs(shifts), 0.7, axis=0))
+    )
+    if len(tiles.centres_px) < _FEWEST_TILES:
+        return None
     cuts = _cut(pictures, tiles, shifts, rolls)
     learnt = _in_turn(cuts, tiles, shifts, rolls, rounds=_BLURRED_ROUNDS, sharp=0, rolling=True)
     by_roll = 1.0 / np.linalg.inv(learnt.normal)[:, 0, 0]
@@ -248,6 +257,21 @@ def _learn(scenery: Scenery, pictures: Sequence[Image], shifts: Floats, rolls: F
     rounds = _BLURRED_ROUNDS + _SHARP_ROUNDS
     learnt = _in_turn(cuts, tiles, shifts, rolls, rounds=rounds, sharp=_SHARP_ROUNDS, rolling=rolling)
     return Steady(level(pictures[0]), tiles, learnt.patches, learnt.variance, rolling, learnt.unlike)
+
+
+def _most_telling(scenery: Scenery, size: tuple[int, ...], reach_px: Floats) -> NDArray[np.intp]:
+    """Choose the windows, mostly whole in the picture, that together tell most, in the worst direction too."""
+    border = SIDE_PX / 2.0 + _MARGIN_PX + reach_px
+    inside = np.all((scenery.centres_px >= border) & (scenery.centres_px <= size - border), axis=1)
+    tensor = np.einsum("n,n,nab->nab", inside, scenery.information, scenery.metric)
+    total, chosen = 1e-3 * tensor.sum(axis=0) + 1e-9 * np.eye(2), []
+    for _ in range(min(_TILES, int(inside.sum()))):
+        gain = np.einsum("ab,nba->n", np.linalg.inv(total), tensor)
+        best = int(gain.argmax())
+        total = total + tensor[best]
+        tensor[best] = 0.0
+        chosen.append(best)
+    return np.array(chosen, dtype=np.intp)
 
 
 def _part_of(scenery: Scenery, some: NDArray[np.intp]) -> Scenery:
@@ -292,10 +316,10 @@ def _in_turn(
         normals = np.stack([f.normal for f in fits]) * weight[..., None, None]
         gradients = np.stack([f.gradient for f in fits]) * weight[..., None]
         if left:
-            for k in range(len(shifts)):
-                step, _ = _solve(normals[:, k].sum(axis=0), gradients[:, k].sum(axis=0), rolling)
-                shifts = shifts - np.eye(len(shifts))[k][:, None] * (step[1:] @ _turned(rolls[k]))
-                rolls = rolls + np.eye(len(rolls))[k] * step[0]
+            together = zip(normals.sum(axis=0), gradients.sum(axis=0), strict=True)
+            steps = np.array([_solve(*one, rolling)[0] for one in together])
+            shifts = shifts - np.array([s[1:] @ _turned(roll) for s, roll in zip(steps, rolls, strict=True)])
+            rolls = rolls + steps[:, 0]
     return _Learnt(
         Patches(
             corners,
@@ -358,7 +382,7 @@ def _cut(pictures: Sequence[Image], scenery: Scenery, shifts: Floats, rolls: Flo
     arms = scenery.centres_px - scenery.origin_px
     middles = scenery.centres_px + carried(arms, shifts, rolls).swapaxes(0, 1)
     corners = np.round(middles - (side - 1) / 2.0).astype(int)
-    whole = ((corners >= 0) & (corners <= [width - side, height - side])).all(axis=-1)
+    whole = np.all((corners >= 0) & (corners <= [width - side, height - side]), axis=-1)
     corners = np.clip(corners, 0, [width - side, height - side])
     pixels = corners[:, :, None] + np.stack([x, y], axis=-1)
     values = np.stack([p[at[..., 1], at[..., 0]] for p, at in zip(pictures, pixels, strict=True)])

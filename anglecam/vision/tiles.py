@@ -49,6 +49,8 @@ class Glimpse:
     """What the head turns while the shutter goes on by a row, rad."""
     row: float = 0.0
     """To whose exposure ``turn`` refers."""
+    wander_px2: Floats | None = None
+    """(2, 2) covariance of this frame's pivot against the clip's, where the camera moves, px²."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,132 @@
+"""A head followed with nothing on it that marks it: a person's nod, and a textured room with a thing that swings."""
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from anglecam.video.frames import Frame, read_frames
+from anglecam.vision.rigid import follow_head
+from support.drawn import Look, draw_frames
+from synth.session import render
+
+REAL = Path(__file__).parents[3] / "shared" / "real" / "pendulum-red-ball" / "esempio.avi"
+NOD = {
+    "seed": 69,
+    "rig": {"neck": "human", "marker": "none", "head": "male", "lips": "bare", "lever_px": 150, "pivot_px": [260, 300]},
+    "scene": {"occluders": [{"from_s": 0.25, "for_s": 0.05}]},
+    "camera": {"fps": 60, "exposure_s": 0.006, "gamma": 2.2, "chroma": 420},
+    "render": {"quality": "draft"},
+    "recordings": [
+        {
+            "name": "nod",
+            "duration_s": 1.05,
+            "command": {"kind": "nod", "from_deg": -25, "rise_deg": 70, "rise_s": 0.3, "hold_s": 0.6, "rest_s": 0.5},
+        }
+    ],
+}
+
+
+def sampled(images, most=32):
+    return images[:: max(1, len(images) // most)]
+
+
+def numbered(images, rate_hz=30.0):
+    return (Frame(i, i / rate_hz, image) for i, image in enumerate(images))
+
+
+def off(motion, angle_deg):
+    """Return the error of the turn, deg, the median taken out, and its ratio to sigma."""
+    error = np.degrees(motion.turn) - angle_deg
+    error -= np.nanmedian(error)
+    return error, error / np.degrees(motion.sigma)
+
+
+def rms(values):
+    return np.sqrt(np.nanmean(np.square(values)))
+
+
+@pytest.fixture(scope="module")
+def nod(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("nod")
+    (folder / "spec.yaml").write_text(yaml.safe_dump(NOD))
+    render(folder / "spec.yaml", folder / "session", folder / "truth")
+    truth = np.genfromtxt(folder / "truth" / "nod.truth.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    clip = folder / "session" / "nod.avi"
+    images = [frame.image for frame in read_frames(clip)]
+    return follow_head(read_frames(clip), sampled(images), 1.0), truth
+
+
+def test_a_nod_of_seventy_degrees_in_a_third_of_a_second_is_followed(nod):
+    motion, truth = nod
+    error, ratio = off(motion, truth["angle_deg"])
+    resting = np.abs(np.gradient(truth["angle_deg"])) < 0.05
+    reach_px = 150.0
+    assert np.radians(rms(error[resting])) * reach_px < 0.2
+    # at 7° a frame, blurred over 7 px, with levels that are no measure of light
+    assert np.radians(rms(error[~resting])) * reach_px < 0.6
+    assert 0.3 < rms(ratio) < 2.0
+
+
+def test_the_centre_of_rotation_needs_no_marker(nod):
+    motion, truth = nod
+    away = motion.pivot_px - [truth["pivot_x_px"][0], truth["pivot_y_px"][0]]
+    assert np.hypot(*away) < 0.6
+    assert away @ np.linalg.solve(motion.pivot_covariance_px2, away) < 25
+
+
+def test_what_is_hidden_is_lost_and_found_again(nod):
+    motion, truth = nod
+    ok = np.array([s == "ok" for s in motion.status])
+    assert set(motion.status) <= {"ok", "no_mouth", "occluded"}
+    assert (np.isfinite(motion.turn) == ok).all()
+    lost = np.flatnonzero(~ok)
+    assert 0 < len(lost) < 16
+    assert ok[-30:].all()
+    assert np.nanmax(np.abs(off(motion, truth["angle_deg"])[0])) < 0.6
+
+
+@pytest.fixture(scope="module")
+def swinging():
+    angles = 8 * np.sin(np.arange(40) / 40 * 4 * np.pi)
+    look = Look(facing="left", lever_px=200.0, skin="dark", distractor="pendulum", marker="none")
+    return look, angles, list(draw_frames(look, angles, seed=4))
+
+
+def test_a_textured_room_and_a_thing_that_swings_are_not_the_head(swinging):
+    look, angles, images = swinging
+    motion = follow_head(numbered(images), sampled(images, 8), look.noise)
+    error, ratio = off(motion, -angles)
+    assert rms(error) < 0.01
+    assert rms(ratio) < 1.5
+    assert motion.status == ("ok",) * 40
+    np.testing.assert_allclose(motion.pivot_px, look.pivot, atol=0.2)
+    assert look.pivot[0] - 250 < motion.centre_px[0] < look.pivot[0] + 50
+
+
+def test_errors_do_not_add_up_with_the_length_of_the_clip_and_every_frame_has_its_row(swinging):
+    look, angles, images = swinging
+    rounds = 3
+    long = [None if i == 50 else image for i, image in enumerate(images * rounds)]
+    motion = follow_head(numbered(long), sampled(images, 8), look.noise)
+    assert [i for i, s in enumerate(motion.status) if s != "ok"] == [50]
+    assert motion.status[50] == "undecodable"
+    turns = motion.turn.reshape(rounds, -1)
+    assert rms(np.degrees(turns[-1] - turns[0])) < 0.005
+    assert rms(off(motion, np.tile(-angles, rounds))[0]) < 0.01
+
+
+def test_a_clip_in_which_nothing_turns_says_so(swinging):
+    look = swinging[0]
+    images = list(draw_frames(look, np.zeros(6), seed=2))
+    assert isinstance(follow_head(numbered(images), sampled(images), look.noise), str)
+    assert isinstance(follow_head(numbered(images[:1] * 20), images[:1] * 5, look.noise), str)
+
+
+@pytest.mark.skipif(not REAL.exists(), reason="the real film is not here")
+def test_a_plain_ball_has_nothing_to_tell_its_turn_by():
+    """Its centre moves on a circle; whether it turns on its thread is not to be seen."""
+    images = [frame.image for frame in itertools.islice(read_frames(REAL), 0, 60)]
+    assert isinstance(follow_head(numbered(images, 24.0), images[::10], 2.0), str)

@@ -1,0 +1,99 @@
+"""How the camera moved, against films whose every frame is known, and against films in which it stands still."""
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+from anglecam.video.frames import read_frames, sample_frames
+from anglecam.vision.steady import CameraMove, learn_steady, shakes
+from support.drawn import Look, draw_frames
+from synth.session import render
+
+SWING = {"name": "swing", "duration_s": 1.0, "command": {"kind": "random", "amplitude_deg": 20, "shortest_s": 0.1}}
+
+
+def film(folder, **spec):
+    """Render a short film; return its path, and where each frame truly shows the pivot."""
+    (folder / "spec.yaml").write_text(yaml.safe_dump({"seed": 7, "recordings": [SWING], **spec}))
+    render(folder / "spec.yaml", folder / "session", folder / "truth")
+    (clip,) = (folder / "session").glob("swing.[am]*")
+    truth = np.genfromtxt(folder / "truth" / "swing.truth.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
+    return clip, np.column_stack([truth["pivot_x_px"], truth["pivot_y_px"]]), truth["time_s"]
+
+
+def follow(clip):
+    steady = learn_steady([frame.image for frame in sample_frames(clip, 32).frames])
+    return steady, [steady.at(frame.image) for frame in read_frames(clip)]
+
+
+def errors(moves, pivots):
+    error = np.array([move.to_frame(pivots[0]) for move in moves]) - pivots
+    sigma = np.sqrt([np.diag(move.place_covariance(pivots[0])) for move in moves])
+    # the reference is good to a frame's own error only
+    return error - error.mean(axis=0), sigma
+
+
+@pytest.fixture(scope="module")
+def raw(tmp_path_factory):
+    camera = {"codec": "ffv1", "fps": 30, "shake": {"rms_px": 2.0, "frequency_hz": 5}}
+    clip, pivots, _ = film(tmp_path_factory.mktemp("raw"), camera=camera)
+    return *follow(clip), pivots
+
+
+def test_a_shaking_camera_is_followed_to_some_thousandths_of_a_pixel(raw):
+    steady, moves, pivots = raw
+    assert not steady.rolls
+    assert np.sqrt((errors(moves, pivots)[0] ** 2).mean()) < 0.005
+
+
+def test_the_uncertainty_is_true(raw):
+    _, moves, pivots = raw
+    error, sigma = errors(moves, pivots)
+    assert 0.7 < np.sqrt(((error / sigma) ** 2).mean()) < 1.4
+
+
+def test_a_frame_whose_scenery_is_covered_says_so(raw):
+    steady, moves, _ = raw
+    assert all(move.known for move in moves)
+    assert not steady.at(np.full((480, 640, 3), 128, np.uint8)).known
+
+
+def test_a_roll_is_told_from_the_heads_turn(tmp_path):
+    camera = {"codec": "mjpeg", "fps": 30, "shake": {"rms_px": 1.0, "frequency_hz": 4}}
+    clip, pivots, time = film(tmp_path, camera=camera, effects={"angle_drift": {"rate_deg_per_s": 0.5}})
+    steady, moves = follow(clip)
+    assert steady.rolls
+    rate = np.polyfit(time, np.degrees([move.roll for move in moves]), 1)[0]
+    assert rate == pytest.approx(0.5, abs=0.02)
+    assert np.sqrt((errors(moves, pivots)[0] ** 2).mean()) < 0.01
+
+
+def test_a_shake_of_a_third_of_a_pixel_is_seen_in_a_lossy_film():
+    images = []
+    for image, shift in zip(draw_frames(Look(), 20.0 * np.sin(np.arange(12))), shaking(12, 0.3), strict=True):
+        moved = cv2.warpAffine(image, np.column_stack([np.eye(2), shift]), image.shape[1::-1], flags=cv2.INTER_CUBIC)
+        images.append(cv2.imdecode(cv2.imencode(".jpg", moved, [cv2.IMWRITE_JPEG_QUALITY, 80])[1], cv2.IMREAD_COLOR))
+    assert shakes(images)
+
+
+def shaking(frames, rms_px):
+    shift = np.random.default_rng(5).standard_normal((frames, 2))
+    return rms_px * shift / np.sqrt((shift**2).mean(axis=0))
+
+
+@pytest.mark.parametrize("look", [Look(distractor="pendulum"), Look(facing="left", background="gradient")])
+def test_a_camera_that_stands_still_does_not_shake_though_head_and_light_do(look):
+    images = list(draw_frames(look, 20.0 * np.sin(np.arange(12))))
+    lit = [np.clip(image * (1.0 + 0.1 * np.sin(k)), 0, 255).astype(np.uint8) for k, image in enumerate(images)]
+    assert not shakes(images)
+    assert not shakes(lit)
+    assert learn_steady(lit) is None
+
+
+def test_points_come_back():
+    move = CameraMove(np.array([300.0, 200.0]), np.array([2.0, -1.0]), 0.01, np.eye(3))
+    points = np.array([[0.0, 0.0], [640.0, 480.0]])
+    np.testing.assert_allclose(move.to_reference(move.to_frame(points)), points, atol=1e-9)
+    # counter-clockwise as seen: what lies to the right goes up
+    assert move.to_frame(np.array([400.0, 200.0]))[1] < 199.0
