@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -30,10 +31,11 @@ from anglecam.report.budget_page import budget_table, write_budget
 from anglecam.report.calibration_figure import plot_calibration
 from anglecam.report.figures import plot_series
 from anglecam.report.page import write_report
-from anglecam.report.summary import loop_table, model_table, series_table
+from anglecam.report.summary import loop_table, model_table, response_table, series_table
+from anglecam.response import Response, responses, responses_as_dicts
 from anglecam.rig import Rig, read_rig
 from anglecam.series import write_series
-from anglecam.session import SERIES_ENDING, Session, command_beside, find_clips, read_session, rig_beside
+from anglecam.session import SERIES_ENDING, Command, Session, command_beside, find_clips, read_session, rig_beside
 from anglecam.video.overlay import write_overlay
 
 app = typer.Typer(
@@ -61,12 +63,12 @@ def measure(
     rig: RigFile = None,
     overlay: Annotated[bool, typer.Option("--overlay", help="Also write NAME.overlay.mp4.")] = False,
 ) -> None:
-    """Measure the angle in every frame: NAME.angles.csv and a plot for each clip."""
+    """Measure the angle in every frame: NAME.angles.csv and a plot for each clip, and how it answers every change."""
     declared = read_rig(rig) if rig else None
     _make_folder(out)
     problems: list[AnglecamError] = []
     done: dict[str, Path] = {}
-    rows = []
+    rows, tables = [], []
     with _progress() as bars:
         for clip in _expand(clips, problems):
             try:
@@ -75,6 +77,10 @@ def measure(
                 done[clip.stem] = clip
                 measurement = _measure(clip, declared if declared is not None else rig_beside(clip), bars)
                 write_series(measurement.series, out / f"{clip.stem}{SERIES_ENDING}")
+                answers = _responses(measurement, command_beside(clip))
+                if answers:
+                    write_json(out / f"{clip.stem}.responses.json", responses_as_dicts(answers))
+                    tables.append(response_table(clip.name, answers))
                 plot_series(measurement.series, out / f"{clip.stem}.png")
                 if overlay:
                     write_overlay(clip, measurement, out / f"{clip.stem}.overlay.mp4")
@@ -85,6 +91,8 @@ def measure(
                 problems.append(problem)
     if rows:
         screen.print(series_table(rows))
+    for table in tables:
+        screen.print(table)
     _end(problems)
 
 
@@ -259,6 +267,12 @@ def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement:
     for note in measurement.sighting.notes:
         errors.print(f"{clip}: {note}")
     return measurement
+
+
+def _responses(measurement: Measurement, command: Command | None) -> tuple[Response, ...]:
+    series = measurement.series
+    changes = [] if command is None else command.time[1:][np.diff(command.angle) != 0.0].tolist()
+    return responses(series.time, series.angle, series.sigma, changes)
 
 
 def _say_what_is_not_applied(rig: Rig, where: Path) -> None:

@@ -112,6 +112,23 @@ def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[floa
     return tuple(found)
 
 
+def responses_as_dicts(answers: Sequence[Response]) -> list[dict[str, dict[str, float]]]:
+    """Return what ``NAME.responses.json`` holds, angles in degrees; overshoot is a share."""
+    in_degrees = {"from_angle": "from_deg", "to_angle": "to_deg", "peak_speed": "peak_speed_deg_per_s"}
+    in_seconds = {"start": "start_s", "rise_time": "rise_time_s", "settling_time": "settling_time_s"}
+
+    def told(answer: Response, name: str, factor: float) -> dict[str, float]:
+        figure: Figure = getattr(answer, name)
+        return {"value": factor * figure.value, "sigma": factor * figure.sigma}
+
+    return [
+        {key: told(answer, name, 1.0) for name, key in in_seconds.items()}
+        | {key: told(answer, name, 180.0 / np.pi) for name, key in in_degrees.items()}
+        | {"overshoot": told(answer, "overshoot", 1.0)}
+        for answer in answers
+    ]
+
+
 def _roughness(y: Floats) -> float:
     """Estimate white noise from second differences, which a smooth motion hardly has."""
     second = np.diff(y, 2)

@@ -1,9 +1,9 @@
 """The coarse pass over a clip: the mouth in every frame, and the pivot that it turns about.
 
 The first reading keeps a few frames, from which the mouth's colour, its rough path and the pivot's marker are learnt;
-the second finds the mouth in every frame. Places are those in the plane of motion: what lens, tilt and a shaking stand
-do to the picture is undone for points, frames stay as they were filmed. Where there is no mouth to see, a head that turns
-as one rigid body will do: a face in profile as it is.
+the second finds the mouth in every frame. Places are those in the plane of motion: what lens, tilt and
+a shaking stand do to the picture is undone for points, frames stay as they were filmed. Where there is no mouth to see,
+a head that turns as one rigid body will do: a face in profile as it is.
 """
 
 from __future__ import annotations

@@ -11,6 +11,7 @@ from anglecam.identify import Identified
 from anglecam.loop.close import Verdict
 from anglecam.loop.result import describe, sentence
 from anglecam.measure import Measurement
+from anglecam.response import Figure, Response
 
 
 def series_table(measurements: Sequence[Measurement]) -> Table:
@@ -34,6 +35,35 @@ def series_table(measurements: Sequence[Measurement]) -> Table:
             "whole head" if measurement.why_coarse is None else f"mouth: {measurement.why_coarse}",
         )
     return table
+
+
+def response_table(name: str, answers: Sequence[Response]) -> Table:
+    """Tabulate how a clip's angle went from rest to rest."""
+    table = Table(
+        "start, s", "from → to, °", "rise, s", "overshoot, %", "settled after, s", "peak, °/s", title=name,
+        title_justify="left",
+    )  # fmt: skip
+    for column in table.columns:
+        column.justify = "right"
+    for a in answers:
+        table.add_row(
+            f"{a.start.value:.3f}",
+            f"{np.degrees(a.from_angle.value):.2f} → {np.degrees(a.to_angle.value):.2f}",
+            _figure(a.rise_time),
+            _figure(a.overshoot, 100.0),
+            _figure(a.settling_time),
+            _figure(a.peak_speed, 180.0 / np.pi),
+        )
+    return table
+
+
+def _figure(figure: Figure, factor: float = 1.0) -> str:
+    """Write a figure to the second digit of its uncertainty."""
+    value, sigma = factor * figure.value, factor * figure.sigma
+    if not np.isfinite(value):
+        return "–"
+    digits = 3 if not 0.0 < sigma < np.inf else int(np.clip(1 - np.floor(np.log10(sigma)), 0, 5))
+    return f"{value:.{digits}f} ± {sigma:.{digits}f}"
 
 
 def model_table(models: Sequence[Identified]) -> Table:
