@@ -265,7 +265,7 @@ def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement:
             progress=lambda n, total: bars.update(bar, completed=n, total=total or None),
         )
     for note in measurement.sighting.notes:
-        errors.print(f"{clip}: {note}")
+        screen.print(f"{clip}: {note}", soft_wrap=True, highlight=False, markup=False)
     return measurement
 
 

@@ -40,7 +40,7 @@ _FEWEST = 12
 """A head seen in fewer frames is not learnt."""
 _FEWEST_TILES = 3
 _YIELDING = 0.5
-"""Of `Look.yielding`: seen 0.05 to 0.1 in clips of steps and swings, 0.8 in a nod of 70° whose way up was six frames."""
+"""Of `Look.yielding`: 0.05 to 0.1 in clips of steps and swings, 0.8 in a nod of 70° with six frames on the way."""
 _DOUBT_PX = 10.0
 """How far off a guess may be."""
 _AGREE = 4.0

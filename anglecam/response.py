@@ -8,6 +8,7 @@ figure's uncertainty is what noise makes of it (Monte Carlo, GUM Supplement 1) a
 
 from __future__ import annotations
 
+import warnings
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -287,7 +288,10 @@ def _response(
 
 def _smooth(t: Floats, y: Floats, s: Floats) -> UnivariateSpline:
     """Fit the smoothest spline that leaves the noise over."""
-    return UnivariateSpline(t, y, w=1.0 / s, s=len(t))
+    with warnings.catch_warnings():
+        # where the noise was overrated the spline stops short of it, which is well
+        warnings.simplefilter("ignore", UserWarning)
+        return UnivariateSpline(t, y, w=1.0 / s, s=len(t))
 
 
 def _read(curve: UnivariateSpline, grid: Floats, levels: tuple[float, float], begun: float | None) -> Floats:

@@ -116,7 +116,7 @@ def test_bad_clips_cost_themselves_one_line_each_and_the_good_one_is_measured(fi
         broken.empty_clip(folder),
         broken.text_clip(folder),
         broken.truncated_clip(folder, clip),
-        broken.clip_without_mouth(folder),
+        broken.clip_of_an_empty_room(folder),
         broken.zero_frame_clip(folder),
         folder / "not_there.avi",
     ]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import av
+import cv2
 import numpy as np
 
 from .drawn import Look, draw_frames, write_clip
@@ -49,6 +50,16 @@ def clip_without_mouth(folder: Path, name: str = "no_mouth", frames: int = 30) -
     skin = tuple(int(0.93 * v) for v in SKIN["pale"][0])
     look = Look(lips_rgb=skin, red_object=None)
     write_clip(path, draw_frames(look, 8 * np.sin(np.arange(frames) / 4)))
+    return path
+
+
+def clip_of_an_empty_room(folder: Path, name: str = "empty_room", frames: int = 30) -> Path:
+    """Film a wall with nobody before it."""
+    path = folder / f"{name}.avi"
+    rng = np.random.default_rng(2)
+    wall = cv2.GaussianBlur(rng.uniform(60, 190, (480, 640, 3)).astype(np.float32), (0, 0), 6)
+    noisy = (np.clip(wall + rng.normal(0, 2, wall.shape), 0, 255).astype(np.uint8) for _ in range(frames))
+    write_clip(path, noisy)
     return path
 
 
