@@ -20,7 +20,7 @@ from anglecam.rig import Rig
 from anglecam.series import CONTRACT_RADII_PX, OK, AngleSeries
 from anglecam.session import Command, recording_name
 from anglecam.shutter import measurement_time
-from anglecam.sighting import Sighting, sight_clip
+from anglecam.sighting import Sighting, sight_clip, sight_head
 
 Floats = NDArray[np.float64]
 
@@ -93,6 +93,14 @@ def measure_clip(
             time = measurement_time(seen.time, row, seen.size[1], rig.camera.row_time_s)
             angles = coarse_angles(seen, ok, time, rig, command)
             angles = fine_angles(angles, registered, np.flatnonzero(ok), time[ok], rig, command)
+        elif seen.marker is None and seen.head is None and rig.pivot.near is None:
+            # a pivot that only a mouth's path tells is far less sure than one that the whole head turns about
+            head = sight_head(path, rig)
+            if isinstance(head, Sighting):
+                rigid = np.array([s == OK for s in head.status])
+                other = coarse_angles(head, rigid, head.time, rig, command)
+                if (other.sigma**2).mean() < (angles.sigma**2).mean():
+                    seen, ok, time, angles = head, rigid, head.time, other
     return Measurement(_series(path, rig, time, seen, ok, angles), seen, angles, why_coarse)
 
 

@@ -119,8 +119,7 @@ def sight_clip(path: Path, rig: Rig, progress: Callable[[int, int], None] | None
     """
     info = inspect_clip(path)
     lens = lens_from_rig(rig, (info.width, info.height), path)
-    most = int(np.clip(_SAMPLE_BYTES // max(3 * info.width * info.height, 1), 8, _SAMPLES))
-    sample = sample_frames(path, most)
+    sample = sample_frames(path, _most(info))
     images = [f.image for f in sample.frames if f.image is not None]
     noise = pixel_noise(images)
     steady = learn_steady(images)
@@ -132,9 +131,11 @@ def sight_clip(path: Path, rig: Rig, progress: Callable[[int, int], None] | None
 
     found = find_mouth(images, rig.mouth_rgb, near, placed) if images else None
     if found is None:
-        if rig.mouth_rgb is None and images:
-            return _sight_head(path, rig, lens, sample, images, info)
-        raise InputError(_no_mouth(path, sample, rig))
+        head = sight_head(path, rig) if rig.mouth_rgb is None and images else None
+        if isinstance(head, Sighting):
+            return head
+        besides = "" if head is None else f"; nor can the head be followed without one: {head}"
+        raise InputError(_no_mouth(path, sample, rig) + besides)
     time, filmed, decoded, repeated, shakes = _read_regions(path, found, sample.count, steady, progress)
     candidates = filmed if shakes is None else [_unshaken(r, move) for r, move in zip(filmed, shakes, strict=True)]
     images = [_levelled(image, move) for image, move in zip(images, moves, strict=True)] if moves else images
@@ -196,12 +197,34 @@ def _follow(
     return lens, track, marker, pivot, disagreement
 
 
-def _sight_head(path: Path, rig: Rig, lens: Lens, sample: Sample, images: Sequence[Image], info: ClipInfo) -> Sighting:
-    """Find the rigid head where there is no mouth."""
+def sight_head(path: Path, rig: Rig) -> Sighting | str:
+    """Follow the rigid head in place of a mouth.
+
+    Parameters
+    ----------
+    path : Path
+        The clip.
+    rig : Rig
+        What is declared about pivot and camera.
+
+    Returns
+    -------
+    Sighting or str
+        Why not, in a few words.
+
+    Raises
+    ------
+    InputError
+        As `sight_clip`, for a file that cannot be read.
+    """
+    info = inspect_clip(path)
+    lens = lens_from_rig(rig, (info.width, info.height), path)
+    sample = sample_frames(path, _most(info))
+    images = [f.image for f in sample.frames if f.image is not None]
     noise = pixel_noise(images)
     head = follow_head(read_frames(path), images, noise)
     if isinstance(head, str):
-        raise InputError(f"{_no_mouth(path, sample, rig)}; nor can the head be followed without one: {head}")
+        return head
     stamps, repeated, before = [], [], None
     for frame in read_frames(path):
         stamps.append(frame.time)
@@ -219,8 +242,8 @@ def _sight_head(path: Path, rig: Rig, lens: Lens, sample: Sample, images: Sequen
     marker = _find_pivot_marker(images, rig, turned, lens)
     pivot, disagreement = choose_pivot(*_reconciled(marker, turned, lens))
     if pivot is None or OK not in head.status:
-        raise InputError(f"{path}: no centre of rotation found: the head hardly turns")
-    notes = ["no mouth to see: the rigid head alone is measured", *([disagreement] if disagreement else [])]
+        return "it hardly turns"
+    notes = ["the rigid head alone is measured, without a mouth", *([disagreement] if disagreement else [])]
     return Sighting(
         time=np.array(stamps),
         status=head.status,
@@ -334,6 +357,11 @@ def _find_pivot_marker(images: Sequence[Image], rig: Rig, circle: Circle | None,
     values, axes = np.linalg.eigh(np.nan_to_num(circle.centre_covariance_px2, nan=1e12, posinf=1e12))
     reach = np.clip(_REACH * np.sqrt(np.abs(values)), _LEAST_REACH_PX, 0.5 * float(np.hypot(*still.shape[:2])))
     return find_marker(still, lens.distort(circle.centre_px), (axes * reach**2) @ axes.T)
+
+
+def _most(info: ClipInfo) -> int:
+    """Return how many frames the first reading keeps."""
+    return int(np.clip(_SAMPLE_BYTES // max(3 * info.width * info.height, 1), 8, _SAMPLES))
 
 
 def _truncated(info: ClipInfo, sample: Sample) -> str | None:

@@ -32,9 +32,13 @@ def series_table(measurements: Sequence[Measurement]) -> Table:
             f"{np.degrees(np.median(series.sigma[ok])):.4f}",
             f"{np.degrees(np.median(series.bounds[6.0][ok])):.2f}",
             measurement.angles.pivot.source,
-            "whole head" if measurement.why_coarse is None else f"mouth: {measurement.why_coarse}",
+            "whole head" if measurement.why_coarse is None else f"{_coarse(measurement)}: {measurement.why_coarse}",
         )
     return table
+
+
+def _coarse(measurement: Measurement) -> str:
+    return "mouth" if measurement.sighting.head is None else "head's key frames"
 
 
 def response_table(name: str, answers: Sequence[Response]) -> Table:

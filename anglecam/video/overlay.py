@@ -95,7 +95,8 @@ def draw_frame(image: Image, measured: Measured, index: int) -> Image:
         for radius in RADII_PX:
             cv2.circle(drawn, mouth, round(radius * 2**_SHIFT), _CIRCLES, 1, cv2.LINE_AA, _SHIFT)
         angle, sigma = np.degrees((series.angle[index], series.sigma[index]))
-        text += f"{angle:+.3f} +- {sigma:.3f} deg"
+        digits = int(np.clip(1 - np.floor(np.log10(sigma)), 2, 5)) if sigma > 0.0 else 3
+        text += f"{angle:+.{digits}f} +- {sigma:.{digits}f} deg"
     else:
         text += series.status[index]
     font, scale, at = cv2.FONT_HERSHEY_SIMPLEX, 0.6, (10, drawn.shape[0] - 12)

@@ -105,6 +105,8 @@ class _Round:
     covariance: Floats
     """Of pivot and heights if the looks were known, in units of the pixels' noise."""
     pose: _Pose
+    fits: Fit
+    """Of the looks, in the pose that they were learnt for."""
 
 
 def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot) -> Look:
@@ -148,7 +150,7 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
         pose = pose.moved(step * (_reach(before, step) if ahead and before is not None else 1.0), lever)
         # after a leap two ordinary steps, to see anew where they lead
         before = None if ahead else step
-        now = _round(task, pose, now.patches, now.hidden if done >= _LOOKS else None)
+        now = _round(task, pose, now.patches, now.hidden if done >= _LOOKS else None, now.fits)
     swallowed = _swallowed(task, now)
     pose, covariance = now.pose, now.covariance / (1.0 - swallowed)
     fits = _compare_all(now.patches, task.seen(pose), pose.turns, task.centres(pose)).without(now.hidden)
@@ -160,7 +162,7 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
     if glimpses[0].wander_px2 is None:
         witnesses.append(_restlessness(normal.sum(axis=0), gradient.sum(axis=0)))
     birge = max(1.0, float(np.sqrt(max(witnesses))))
-    scores = _centre_equations(normal, gradient, pose.turns, task.parallax)[1]
+    scores = _centre_equations(normal, gradient, pose.turns, task.parallax).scores
     unlike = max(birge**2, _disagreement(now.covariance, scores, groups))
     told = normal[:, :, 0, 0].sum(axis=1)
     return Look(
@@ -177,25 +179,31 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
     )
 
 
-def _round(task: _Task, pose: _Pose, patches: Sequence[Patches], hidden: NDArray[np.bool_] | None) -> _Round:
+def _round(
+    task: _Task,
+    pose: _Pose,
+    patches: Sequence[Patches],
+    hidden: NDArray[np.bool_] | None,
+    before: Fit | None = None,
+) -> _Round:
     """Learn the looks for a pose, then the pose for those looks."""
     views, centres = task.seen(pose), task.centres(pose)
-    fits = _compare_all(patches, views, pose.turns, centres)
-    out = _hidden(fits) if hidden is None else hidden
+    before = _compare_all(patches, views, pose.turns, centres) if before is None else before
+    out = _hidden(before) if hidden is None else hidden
     patches = [
         learn_patch(p.corners[0], SIDE_PX, levelled(v, light).without(o), pose.turns, c, p.gains[0])
-        for p, v, c, light, o in zip(patches, views, centres, fits.light, out, strict=True)
+        for p, v, c, light, o in zip(patches, views, centres, before.light, out, strict=True)
     ]
-    fits = _compare_all(patches, views, pose.turns, centres).without(out)
+    whole = _compare_all(patches, views, pose.turns, centres)
+    fits = whole.without(out)
     variance = fits.squares.sum(axis=1) / np.maximum(fits.count.sum(axis=1), 1)
     variance = np.maximum(variance, _SOUND * np.median(variance))
     equations = _centre_equations(*fits.weighted(variance), pose.turns, task.parallax)
-    moved, raised, covariance = _centres_error(*equations, task.prior, pose.error, pose.heights)
-    there = _Pose(pose.error + moved, pose.heights + raised, pose.turns)
-    fits = _compare_all(patches, task.seen(there), there.turns, task.centres(there)).without(out)
-    normal, gradient = (part.sum(axis=0) for part in fits.weighted(variance))
-    turned = gradient[:, 0] / np.maximum(normal[:, 0, 0], _NOTHING)
-    return _Round(patches, out, variance, covariance, replace(there, turns=there.turns + turned))
+    step, covariance = _centres_error(equations, task.prior, pose.error, pose.heights)
+    raised = step[2:] if len(step) > 2 else np.zeros(len(pose.heights))
+    turned = (equations.turn_pull - equations.crossed @ step) / equations.by_turn
+    there = _Pose(pose.error + step[:2], pose.heights + raised, pose.turns + turned)
+    return _Round(patches, out, variance, covariance, there, whole)
 
 
 def _reach(before: Floats, step: Floats) -> float:
@@ -207,7 +215,7 @@ def _reach(before: Floats, step: Floats) -> float:
 def _yielding(task: _Task, now: _Round) -> float:
     """Return the share of an error that goes with the turn itself, that the looks adapt to."""
     stretch = _STRETCH * (now.pose.turns - np.median(now.pose.turns))
-    after = _round(task, replace(now.pose, turns=now.pose.turns + stretch), now.patches, now.hidden)
+    after = _round(task, replace(now.pose, turns=now.pose.turns + stretch), now.patches, now.hidden, now.fits)
     return float((after.pose.turns - now.pose.turns) @ stretch / max(float(stretch @ stretch), 1e-18))
 
 
@@ -215,7 +223,7 @@ def _swallowed(task: _Task, now: _Round) -> float:
     """Return the share of an error of the pivot, in its worst known direction, that the looks adapt to."""
     axis = np.linalg.eigh(now.covariance[:2, :2])[1][:, -1]
     nudged = replace(now.pose, error=now.pose.error + _NUDGE_PX * axis)
-    after = _round(task, nudged, now.patches, now.hidden)
+    after = _round(task, nudged, now.patches, now.hidden, now.fits)
     left = float((after.pose.error - now.pose.error) @ axis) / _NUDGE_PX
     return float(np.clip(left, 0.0, _LARGEST_SHARE))
 
@@ -241,8 +249,24 @@ def _hidden(fits: Fit) -> NDArray[np.bool_]:
     return np.asarray((mean_square > HIDDEN * spoilt * usual) | covered(fits))
 
 
-def _centre_equations(normal: Floats, gradient: Floats, turns: Floats, parallax: Floats) -> tuple[Floats, Floats]:
-    """Return what tiles say of the errors of pivot and heights: information, and every tile's score.
+@dataclass(frozen=True)
+class _Equations:
+    """What tiles say of the errors of pivot and heights (size 2, or 2 + tiles), every frame's turn eliminated."""
+
+    information: Floats
+    """(size, size)."""
+    scores: Floats
+    """(tiles, size)."""
+    crossed: Floats
+    """(frames, size) what they have in common with each frame's turn."""
+    by_turn: Floats
+    """(frames,) information about the turn."""
+    turn_pull: Floats
+    """(frames,) score of the turn."""
+
+
+def _centre_equations(normal: Floats, gradient: Floats, turns: Floats, parallax: Floats) -> _Equations:
+    """Gather what tiles say of the errors of pivot and heights.
 
     A turned tile seems displaced by t = (1 − R)·(e + p·h). Every frame's turn is free: it is eliminated. Where there
     is no parallax, heights do not count.
@@ -264,14 +288,12 @@ def _centre_equations(normal: Floats, gradient: Floats, turns: Floats, parallax:
         crossed[:, 2:] = (cross @ parallax).T
     information -= (crossed.T / by_turn) @ crossed
     scores -= (gradient[..., 0] / by_turn) @ crossed
-    return information, scores
+    return _Equations(information, scores, crossed, by_turn, gradient[..., 0].sum(axis=0))
 
 
-def _centres_error(
-    information: Floats, scores: Floats, prior: _Prior, so_far: Floats, heights: Floats
-) -> tuple[Floats, Floats, Floats]:
+def _centres_error(equations: _Equations, prior: _Prior, so_far: Floats, heights: Floats) -> tuple[Floats, Floats]:
     """Solve for the errors of pivot and heights; return the covariance too, all in units of the pixels' noise."""
-    known, right = information.copy(), scores.sum(axis=0)
+    known, right = equations.information.copy(), equations.scores.sum(axis=0)
     known[:2, :2] += prior.pivot
     right[:2] -= prior.pivot @ so_far
     tall = len(known) > 2
@@ -279,8 +301,7 @@ def _centres_error(
         known[2:, 2:] += prior.height * np.eye(len(heights))
         right[2:] -= prior.height * heights
     covariance = np.asarray(np.linalg.inv(known), dtype=float)
-    found = covariance @ right
-    return found[:2], found[2:] if tall else np.zeros(len(heights)), covariance
+    return covariance @ right, covariance
 
 
 def _disagreement(covariance: Floats, scores: Floats, groups: NDArray[np.intp]) -> float:
