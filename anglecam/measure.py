@@ -93,7 +93,7 @@ def measure_clip(
             time = measurement_time(seen.time, row, seen.size[1], rig.camera.row_time_s)
             angles = coarse_angles(seen, ok, time, rig, command)
             angles = fine_angles(angles, registered, np.flatnonzero(ok), time[ok], rig, command)
-        elif seen.marker is None and seen.head is None and rig.pivot.near is None:
+        elif seen.marker is None and seen.head is None and rig.pivot.near is None and seen.lens.is_identity:
             # a pivot that only a mouth's path tells is far less sure than one that the whole head turns about
             head = sight_head(path, rig)
             if isinstance(head, Sighting):

@@ -146,7 +146,8 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
         step = pose.step_to(now.pose, lever)
         if np.hypot(*(task.centres(now.pose) - task.centres(pose)).T).max() < _SETTLED_PX:
             break
-        ahead = done > _LOOKS and before is not None
+        # heights have ways of their own to settle: in a tilted view there is no one share to leap by
+        ahead = done > _LOOKS and before is not None and not task.parallax.any()
         pose = pose.moved(step * (_reach(before, step) if ahead and before is not None else 1.0), lever)
         # after a leap two ordinary steps, to see anew where they lead
         before = None if ahead else step
