@@ -19,8 +19,8 @@ from anglecam.rig import Rig
 from anglecam.session import Command
 from anglecam.sighting import Sighting
 from anglecam.uncertainty import Tilt
+from anglecam.vision.one_centre import RigidMotion
 from anglecam.vision.pivot import Pivot
-from anglecam.vision.rigid import RigidMotion
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -146,7 +146,13 @@ def turns(angles: Angles, rig: Rig) -> Floats:
 
 
 def fine_angles(
-    coarse: Angles, found: Registered, rows: NDArray[np.intp], time: Floats, rig: Rig, command: Command | None
+    coarse: Angles,
+    found: Registered,
+    rows: NDArray[np.intp],
+    filmed_px: Floats,
+    time: Floats,
+    rig: Rig,
+    command: Command | None,
 ) -> Angles:
     """Take the turns of the whole head in place of the mouth's.
 
@@ -161,6 +167,8 @@ def fine_angles(
         The turns, in every frame of the clip.
     rows : ndarray
         (n,) numbers of the frames in which the mouth was seen.
+    filmed_px : ndarray
+        (n, 2) where those frames show it, px.
     time : ndarray
         (n,) s.
     rig : Rig
@@ -180,10 +188,7 @@ def fine_angles(
     line = np.where(seen, base + signed, coarse.line)
     neutral, resting = _neutral(rig, command, time, line, coarse.lever_px)
     used = seen if resting is None or not (resting & seen).any() else resting & seen
-    usual = float(np.median(pose[seen]))
-    # what goes with the place on the pixel grid does not grow less by resting there
-    places = len(np.unique(np.round(coarse.mouth_px[used]).astype(int), axis=0))
-    shared = float(np.sqrt((noise[used] ** 2).mean() / used.sum() + usual**2 / places))
+    shared = _sigma_of_mean(turn[used], noise[used], float(np.median(pose[seen])), filmed_px[used])
     against = pull - pull[used].mean(axis=0)
     by_pivot = np.einsum("ni,ij,nj->n", against, found.pivot_covariance_px2, against)
     sigma = np.sqrt(noise**2 + pose**2 + shared**2 + by_pivot + coarse.view.sigma**2)
@@ -201,6 +206,22 @@ def fine_angles(
         registered=found,
         shared=shared,
     )
+
+
+def _sigma_of_mean(turn: Floats, noise: Floats, pose: float, filmed_px: Floats) -> float:
+    """Return the standard uncertainty of the mean turn of frames in few poses, rad.
+
+    What goes with the place on the pixel grid does not grow less by resting there. As far as frames at rest scatter
+    more than the pixels' noise makes them, it is another in every frame: a codec's errors where noise stirs them, a
+    camera's that shakes.
+    """
+    n, places = len(turn), np.unique(np.round(filmed_px).astype(int), axis=0, return_inverse=True)[1].ravel()
+    count = np.bincount(places)
+    own = 0.0
+    if n > len(count):
+        within = turn - (np.bincount(places, turn) / count)[places]
+        own = float(np.clip((within**2).sum() / (n - len(count)) - (noise**2).mean(), 0.0, pose**2))
+    return float(np.sqrt(((noise**2).mean() + own) / n + (pose**2 - own) / len(count)))
 
 
 def _view_errors(

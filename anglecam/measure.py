@@ -92,8 +92,9 @@ def measure_clip(
             row = np.where(found, registered.row, row)
             time = measurement_time(seen.time, row, seen.size[1], rig.camera.row_time_s)
             angles = coarse_angles(seen, ok, time, rig, command)
-            angles = fine_angles(angles, registered, np.flatnonzero(ok), time[ok], rig, command)
-        elif seen.marker is None and seen.head is None and rig.pivot.near is None and seen.lens.is_identity:
+            filmed = seen.in_picture(_among(ok, angles.mouth_px))[ok]
+            angles = fine_angles(angles, registered, np.flatnonzero(ok), filmed, time[ok], rig, command)
+        elif _only_the_path_tells(seen, rig):
             # a pivot that only a mouth's path tells is far less sure than one that the whole head turns about
             head = sight_head(path, rig)
             if isinstance(head, Sighting):
@@ -102,6 +103,19 @@ def measure_clip(
                 if (other.sigma**2).mean() < (angles.sigma**2).mean():
                     seen, ok, time, angles = head, rigid, head.time, other
     return Measurement(_series(path, rig, time, seen, ok, angles), seen, angles, why_coarse)
+
+
+def _only_the_path_tells(seen: Sighting, rig: Rig) -> bool:
+    """Tell whether the pivot is where the mouth's path has its centre, and a rigid head could be followed instead."""
+    followable = seen.head is None and seen.shakes is None and seen.lens.is_identity
+    return followable and seen.marker is None and rig.pivot.near is None
+
+
+def _among(ok: NDArray[np.bool_], places_px: Floats) -> Floats:
+    """Lay the places of the measured frames among all the clip's frames."""
+    among = np.full((len(ok), 2), np.nan)
+    among[ok] = places_px
+    return among
 
 
 def _rolls(seen: Sighting) -> Floats:
@@ -173,9 +187,8 @@ def _series(
     """Lay the measured frames among all the clip's frames, less the duplicates."""
     empty, status = np.full(len(time), np.nan), [OK if k else s for k, s in zip(ok, seen.status, strict=True)]
     lines, sigmas, levers = empty.copy(), empty.copy(), empty.copy()
-    mouths = np.full((len(time), 2), np.nan)
     lines[ok], sigmas[ok], levers[ok] = angles.line, angles.sigma, angles.lever_px
-    mouths[ok] = angles.mouth_px
+    mouths = _among(ok, angles.mouth_px)
     pivots = np.broadcast_to(angles.pivot.centre_px, (len(time), 2))
     mouths, pivots = seen.in_picture(mouths), seen.in_picture(pivots)
     for i in _duplicates(lines, sigmas, seen.repeated):

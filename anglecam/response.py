@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import UnivariateSpline
 
-Floats = NDArray[np.float64]
+from anglecam.estimate.crossings import HIGH, LOW, SETTLED, first_crossing, last_rise, settling
 
-LOW, HIGH, SETTLED = 0.1, 0.9, 0.02
-"""Shares of the way: rise from the first to the second, settling to within the third."""
+Floats = NDArray[np.float64]
 
 _STILL_SIGMAS, _STILL_SHARE = 3.0, 0.005
 """Half-width of the band that a rest stays in: times sigma, of the clip's whole range; the larger holds."""
@@ -227,7 +226,7 @@ def _rough_rise(t: Floats, y: Floats, before: _Rest, after: _Rest, band: float) 
         # out and back again: neither rise can be longer than half of it
         return 0.5 * float(t[after.first] - t[before.last])
     share = (y[rows] - before.level) / way
-    return _crossing(t[rows], share, HIGH) - _crossing(t[rows], share, LOW)
+    return first_crossing(t[rows], share, HIGH) - first_crossing(t[rows], share, LOW)
 
 
 def _response(
@@ -298,29 +297,10 @@ def _read(curve: UnivariateSpline, grid: Floats, levels: tuple[float, float], be
     """Read start, 10 %, 90 %, settled (s), rise, overshoot, settling and peak speed off a curve."""
     way = levels[1] - levels[0]
     share = (curve(grid) - levels[0]) / way
-    low, high = _crossing(grid, share, LOW), _crossing(grid, share, HIGH)
+    low, high = first_crossing(grid, share, LOW), first_crossing(grid, share, HIGH)
     first = int(np.searchsorted(grid, low))
-    start = begun if begun is not None else _last_crossing(grid[: first + 1], share[: first + 1] - SETTLED)
-    settled = _last_crossing(grid, SETTLED - np.abs(share - 1.0))
+    start = begun if begun is not None else last_rise(grid[: first + 1], share[: first + 1] - SETTLED)
+    settled = settling(grid, share)
     overshoot = max(0.0, float(share.max()) - 1.0)
     speed = float((np.sign(way) * curve.derivative()(grid)).max())
     return np.array([start, low, high, settled, high - low, overshoot, settled - start, speed])
-
-
-def _crossing(t: Floats, share: Floats, level: float) -> float:
-    """Return when ``share`` first reaches ``level``."""
-    i = int(np.argmax(share >= level))
-    if i == 0:
-        return float(t[0] if share[0] >= level else t[-1])
-    return float(np.interp(level, share[i - 1 : i + 1], t[i - 1 : i + 1]))
-
-
-def _last_crossing(t: Floats, value: Floats) -> float:
-    """Return when ``value`` rises through zero for the last time."""
-    below = np.flatnonzero(value < 0.0)
-    if not len(below):
-        return float(t[0])
-    i = int(below[-1])
-    if i + 1 == len(t):
-        return float(t[-1])
-    return float(np.interp(0.0, value[i : i + 2], t[i : i + 2]))

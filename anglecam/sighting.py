@@ -24,11 +24,13 @@ from anglecam.series import OK
 from anglecam.video.frames import ClipInfo, Image, Sample, inspect_clip, read_frames, sample_frames
 from anglecam.vision.circle import Circle
 from anglecam.vision.noise import pixel_noise
+from anglecam.vision.one_centre import RigidMotion
 from anglecam.vision.pivot import Marker, Pivot, choose_pivot, find_marker
-from anglecam.vision.rigid import RigidMotion, follow_head
+from anglecam.vision.rigid import follow_head
 from anglecam.vision.search import Found, find_mouth
 from anglecam.vision.segment import Region, find_regions
-from anglecam.vision.steady import LOST, CameraMove, Steady, learn_steady
+from anglecam.vision.steady import LOST, CameraMove, Steady
+from anglecam.vision.steady_learning import learn_steady
 from anglecam.vision.track import Track, follow_mouth
 
 Floats = NDArray[np.float64]

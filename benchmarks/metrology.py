@@ -18,10 +18,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import yaml
 
+from anglecam.calibration import Calibration, write_calibration
 from anglecam.measure import measure_clip
 from anglecam.rig import read_rig
 from anglecam.session import read_command
@@ -152,12 +152,9 @@ def bound_deg() -> float:
 def _write_calibration(folder: Path) -> None:
     camera = yaml.safe_load((folder / "truth" / "truth.json").read_text())["camera"]
     (x, y), f = camera["lens_px"], camera["focal_px"]
-    store = cv2.FileStorage(str(folder / "session" / "lens.yaml"), cv2.FILE_STORAGE_WRITE)
-    store.write("image_width", camera["size"][0])
-    store.write("image_height", camera["size"][1])
-    store.write("camera_matrix", np.array([[f, 0.0, x], [0.0, f, y], [0.0, 0.0, 1.0]]))
-    store.write("distortion_coefficients", np.array([[camera.get("k1") or 0.0, 0.0, 0.0, 0.0, 0.0]]))
-    store.release()
+    matrix = np.array([[f, 0.0, x], [0.0, f, y], [0.0, 0.0, 1.0]])
+    distortion = np.array([camera.get("k1") or 0.0, 0.0, 0.0, 0.0, 0.0])
+    write_calibration(Calibration(tuple(camera["size"]), matrix, distortion), folder / "session" / "lens.yaml")
 
 
 def main() -> None:

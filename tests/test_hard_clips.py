@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 import yaml
 
+from anglecam.calibration import Calibration, write_calibration
 from anglecam.measure import Measurement, measure_clip
 from anglecam.rig import read_rig
 from anglecam.session import read_command
@@ -40,10 +40,9 @@ def _measure(folder: Path, seconds: float = 2.0, command: dict = SWING, **spec) 
 def _write_calibration(folder: Path) -> None:
     camera = yaml.safe_load((folder / "truth" / "truth.json").read_text())["camera"]
     (x, y), f = camera["lens_px"], camera["focal_px"]
-    store = cv2.FileStorage(str(folder / "session" / "lens.yaml"), cv2.FILE_STORAGE_WRITE)
-    store.write("camera_matrix", np.array([[f, 0.0, x], [0.0, f, y], [0.0, 0.0, 1.0]]))
-    store.write("distortion_coefficients", np.array([[camera.get("k1") or 0.0, 0.0, 0.0, 0.0, 0.0]]))
-    store.release()
+    matrix = np.array([[f, 0.0, x], [0.0, f, y], [0.0, 0.0, 1.0]])
+    distortion = np.array([camera.get("k1") or 0.0, 0.0, 0.0, 0.0, 0.0])
+    write_calibration(Calibration(None, matrix, distortion), folder / "session" / "lens.yaml")
 
 
 def _errors(measured: Measurement, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -125,7 +124,8 @@ def test_a_calibrated_lens_is_undone(tmp_path):
 def test_a_declared_tilt_is_undone_for_parts_at_every_height(tmp_path):
     measured, truth = _measure(
         tmp_path,
-        seconds=1.9,
+        seconds=2.4,
+        command=STAIRS,
         camera={"codec": "ffv1"},
         effects={"camera_tilt": {"tilt_deg": 15.0}},
         declare={"camera": {"tilt_deg": 15.0, "calibration": "lens.yaml"}},

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.estimate.crossings import HIGH, LOW, first_crossing, settling
 from anglecam.estimate.output_error import Model
 from anglecam.session import Command
 
 Floats = NDArray[np.float64]
-
-SETTLED = 0.02
-"""Share of the whole way within which a response counts as settled."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +23,7 @@ class StepFigures:
     overshoot: float
     """Peak beyond the steady state as a share of it, not below 0."""
     settling_time: float
-    """After which the response stays within `SETTLED` of the steady state, s."""
+    """After which the response stays within 2 % of the steady state, s."""
     steady_state: float
     """Per unit of the command."""
 
@@ -59,18 +57,6 @@ def step_figures(model: Model, parameters: Floats, poles: NDArray, steady_state:
     step = Command(np.zeros(1), np.ones(1))
     response = model.predict(parameters, time, step, np.zeros(model.states)) / steady_state
 
-    def first_crossing(level: float) -> float:
-        i = int(np.argmax(response >= level))
-        if i == 0:
-            return float(time[0]) if response[0] >= level else np.nan
-        return float(np.interp(level, response[i - 1 : i + 1], time[i - 1 : i + 1]))
-
-    outside = np.flatnonzero(np.abs(response - 1.0) > SETTLED)
-    last = int(outside[-1]) if len(outside) else 0
-    settled = time[last]
-    if last + 1 < len(time):
-        edge = np.abs(response[last : last + 2] - 1.0)
-        settled = time[last] + (time[last + 1] - time[last]) * (edge[0] - SETTLED) / (edge[0] - edge[1])
-    return StepFigures(
-        first_crossing(0.9) - first_crossing(0.1), max(0.0, float(response.max()) - 1.0), float(settled), steady_state
-    )
+    rise = first_crossing(time, response, HIGH) - first_crossing(time, response, LOW)
+    overshoot = max(0.0, float(response.max()) - 1.0)
+    return StepFigures(rise, overshoot, settling(time, response), steady_state)

@@ -13,16 +13,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.cluster.vq import kmeans2
 
-from anglecam.vision.patch import Fit, Patches, Views, compare, learn_patch, levelled
+from anglecam.vision.grouping import group_neighbours
+from anglecam.vision.patch import Fit, Patches, Views, compare, joined, learn_patch, levelled
 from anglecam.vision.pivot import Pivot
 from anglecam.vision.register import HIDDEN, Look, covered, scatter
 from anglecam.vision.tiles import SIDE_PX, Glimpse, Plane, Tiles, look_at
+from anglecam.vision.transforms import turned
 
 Floats = NDArray[np.float64]
 
-GROUPS = 6
+_GROUPS = 6
 _ROUNDS = 16
 _SETTLED_PX = 0.002
 """Looks, centre and turns are found in turn until the centre moves by less."""
@@ -156,7 +157,7 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
     pose, covariance = now.pose, now.covariance / (1.0 - swallowed)
     fits = _compare_all(now.patches, task.seen(pose), pose.turns, task.centres(pose)).without(now.hidden)
     normal, gradient = fits.weighted(now.variance)
-    groups = _groups(tiles.corners)
+    groups = group_neighbours(tiles.corners, _GROUPS)
     total, freedom = scatter(normal, gradient, groups)
     # two witnesses: groups that disagree about the turn, and a head that seems to leave its pivot, if that stands still
     witnesses = [total / max(freedom - len(pose.turns), 1)]
@@ -167,7 +168,7 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
     unlike = max(birge**2, _disagreement(now.covariance, scores, groups))
     told = normal[:, :, 0, 0].sum(axis=1)
     return Look(
-        patches=_one_by_one(now.patches),
+        patches=joined(now.patches),
         heights=pose.heights,
         plane=plane,
         pivot_px=start + pose.error,
@@ -244,7 +245,8 @@ def _compare_all(patches: Sequence[Patches], views: Sequence[Views], turns: Floa
 def _hidden(fits: Fit) -> NDArray[np.bool_]:
     """Tell in which frames a tile is seen badly: what passes before it is not learnt."""
     mean_square = fits.squares / np.maximum(fits.count, 1)
-    usual = np.median(mean_square, axis=1, keepdims=True)
+    # a tile that is out of most pictures has no usual misfit; where it is seen, it is judged badly seen
+    usual = np.maximum(np.median(mean_square, axis=1, keepdims=True), _NOTHING)
     # motion blur and the like spoil all tiles alike
     spoilt = np.maximum(np.median(mean_square / usual, axis=0, keepdims=True), 1.0)
     return np.asarray((mean_square > HIDDEN * spoilt * usual) | covered(fits))
@@ -272,8 +274,7 @@ def _centre_equations(normal: Floats, gradient: Floats, turns: Floats, parallax:
     A turned tile seems displaced by t = (1 − R)·(e + p·h). Every frame's turn is free: it is eliminated. Where there
     is no parallax, heights do not count.
     """
-    c, s = np.cos(turns), np.sin(turns)
-    moved = np.eye(2) - np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
+    moved = np.eye(2) - turned(turns)
     place = np.einsum("kai,tkab,kbj->tij", moved, normal[..., 1:, 1:], moved)
     cross = np.einsum("kai,tka->tki", moved, normal[..., 1:, 0])
     pull = np.einsum("kai,tka->ti", moved, gradient[..., 1:])
@@ -322,20 +323,4 @@ def _restlessness(normal: Floats, gradient: Floats) -> float:
     normal, gradient = normal[seen], gradient[seen]
     place = normal[:, 1:, 1:] - normal[:, 1:, :1] * normal[:, :1, 1:] / normal[:, :1, :1]
     shift = gradient[:, 1:] - normal[:, 1:, 0] * (gradient[:, :1] / normal[:, :1, 0])
-    return float(np.einsum("ni,nij,nj->n", shift, np.linalg.inv(place), shift).mean() / 2.0)
-
-
-def _groups(corners: Floats) -> NDArray[np.intp]:
-    """Put tiles that lie together into groups."""
-    if len(corners) <= 2 * GROUPS:
-        return np.arange(len(corners))
-    return np.asarray(kmeans2(corners, GROUPS, minit="++", seed=0)[1])
-
-
-def _one_by_one(patches: Sequence[Patches]) -> Patches:
-    return Patches(
-        np.concatenate([p.corners for p in patches]),
-        patches[0].side,
-        np.concatenate([p.coefficients for p in patches]),
-        np.concatenate([p.gains for p in patches]),
-    )
+    return float(np.einsum("ni,nij,nj->n", shift, np.linalg.pinv(place, hermitian=True), shift).mean() / 2.0)

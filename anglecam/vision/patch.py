@@ -6,19 +6,19 @@ this camera, lens and codec show it. Light that falls differently on a turned he
 the patch and smoothly with the angle::
 
     I(x) = T(s)·g(s, θ) + noise,    s = pivot + R(θ)·(x − pivot),    g = 1 + Σ_p θ^p·(g_p0 + g_p1·s_x + g_p2·s_y)
-
-No compiled function here calls one of another file, so that a cached one is never out of date.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
+
+from anglecam.vision.spline_kernels import gain_equations, normal_equations, turn_equations
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -70,8 +70,15 @@ class Patches:
     def __len__(self) -> int:
         return len(self.corners)
 
-    def __getitem__(self, part: slice) -> Patches:
-        return Patches(self.corners[part], self.side, self.coefficients[part], self.gains[part])
+
+def joined(patches: Sequence[Patches]) -> Patches:
+    """Put tiles of one size together."""
+    return Patches(
+        np.concatenate([p.corners for p in patches]),
+        patches[0].side,
+        np.concatenate([p.coefficients for p in patches]),
+        np.concatenate([p.gains for p in patches]),
+    )
 
 
 def learn_patch(
@@ -101,12 +108,12 @@ def learn_patch(
     """
     n = round(side / STEP_PX) + 3
     start = np.zeros((POWERS, 3)) if gains is None else gains
-    band, right = _normal_equations(views.offsets, views.values, views.starts, turns, pivot, corner, side, n, start)
+    band, right = normal_equations(views.offsets, views.values, views.starts, turns, pivot, corner, side, n, start)
     lower = _as_lower_band(band, n) + _SMOOTH * _roughness(n)
     lower[0] += _RIDGE
     factor = cholesky_banded(lower, lower=True, overwrite_ab=True)
     coefficients = cho_solve_banded((factor, True), right.T).T.reshape(-1, n, n)
-    normal, gradient = _gain_equations(
+    normal, gradient = gain_equations(
         views.offsets, views.values, views.starts, turns, pivot, corner, side, coefficients
     )
     found = np.linalg.lstsq(normal, gradient, rcond=1e-9)[0].reshape(1, POWERS, 3)
@@ -190,7 +197,7 @@ def compare(patches: Patches, views: Views, turns: Floats, pivots: Floats) -> Fi
         A row a view.
     """
     return Fit(
-        *_compare(
+        *turn_equations(
             views.offsets,
             views.values,
             views.starts,
@@ -224,188 +231,3 @@ def _roughness(n: int) -> Floats:
     for shift in (0, 1, 2, n, 2 * n):
         lower[shift, : n * n - shift] = np.diagonal(whole, -shift)
     return lower
-
-
-@njit(cache=True, inline="always")
-def _weights(u, w):  # type: ignore[no-untyped-def]
-    w[0] = (1 - u) ** 3 / 6
-    w[1] = (3 * u**3 - 6 * u**2 + 4) / 6
-    w[2] = (-3 * u**3 + 3 * u**2 + 3 * u + 1) / 6
-    w[3] = u**3 / 6
-
-
-@njit(cache=True, inline="always")
-def _slopes(u, d):  # type: ignore[no-untyped-def]
-    d[0] = -((1 - u) ** 2) / 2
-    d[1] = (3 * u * u - 4 * u) / 2
-    d[2] = (-3 * u * u + 2 * u + 1) / 2
-    d[3] = u * u / 2
-
-
-@njit(cache=True, inline="always")
-def _bends(u, b):  # type: ignore[no-untyped-def]
-    b[0] = 1 - u
-    b[1] = 3 * u - 2
-    b[2] = 1 - 3 * u
-    b[3] = u
-
-
-@njit(cache=True, inline="always")
-def _gain(gains, turn, x, y):  # type: ignore[no-untyped-def]
-    total, power = 1.0, 1.0
-    for p in range(gains.shape[0]):
-        power *= turn
-        total += power * (gains[p, 0] + gains[p, 1] * x + gains[p, 2] * y)
-    return total
-
-
-@njit(cache=True)
-def _normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gains):  # type: ignore[no-untyped-def]
-    band = np.zeros((n * n, 49))
-    planes = values.shape[1]
-    right = np.zeros((planes, n * n))
-    wx, wy = np.zeros(4), np.zeros(4)
-    scale = (n - 3) / side
-    for k in range(len(turns)):
-        c, s = np.cos(turns[k]), np.sin(turns[k])
-        for m in range(starts[k], starts[k + 1]):
-            x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1] - corner[0]
-            y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1] - corner[1]
-            if x < 0 or y < 0 or x >= side or y >= side:
-                continue
-            g = _gain(gains, turns[k], 2 * x / side - 1, 2 * y / side - 1)
-            ux, uy = x * scale, y * scale
-            ix, iy = int(ux), int(uy)
-            _weights(ux - ix, wx)
-            _weights(uy - iy, wy)
-            for j in range(4):
-                for i in range(4):
-                    w = g * wx[i] * wy[j]
-                    p = (iy + j) * n + ix + i
-                    for channel in range(planes):
-                        right[channel, p] += w * values[m, channel]
-                    for jj in range(4):
-                        for ii in range(4):
-                            band[p, (jj - j + 3) * 7 + ii - i + 3] += w * g * wx[ii] * wy[jj]
-    return band, right
-
-
-@njit(cache=True)
-def _gain_equations(offsets, values, starts, turns, pivot, corner, side, coefficients):  # type: ignore[no-untyped-def]
-    n = coefficients.shape[1]
-    terms = 3 * 3
-    normal, gradient, basis = np.zeros((terms, terms)), np.zeros(terms), np.zeros(terms)
-    wx, wy = np.zeros(4), np.zeros(4)
-    scale = (n - 3) / side
-    for k in range(len(turns)):
-        c, s = np.cos(turns[k]), np.sin(turns[k])
-        for m in range(starts[k], starts[k + 1]):
-            x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1] - corner[0]
-            y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1] - corner[1]
-            if x < 0 or y < 0 or x >= side or y >= side:
-                continue
-            ux, uy = x * scale, y * scale
-            ix, iy = int(ux), int(uy)
-            _weights(ux - ix, wx)
-            _weights(uy - iy, wy)
-            power = 1.0
-            for p in range(3):
-                power *= turns[k]
-                basis[3 * p] = power
-                basis[3 * p + 1] = power * (2 * x / side - 1)
-                basis[3 * p + 2] = power * (2 * y / side - 1)
-            for channel in range(coefficients.shape[0]):
-                look = 0.0
-                for j in range(4):
-                    for i in range(4):
-                        look += wx[i] * wy[j] * coefficients[channel, iy + j, ix + i]
-                rest = values[m, channel] - look
-                for a in range(terms):
-                    gradient[a] += basis[a] * look * rest
-                    for b in range(terms):
-                        normal[a, b] += basis[a] * basis[b] * look * look
-    return normal, gradient
-
-
-@njit(cache=True)
-def _compare(offsets, values, starts, turns, pivots, corners, side, looks, all_gains):  # type: ignore[no-untyped-def]
-    views, planes, n = len(turns), looks.shape[1], looks.shape[2]
-    normals, gradients = np.zeros((views, 3, 3)), np.zeros((views, 3))
-    squares, counts = np.zeros(views), np.zeros(views, dtype=np.int64)
-    lights = np.zeros((views, planes, 3))
-    wx, wy, dx, dy, bx, by = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4)
-    slope, bright = np.zeros(3), np.ones(3)
-    scale = (n - 3) / side
-    for k in range(views):
-        c, s = np.cos(turns[k]), np.sin(turns[k])
-        p = k if len(looks) > 1 else 0
-        pivot, corner, coefficients, gains = pivots[p], corners[p], looks[p], all_gains[p]
-        whole, pull = np.zeros((3, 3)), np.zeros(3)
-        light, light_pull, across = np.zeros((planes, 3, 3)), np.zeros((planes, 3)), np.zeros((planes, 3, 3))
-        for m in range(starts[k], starts[k + 1]):
-            at_x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1]
-            at_y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1]
-            x, y = at_x - corner[0], at_y - corner[1]
-            # half a pixel within, where the spline has been seen from all sides
-            if x < 0.5 or y < 0.5 or x >= side - 0.5 or y >= side - 0.5:
-                continue
-            g = _gain(gains, turns[k], 2 * x / side - 1, 2 * y / side - 1)
-            ux, uy = x * scale, y * scale
-            ix, iy = int(ux), int(uy)
-            _weights(ux - ix, wx)
-            _weights(uy - iy, wy)
-            _slopes(ux - ix, dx)
-            _slopes(uy - iy, dy)
-            _bends(ux - ix, bx)
-            _bends(uy - iy, by)
-            away_x, away_y = at_x - pivot[0], at_y - pivot[1]
-            from_pivot = max(away_x * away_x + away_y * away_y, 1.0)
-            for channel in range(planes):
-                look, along_x, along_y, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-                for j in range(4):
-                    for i in range(4):
-                        q = coefficients[channel, iy + j, ix + i]
-                        look += wx[i] * wy[j] * q
-                        along_x += dx[i] * wy[j] * q
-                        along_y += wx[i] * dy[j] * q
-                        xx += bx[i] * wy[j] * q
-                        xy += dx[i] * dy[j] * q
-                        yy += wx[i] * by[j] * q
-                along_x *= g * scale
-                along_y *= g * scale
-                slope[0] = along_y * away_x - along_x * away_y
-                slope[1] = along_x
-                slope[2] = along_y
-                bright[0] = g * look
-                bent = away_y * away_y * xx - 2.0 * away_x * away_y * xy + away_x * away_x * yy
-                bright[2] = g * scale * scale * bent / from_pivot
-                rest = values[m, channel] - g * look
-                squares[k] += rest * rest
-                counts[k] += 1
-                for a in range(3):
-                    pull[a] += slope[a] * rest
-                    for b in range(a, 3):
-                        whole[a, b] += slope[a] * slope[b]
-                for a in range(3):
-                    light_pull[channel, a] += bright[a] * rest
-                    for b in range(3):
-                        light[channel, a, b] += bright[a] * bright[b]
-                        across[channel, a, b] += bright[a] * slope[b]
-        if counts[k] < 30:
-            counts[k] = 0
-            squares[k] = 0.0
-            continue
-        for a in range(3):
-            for b in range(a):
-                whole[a, b] = whole[b, a]
-        # the view's brightness and blur are fitted along and eliminated
-        for channel in range(planes):
-            known = light[channel] + 1e-9 * np.eye(3)
-            taken = np.linalg.solve(known, across[channel])
-            told = np.linalg.solve(known, light_pull[channel])
-            whole -= across[channel].T @ taken
-            pull -= taken.T @ light_pull[channel]
-            squares[k] -= light_pull[channel] @ told
-            lights[k, channel] = told
-        normals[k], gradients[k] = whole, pull
-    return normals, gradients, squares, counts, lights

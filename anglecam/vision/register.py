@@ -17,8 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.video.frames import Image
 from anglecam.vision.patch import Fit, Patches, compare
-from anglecam.vision.tiles import SIDE_PX, Glimpse, Image, Plane, look_at
+from anglecam.vision.tiles import SIDE_PX, Glimpse, Plane, look_at
+from anglecam.vision.transforms import turned
 
 Floats = NDArray[np.float64]
 
@@ -36,7 +38,7 @@ _BETTER = 0.6
 """Misfit of another turn over that of the guess below which the guess is wrong."""
 _COPY = 0.13
 """What a codec's copy hides, as a share of the turn whose change of the picture equals the tiles' misfit: films with
-known angles, encoded by x264 at crf 12 to 30, presets ultrafast to medium, have 0.10 to 0.16."""
+known angles, encoded by x264 at crf 12 to 23, have 0.10 to 0.17. Coarser ones copy more than this tells of."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,7 @@ class Look:
 
     def row_of_middle(self, glimpse: Glimpse) -> float:
         """Return the row of the picture in which a frame shows the middle."""
-        c, s = np.cos(glimpse.turn), np.sin(glimpse.turn)
-        arm = (self.middle_px - self.pivot_px) @ np.array([[c, -s], [s, c]])
+        arm = (self.middle_px - self.pivot_px) @ turned(glimpse.turn)
         return float(self.plane.lens.distort(glimpse.pivot_px + arm)[1])
 
 
@@ -93,7 +94,7 @@ def find_turn(look: Look, glimpse: Glimpse, before: Image | None = None) -> Turn
     Parameters
     ----------
     look : Look
-        From `learn`.
+        From `anglecam.vision.learning.learn`.
     glimpse : Glimpse
         With the coarse turn, and the pivot on the same ground as ``look.pivot_px``.
     before : ndarray, optional
@@ -117,37 +118,41 @@ def find_turn(look: Look, glimpse: Glimpse, before: Image | None = None) -> Turn
             return LOST
         each = fit.weighted(np.where(clear, look.variance * max(usual, 1.0), np.inf))
         normal, gradient = each[0].sum(axis=0), each[1].sum(axis=0)
+        by_pixels = 1.0
         if glimpse.wander_px2 is not None:
-            normal, gradient = _wandering(normal, gradient, glimpse.wander_px2)
+            normal, gradient, by_pixels = _wandering(normal, gradient, glimpse.wander_px2)
         step = gradient[0] / normal[0, 0]
         turn += step
         if abs(step) < _SETTLED:
             break
-    c, s = np.cos(turn), np.sin(turn)
-    pull = -normal[0, 1:] @ (np.eye(2) - np.array([[c, -s], [s, c]])) / normal[0, 0]
+    pull = -normal[0, 1:] @ (np.eye(2) - turned(turn)) / normal[0, 0]
     noise = 1 / float(np.sqrt(normal[0, 0]))
     # a frame that a codec spoils more than others shows it in its own tiles, as far as so few can tell
     total, freedom = scatter(each[0][:, None], each[1][:, None], look.groups)
     birge2 = (_TRUST * look.birge**2 + total) / (_TRUST + max(freedom - 1, 0))
-    pose2 = noise**2 * max(birge2 - 1, 0.0)
+    pose2 = by_pixels * noise**2 * max(birge2 - 1, 0.0)
     if before is not None:
-        misfit = noise * np.sqrt(fit.count[clear].sum())
+        misfit = noise * np.sqrt(by_pixels * fit.count[clear].sum())
         pose2 += (_COPY * _copied(glimpse.image, before, places[clear]) * misfit) ** 2
     return Turn(float(turn), noise, float(np.sqrt(pose2)), pull)
 
 
-def _wandering(normal: Floats, gradient: Floats, covariance_px2: Floats) -> tuple[Floats, Floats]:
+def _wandering(normal: Floats, gradient: Floats, covariance_px2: Floats) -> tuple[Floats, Floats, float]:
     """Let the pivot lie where the frame wants it, as far as is known where it is: eliminate its displacement.
 
-    Its covariance is taken to be the same in all directions, so that the head's turn does not matter.
+    Its covariance is taken to be the same in all directions, so that the head's turn does not matter. Tell too which
+    share of the turn's variance is the pixels' and not the pivot's.
     """
-    free = normal[1:, 1:] + np.eye(2) / max(float(np.trace(covariance_px2)) / 2.0, 1e-9)
+    known = 1.0 / max(float(np.trace(covariance_px2)) / 2.0, 1e-9)
+    free = normal[1:, 1:] + known * np.eye(2)
     taken = np.linalg.solve(free, np.column_stack([normal[1:, :1], gradient[1:]]))
     told = normal.copy()
     told[0, 0] -= normal[0, 1:] @ taken[:, 0]
+    told[0, 1:] = known * taken[:, 0]
     pulled = gradient.copy()
     pulled[0] -= normal[0, 1:] @ taken[:, 1]
-    return told, pulled
+    by_pixels = 1.0 - known * float(taken[:, 0] @ taken[:, 0]) / float(told[0, 0])
+    return told, pulled, by_pixels
 
 
 def nearest_fit(look: Look, glimpse: Glimpse, reach_px: float) -> Glimpse:
@@ -156,7 +161,7 @@ def nearest_fit(look: Look, glimpse: Glimpse, reach_px: float) -> Glimpse:
     Parameters
     ----------
     look : Look
-        From `learn`.
+        From `anglecam.vision.learning.learn`.
     glimpse : Glimpse
         With a turn that may be wrong.
     reach_px : float

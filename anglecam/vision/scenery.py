@@ -1,9 +1,8 @@
 """Which parts of the picture are scenery, and how they move where the camera does not stand still.
 
-Small windows with edges are followed from the first of a few frames into the others (Lucas & Kanade 1981, through a
-pyramid of ever smaller pictures). The scenery is the group of windows that keep their places among one another in all
-frames: one shift and one roll a frame carry them all. A nodding head keeps its shape too; of such groups the one that
-turns less is the scenery.
+Small windows with edges are followed from the first of a few frames into the others (`anglecam.vision.windows`). The
+scenery is the group of windows that keep their places among one another in all frames: one shift and one roll a frame
+carry them all. A nodding head keeps its shape too; of such groups the one that turns less is the scenery.
 """
 
 from __future__ import annotations
@@ -11,30 +10,16 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.video.frames import Image
 from anglecam.vision.noise import pixel_noise
+from anglecam.vision.windows import GATE_PX, carried, find_windows, fit_motion, follow, level, metric_of, squared_gates
 
-Image = NDArray[Any]
-"""Bytes, but cv2's type hints do not know it."""
 Floats = NDArray[np.float64]
 
-SIDE_PX = 20
-"""Of a window."""
-_HALVINGS = 3
-"""Of the picture: shifts of some twenty pixels are found."""
-_LOCAL_PX = 15
-"""Brightness is told from its mean over a square of this side, so that flicker moves nothing."""
-_LEAST_SLOPE = 1.0
-"""Root mean square slope of a window's brightness over the pixels' noise, px⁻¹: its place is good to 1/20 px."""
-_EDGE = 0.05
-"""Ratio of a window's lesser to its greater information below which it is a straight edge and tells only across."""
-_GATE_PX = 0.3
-"""Distance from where the motion has it at which a window is half lost; Lucas and Kanade err by a tenth of that."""
 _FAR = 9.0
 """Squared gates from which on farther off is no worse."""
 _SEEN = 0.7
@@ -49,8 +34,6 @@ _SHARE = 0.25
 """Of the weight of the group that keeps its shape best, enough for one that turns less."""
 _ALIKE, _ALIKE_ROLL = 1.5, 0.001
 """Groups turn alike whose rolls scatter by this ratio, or by so little, rad."""
-_MOST = 300
-"""Windows; of more, every so many are taken."""
 _CELLS = 6
 """Squares across the picture, in each of which the best corner is tried as a seed."""
 _BASELINE_PX = 60.0
@@ -59,8 +42,6 @@ _STRETCH_PX = 0.5
 """Change of the distance of two windows that are not of one body."""
 _MOST_ROLL = np.radians(4.0)
 """From the first frame to any other; a stand that sags more is a mechanism."""
-_WINDOW_PX, _ROLL = 0.1, 0.01
-"""Standard deviations of a window's place, px, and of the roll before any is seen, rad."""
 _STILL_PX = 0.05
 """Root mean square displacement up to which a camera stands still."""
 _SURE = 3.0
@@ -123,11 +104,11 @@ def find_scenery(pictures: Sequence[Image]) -> Scenery | None:
         ``None`` where too little goes together.
     """
     levelled = [level(picture) for picture in pictures]
-    centres, tensor = _windows(pictures[0], pixel_noise(levelled))
+    centres, tensor = find_windows(pictures[0], pixel_noise(levelled))
     if len(centres) < _FEWEST or len(pictures) < 2:
         return None
     moved = np.stack([follow(levelled[0], one, centres) for one in levelled], axis=1)
-    metric, information = _metric(tensor)
+    metric, information = metric_of(tensor)
     seeds = _seeds(centres, tensor, pictures[0].shape[1] / _CELLS)
     still = _best((moved[seed] for seed in seeds), moved, metric)
     turned = _best(_motions_of_two(centres, moved, seeds), moved, metric)
@@ -139,7 +120,7 @@ def find_scenery(pictures: Sequence[Image]) -> Scenery | None:
     if group.sum() < _FEWEST or np.linalg.eigvalsh(metric[group].sum(axis=0))[0] < 1.0:
         return None
     close = off[group][off[group] < 1.0]
-    scatter = _GATE_PX * float(np.sqrt(close.mean()))
+    scatter = GATE_PX * float(np.sqrt(close.mean()))
     found = Scenery(centres[group], metric[group], information[group], origin, np.empty((0, 2)), rolls, scatter)
     each = [locate(found, moved[group, k]) for k in range(len(pictures))]
     found = replace(found, shifts_px=np.array([shift for shift, _ in each]), rolls=np.array([roll for _, roll in each]))
@@ -164,7 +145,7 @@ def locate(scenery: Scenery, moved: Floats) -> tuple[Floats, float]:
     """
     arms, moved = scenery.centres_px - scenery.origin_px, moved[:, None]
     low, high = float(np.nanmin(scenery.rolls)), float(np.nanmax(scenery.rolls))
-    step = _GATE_PX / float(np.hypot(*arms.T).max())
+    step = GATE_PX / float(np.hypot(*arms.T).max())
     tried = np.repeat(np.linspace(low, high, 1 + int((high - low) / step)), len(arms))
     shifts = np.tile(moved[:, 0], (len(tried) // len(arms), 1)) - np.concatenate(
         [carried(arms, np.zeros((1, 2)), tried[k : k + 1])[:, 0] for k in range(0, len(tried), len(arms))]
@@ -180,110 +161,6 @@ def locate(scenery: Scenery, moved: Floats) -> tuple[Floats, float]:
     if np.linalg.eigvals(np.linalg.solve(scenery.metric.sum(axis=0), along.sum(axis=0))).min() < _HALF:
         return np.full(2, np.nan), float("nan")
     return shift[0], float(roll[0])
-
-
-def level(picture: Image) -> Image:
-    """Tell brightness (h, w) from its local mean."""
-    mean = cv2.boxFilter(picture, -1, (_LOCAL_PX, _LOCAL_PX))
-    return cv2.addWeighted(picture, 1.0, mean, -1.0, 128.0)
-
-
-def follow(first: Image, other: Image, centres_px: Floats) -> Floats:
-    """Find by how much windows of a levelled picture are displaced in another one.
-
-    Parameters
-    ----------
-    first, other : ndarray
-        (h, w) from `level`.
-    centres_px : ndarray
-        (n, 2) of the windows in the first picture, px.
-
-    Returns
-    -------
-    ndarray
-        (n, 2) px, good to some hundredths; anything where the window is not to be seen.
-    """
-    start = centres_px.astype(np.float32)[:, None]
-    found, _, _ = cv2.calcOpticalFlowPyrLK(
-        first,
-        other,
-        start,
-        start.copy(),
-        winSize=(SIDE_PX + 1, SIDE_PX + 1),
-        maxLevel=_HALVINGS,
-        criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 15, 0.01),
-        minEigThreshold=1e-6,
-    )
-    return np.asarray((found - start)[:, 0], dtype=float)
-
-
-def carried(arms_px: Floats, shifts_px: Floats, rolls: Floats) -> Floats:
-    """Displace points (n, 2), given from the origin, by shifts (m, 2) and rolls (m,): (n, m, 2) px."""
-    x, y = arms_px[:, :1], arms_px[:, 1:]
-    c, s = np.cos(rolls) - 1.0, np.sin(rolls)
-    return np.stack([x * c + y * s, y * c - x * s], axis=-1) + shifts_px
-
-
-def fit_motion(
-    arms_px: Floats, moved: Floats, metric: Floats, weight: Floats, shifts_px: Floats, rolls: Floats
-) -> tuple[Floats, Floats]:
-    """Improve shifts and rolls by one weighted step of Gauss and Newton.
-
-    Parameters
-    ----------
-    arms_px : ndarray
-        (n, 2) windows from the origin, px.
-    moved : ndarray
-        (n, m, 2) their displacements in each frame, px.
-    metric : ndarray
-        (n, 2, 2) as in `Scenery`.
-    weight : ndarray
-        (n, m).
-    shifts_px, rolls : ndarray
-        (m, 2) px and (m,) rad so far.
-
-    Returns
-    -------
-    tuple of ndarray
-        Both, improved.
-    """
-    rest = moved - carried(arms_px, shifts_px, rolls)
-    by_roll = np.stack([arms_px[:, 1], -arms_px[:, 0]], axis=-1)
-    J = np.concatenate([np.broadcast_to(np.eye(2), (len(arms_px), 2, 2)), by_roll[..., None]], axis=-1)
-    MJ = metric @ J / _WINDOW_PX**2
-    normal = np.einsum("nk,nai,naj->kij", weight, J, MJ) + np.diag([1e-6, 1e-6, 1.0 / _ROLL**2])
-    right = np.einsum("nk,nka,nai->ki", weight, rest, MJ)
-    right[:, 2] -= rolls / _ROLL**2
-    step = np.linalg.solve(normal, right[..., None])[..., 0]
-    return shifts_px + step[:, :2], rolls + step[:, 2]
-
-
-def squared_gates(rest: Floats, metric: Floats) -> Floats:
-    """Square distances (n, m, 2) across edges, in gates."""
-    return np.einsum("nka,nab,nkb->nk", rest, metric, rest) / _GATE_PX**2
-
-
-def _windows(picture: Image, noise: float) -> tuple[Floats, Floats]:
-    """Cut the picture into squares; return those with edges, (n, 2), and their structure tensors, (n, 2, 2)."""
-    smooth = cv2.GaussianBlur(picture, (0, 0), 0.7)
-    gx, gy = (cv2.Scharr(smooth, cv2.CV_32F, *axis, scale=1 / 32) for axis in ((1, 0), (0, 1)))
-    half = SIDE_PX // 2
-    inner = np.s_[SIDE_PX : -half - 1 : SIDE_PX, SIDE_PX : -half - 1 : SIDE_PX]
-    xx, xy, yy = (cv2.boxFilter(part, -1, (SIDE_PX, SIDE_PX))[inner] for part in (gx * gx, gx * gy, gy * gy))
-    tensor = np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-2).astype(float)
-    row, column = np.nonzero(np.linalg.eigvalsh(tensor)[..., 1] > (_LEAST_SLOPE * max(noise, 1.0)) ** 2)
-    thin = np.s_[:: 1 + len(row) // _MOST]
-    centres = np.asarray(SIDE_PX * (np.column_stack([column, row])[thin] + 1.0), dtype=float)
-    return centres, tensor[row, column][thin]
-
-
-def _metric(tensor: Floats) -> tuple[Floats, Floats]:
-    """Scale structure tensors to 1 across the main edge, which is returned too; straight edges say nothing along."""
-    values, vectors = np.linalg.eigh(tensor)
-    most: Floats = values[:, 1]
-    along = np.where(values[:, 0] < _EDGE * most, 0.0, values[:, 0] / most)
-    scale = np.stack([along, np.ones(len(most))], axis=-1)
-    return np.einsum("nai,ni,nbi->nab", vectors, scale, vectors), most
 
 
 def _seeds(centres: Floats, tensor: Floats, cell_px: float) -> NDArray[np.intp]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import cv2
 import numpy as np
@@ -17,10 +16,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from anglecam.lens import Lens
+from anglecam.video.frames import Image
 from anglecam.vision.patch import Views
+from anglecam.vision.transforms import turned
 
-Image = NDArray[Any]
-"""Bytes, but cv2's type hints do not know it."""
 Floats = NDArray[np.float64]
 
 SIDE_PX = 16
@@ -152,7 +151,7 @@ def look_at(
     reach = (0.71 * SIDE_PX + 1.5) * plane.stretch
     for g in glimpses:
         arm = corners + SIDE_PX / 2 - pivot_px - beside
-        middle = plane.lens.distort(arm @ _turned(g.turn) + g.pivot_px + beside)
+        middle = plane.lens.distort(arm @ turned(g.turn) + g.pivot_px + beside)
         if g.turn_per_row:
             early = g.turn_per_row * (middle[:, 1] - g.row)
             middle = plane.lens.distort(_each_turned(arm, g.turn + early) + g.pivot_px + beside)
@@ -177,13 +176,8 @@ def look_at(
     return Views(np.concatenate(offsets), np.concatenate(values), np.array(starts)), np.concatenate(centres)
 
 
-def _turned(turn: float) -> Floats:
-    """Return the matrix M with which v @ M is v turned counter-clockwise as seen, y down."""
-    c, s = np.cos(turn), np.sin(turn)
-    return np.array([[c, -s], [s, c]])
-
-
 def _each_turned(arms: Floats, turns: Floats) -> Floats:
+    """Turn each point (n, 2) by its own turn (n,): of whole pictures, without a matrix a pixel."""
     c, s = np.cos(turns), np.sin(turns)
     return np.column_stack([c * arms[:, 0] + s * arms[:, 1], -s * arms[:, 0] + c * arms[:, 1]])
 
@@ -222,13 +216,13 @@ def _stack(
     arms = np.stack([x, y], axis=-1).reshape(-1, 2) - pivot_px - beside
     pile, whole = [], np.ones(x.shape, bool)
     for g in glimpses:
-        there = plane.lens.distort(arms @ _turned(g.turn) + g.pivot_px + beside)
+        there = plane.lens.distort(arms @ turned(g.turn) + g.pivot_px + beside)
         if g.turn_per_row:
             early = g.turn_per_row * (there[:, 1] - g.row)
             there = plane.lens.distort(_each_turned(arms, g.turn + early) + g.pivot_px + beside)
         at = there.reshape(*x.shape, 2).astype(np.float32)
-        turned = cv2.remap(g.image, at[..., 0], at[..., 1], cv2.INTER_LINEAR)
-        pile.append(turned.reshape(*x.shape, -1).astype(np.float32))
+        back = cv2.remap(g.image, at[..., 0], at[..., 1], cv2.INTER_LINEAR)
+        pile.append(back.reshape(*x.shape, -1).astype(np.float32))
         whole &= (at >= 0).all(axis=2) & (at[..., 0] <= width - 1) & (at[..., 1] <= height - 1)
     return *_middle_and_spread(np.stack(pile)), whole
 

@@ -1,0 +1,249 @@
+"""The sums over pixels behind a patch's look and its fits, compiled: cubic B-splines and their derivatives.
+
+A pixel at an offset from the centre of rotation is turned onto the tile and weighs the 4 × 4 coefficients about it.
+
+No compiled function here calls one of another file, so that a cached one is never out of date.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, inline="always")
+def _weights(u, w):  # type: ignore[no-untyped-def]
+    w[0] = (1 - u) ** 3 / 6
+    w[1] = (3 * u**3 - 6 * u**2 + 4) / 6
+    w[2] = (-3 * u**3 + 3 * u**2 + 3 * u + 1) / 6
+    w[3] = u**3 / 6
+
+
+@njit(cache=True, inline="always")
+def _slopes(u, d):  # type: ignore[no-untyped-def]
+    d[0] = -((1 - u) ** 2) / 2
+    d[1] = (3 * u * u - 4 * u) / 2
+    d[2] = (-3 * u * u + 2 * u + 1) / 2
+    d[3] = u * u / 2
+
+
+@njit(cache=True, inline="always")
+def _bends(u, b):  # type: ignore[no-untyped-def]
+    b[0] = 1 - u
+    b[1] = 3 * u - 2
+    b[2] = 1 - 3 * u
+    b[3] = u
+
+
+@njit(cache=True, inline="always")
+def _gain(gains, turn, x, y):  # type: ignore[no-untyped-def]
+    total, power = 1.0, 1.0
+    for p in range(gains.shape[0]):
+        power *= turn
+        total += power * (gains[p, 0] + gains[p, 1] * x + gains[p, 2] * y)
+    return total
+
+
+@njit(cache=True)
+def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gains):  # type: ignore[no-untyped-def]
+    """Gather the equations for a tile's coefficients from views at known turns and gains.
+
+    Parameters
+    ----------
+    offsets, values, starts : ndarray
+        Of the views, see `anglecam.vision.patch.Views`.
+    turns : ndarray
+        (views,) rad.
+    pivot, corner : ndarray
+        (2,) centre of rotation and upper left corner of the tile, px.
+    side : int
+        Of the tile, px.
+    n : int
+        Coefficients along a side.
+    gains : ndarray
+        (powers, 3) of the gain.
+
+    Returns
+    -------
+    tuple of ndarray
+        (n², 49) products of each coefficient's spline with those of its 7 × 7 neighbours, and (planes, n²) with the
+        pixels' values.
+    """
+    band = np.zeros((n * n, 49))
+    planes = values.shape[1]
+    right = np.zeros((planes, n * n))
+    wx, wy = np.zeros(4), np.zeros(4)
+    scale = (n - 3) / side
+    for k in range(len(turns)):
+        c, s = np.cos(turns[k]), np.sin(turns[k])
+        for m in range(starts[k], starts[k + 1]):
+            x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1] - corner[0]
+            y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1] - corner[1]
+            if x < 0 or y < 0 or x >= side or y >= side:
+                continue
+            g = _gain(gains, turns[k], 2 * x / side - 1, 2 * y / side - 1)
+            ux, uy = x * scale, y * scale
+            ix, iy = int(ux), int(uy)
+            _weights(ux - ix, wx)
+            _weights(uy - iy, wy)
+            for j in range(4):
+                for i in range(4):
+                    w = g * wx[i] * wy[j]
+                    p = (iy + j) * n + ix + i
+                    for channel in range(planes):
+                        right[channel, p] += w * values[m, channel]
+                    for jj in range(4):
+                        for ii in range(4):
+                            band[p, (jj - j + 3) * 7 + ii - i + 3] += w * g * wx[ii] * wy[jj]
+    return band, right
+
+
+@njit(cache=True)
+def gain_equations(offsets, values, starts, turns, pivot, corner, side, coefficients):  # type: ignore[no-untyped-def]
+    """Gather the equations for a tile's gain, the coefficients given.
+
+    Parameters
+    ----------
+    offsets, values, starts, turns, pivot, corner, side
+        As in `normal_equations`.
+    coefficients : ndarray
+        (planes, n, n), y first.
+
+    Returns
+    -------
+    tuple of ndarray
+        Normal matrix (9, 9) and right side (9,), for constant, x and y of the first power of the turn and so on.
+    """
+    n = coefficients.shape[1]
+    terms = 3 * 3
+    normal, gradient, basis = np.zeros((terms, terms)), np.zeros(terms), np.zeros(terms)
+    wx, wy = np.zeros(4), np.zeros(4)
+    scale = (n - 3) / side
+    for k in range(len(turns)):
+        c, s = np.cos(turns[k]), np.sin(turns[k])
+        for m in range(starts[k], starts[k + 1]):
+            x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1] - corner[0]
+            y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1] - corner[1]
+            if x < 0 or y < 0 or x >= side or y >= side:
+                continue
+            ux, uy = x * scale, y * scale
+            ix, iy = int(ux), int(uy)
+            _weights(ux - ix, wx)
+            _weights(uy - iy, wy)
+            power = 1.0
+            for p in range(3):
+                power *= turns[k]
+                basis[3 * p] = power
+                basis[3 * p + 1] = power * (2 * x / side - 1)
+                basis[3 * p + 2] = power * (2 * y / side - 1)
+            for channel in range(coefficients.shape[0]):
+                look = 0.0
+                for j in range(4):
+                    for i in range(4):
+                        look += wx[i] * wy[j] * coefficients[channel, iy + j, ix + i]
+                rest = values[m, channel] - look
+                for a in range(terms):
+                    gradient[a] += basis[a] * look * rest
+                    for b in range(terms):
+                        normal[a, b] += basis[a] * basis[b] * look * look
+    return normal, gradient
+
+
+@njit(cache=True)
+def turn_equations(offsets, values, starts, turns, pivots, corners, side, looks, all_gains):  # type: ignore[no-untyped-def]
+    """Gather what each view says of its turn, and of its centre's place, against a look.
+
+    The view's own brightness and blur, plane by plane, are fitted along and eliminated.
+
+    Parameters
+    ----------
+    offsets, values, starts, turns, side
+        As in `normal_equations`.
+    pivots, corners, looks, all_gains : ndarray
+        (tiles, …) centres of rotation, corners, coefficients and gains: of one tile, or of one for each view.
+
+    Returns
+    -------
+    tuple of ndarray
+        What `anglecam.vision.patch.Fit` holds, in its order.
+    """
+    views, planes, n = len(turns), looks.shape[1], looks.shape[2]
+    normals, gradients = np.zeros((views, 3, 3)), np.zeros((views, 3))
+    squares, counts = np.zeros(views), np.zeros(views, dtype=np.int64)
+    lights = np.zeros((views, planes, 3))
+    wx, wy, dx, dy, bx, by = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4)
+    slope, bright = np.zeros(3), np.ones(3)
+    scale = (n - 3) / side
+    for k in range(views):
+        c, s = np.cos(turns[k]), np.sin(turns[k])
+        p = k if len(looks) > 1 else 0
+        pivot, corner, coefficients, gains = pivots[p], corners[p], looks[p], all_gains[p]
+        whole, pull = np.zeros((3, 3)), np.zeros(3)
+        light, light_pull, across = np.zeros((planes, 3, 3)), np.zeros((planes, 3)), np.zeros((planes, 3, 3))
+        for m in range(starts[k], starts[k + 1]):
+            at_x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1]
+            at_y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1]
+            x, y = at_x - corner[0], at_y - corner[1]
+            # half a pixel within, where the spline has been seen from all sides
+            if x < 0.5 or y < 0.5 or x >= side - 0.5 or y >= side - 0.5:
+                continue
+            g = _gain(gains, turns[k], 2 * x / side - 1, 2 * y / side - 1)
+            ux, uy = x * scale, y * scale
+            ix, iy = int(ux), int(uy)
+            _weights(ux - ix, wx)
+            _weights(uy - iy, wy)
+            _slopes(ux - ix, dx)
+            _slopes(uy - iy, dy)
+            _bends(ux - ix, bx)
+            _bends(uy - iy, by)
+            away_x, away_y = at_x - pivot[0], at_y - pivot[1]
+            from_pivot = max(away_x * away_x + away_y * away_y, 1.0)
+            for channel in range(planes):
+                look, along_x, along_y, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+                for j in range(4):
+                    for i in range(4):
+                        q = coefficients[channel, iy + j, ix + i]
+                        look += wx[i] * wy[j] * q
+                        along_x += dx[i] * wy[j] * q
+                        along_y += wx[i] * dy[j] * q
+                        xx += bx[i] * wy[j] * q
+                        xy += dx[i] * dy[j] * q
+                        yy += wx[i] * by[j] * q
+                along_x *= g * scale
+                along_y *= g * scale
+                slope[0] = along_y * away_x - along_x * away_y
+                slope[1] = along_x
+                slope[2] = along_y
+                bright[0] = g * look
+                bent = away_y * away_y * xx - 2.0 * away_x * away_y * xy + away_x * away_x * yy
+                bright[2] = g * scale * scale * bent / from_pivot
+                rest = values[m, channel] - g * look
+                squares[k] += rest * rest
+                counts[k] += 1
+                for a in range(3):
+                    pull[a] += slope[a] * rest
+                    for b in range(a, 3):
+                        whole[a, b] += slope[a] * slope[b]
+                for a in range(3):
+                    light_pull[channel, a] += bright[a] * rest
+                    for b in range(3):
+                        light[channel, a, b] += bright[a] * bright[b]
+                        across[channel, a, b] += bright[a] * slope[b]
+        if counts[k] < 30:
+            counts[k] = 0
+            squares[k] = 0.0
+            continue
+        for a in range(3):
+            for b in range(a):
+                whole[a, b] = whole[b, a]
+        # the view's brightness and blur are fitted along and eliminated
+        for channel in range(planes):
+            known = light[channel] + 1e-9 * np.eye(3)
+            taken = np.linalg.solve(known, across[channel])
+            told = np.linalg.solve(known, light_pull[channel])
+            whole -= across[channel].T @ taken
+            pull -= taken.T @ light_pull[channel]
+            squares[k] -= light_pull[channel] @ told
+            lights[k, channel] = told
+        normals[k], gradients[k] = whole, pull
+    return normals, gradients, squares, counts, lights
