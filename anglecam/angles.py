@@ -17,6 +17,7 @@ from anglecam.lens import Lens
 from anglecam.registration import Registered
 from anglecam.rig import Rig
 from anglecam.session import Command
+from anglecam.shutter import mean_off_middle
 from anglecam.sighting import Sighting
 from anglecam.uncertainty import Tilt
 from anglecam.vision.one_centre import RigidMotion
@@ -63,6 +64,8 @@ class Angles:
     """Of the mouth's centroid."""
     view: ViewErrors
     """Of lens and tilt."""
+    within_exposure: Floats
+    """Standard uncertainty by motion that is not steady within the exposure, rad."""
     registered: Registered | None = None
     """What the fine angles come from."""
     shared: float = 0.0
@@ -117,8 +120,9 @@ def coarse_angles(seen: Sighting, ok: NDArray[np.bool_], time: Floats, rig: Rig,
     thick = _THICK * float(np.median(np.sqrt([r.area_px2 for r in regions])))
     aside = thick * np.hypot(*seen.lens.parallax) * (line - neutral) / lever
     known = angle_sigma(mouth, pivot.centre_px, pivot.covariance_px2, errors, resting)
-    sigma = np.sqrt(known**2 + view.sigma**2 + aside**2)
-    return Angles(line, sigma, mouth, pivot, neutral, resting, errors, view)
+    unsteady = mean_off_middle(time[ok], line, rig.camera.exposure_s)
+    sigma = np.sqrt(known**2 + view.sigma**2 + aside**2 + unsteady**2)
+    return Angles(line, sigma, mouth, pivot, neutral, resting, errors, view, unsteady)
 
 
 def _angles_of_head(
@@ -136,7 +140,9 @@ def _angles_of_head(
     errors = PlaceErrors(sigma * lever, 0.0)
     view = _view_errors(seen.lens, mouth, seen.pivot.centre_px, line, neutral, resting, rig)
     known = angle_sigma(mouth, seen.pivot.centre_px, seen.pivot.covariance_px2, errors, resting)
-    return Angles(line, np.hypot(known, view.sigma), mouth, seen.pivot, neutral, resting, errors, view)
+    unsteady = mean_off_middle(time[ok], line, rig.camera.exposure_s)
+    sigma = np.sqrt(known**2 + view.sigma**2 + unsteady**2)
+    return Angles(line, sigma, mouth, seen.pivot, neutral, resting, errors, view, unsteady)
 
 
 def turns(angles: Angles, rig: Rig) -> Floats:
@@ -191,7 +197,8 @@ def fine_angles(
     shared = _sigma_of_mean(turn[used], noise[used], float(np.median(pose[seen])), filmed_px[used])
     against = pull - pull[used].mean(axis=0)
     by_pivot = np.einsum("ni,ij,nj->n", against, found.pivot_covariance_px2, against)
-    sigma = np.sqrt(noise**2 + pose**2 + shared**2 + by_pivot + coarse.view.sigma**2)
+    unsteady = mean_off_middle(time, line, rig.camera.exposure_s)
+    sigma = np.sqrt(noise**2 + pose**2 + shared**2 + by_pivot + coarse.view.sigma**2 + unsteady**2)
     if resting is None:
         # an absolute line stands on the mouth's mean place on the head, and on the pivot
         sigma = np.sqrt(sigma**2 + float(np.median(coarse.sigma[seen])) ** 2)
@@ -203,6 +210,7 @@ def fine_angles(
         pivot=pivot,
         neutral=neutral,
         resting=resting,
+        within_exposure=unsteady,
         registered=found,
         shared=shared,
     )

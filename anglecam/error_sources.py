@@ -79,6 +79,7 @@ def error_sources(measured: Measurement, rig: Rig) -> ErrorSources:
         mouth_on_head=None if mouth_on_head is None else mouth_on_head[kept],
         lens_px=(angles.view.lens * angles.lever_px)[kept] if angles.view.lens.any() else None,
         tilt=angles.view.tilt,
+        within_exposure=angles.within_exposure[kept] if angles.within_exposure.any() else None,
         exposure_s=rig.camera.exposure_s,
     )
 
@@ -120,7 +121,8 @@ def _by_registration(
     pull = np.where(seen[:, None], pull, mean)
     off = pull - mean
     by_pivot = np.einsum("ni,ij,nj->n", off, angles.pivot.covariance_px2, off)
-    rest = np.sqrt(np.maximum(angles.sigma**2 - by_pivot - shared**2 - np.where(seen, sigma**2, 0.0), 0.0))
+    explained = by_pivot + shared**2 + angles.within_exposure**2 + np.where(seen, sigma**2, 0.0)
+    rest = np.sqrt(np.maximum(angles.sigma**2 - explained, 0.0))
     alone = np.where(seen, 0.0, rest * angles.lever_px)
     mouth_on_head = np.where(seen, rest, 0.0) if neutral is None else None
     stand_in = neutral or _neutral(angles, used, np.zeros(len(rows), np.int64), mirrored)

@@ -115,6 +115,8 @@ class ErrorSources:
     lens_px: Floats | None = None
     """How far the calibration may still displace the mouth along its path against neutral, standard uncertainty, px."""
     tilt: Tilt | None = None
+    within_exposure: Floats | None = None
+    """Standard uncertainty by motion that is not steady within the exposure, rad."""
     exposure_s: float | None = None
     """Length of the exposure, anywhere in which the camera may have stamped the frame, s."""
     clock_s: float | None = None
@@ -219,6 +221,8 @@ def courses(sources: ErrorSources) -> tuple[Course, ...]:
         zero = s.line - s.angle
         off = off - (s.tilt.turned(zero, s.tilt.sigma) - zero)
         found.append(Course("camera tilt", "rad", s.tilt.sigma * even, off / s.tilt.sigma, "declared (B)"))
+    if s.within_exposure is not None:
+        found.append(Course("acceleration in the exposure", "rad", s.within_exposure, even, "exposure declared (B)"))
     for name, step, known in (
         ("instant within the exposure", s.exposure_s, "exposure declared (B)"),
         ("time stamp's step", s.clock_s, "the file's unit of time (B)"),
@@ -266,7 +270,7 @@ def angle_draws(sources: ErrorSources, i: int) -> Draw:
         line = _direction(mouth + places(s.noise_px[i] * noise) + pose - pivot) + error @ pull
         if s.lens_px is not None:
             line = line + rng.standard_normal(m) * (s.lens_px[i] / s.lever_px[i])
-        for turned in (s.registration, s.mouth_on_head):
+        for turned in (s.registration, s.mouth_on_head, s.within_exposure):
             if turned is not None:
                 line = line + rng.standard_normal(m) * turned[i]
         line0: Floats = np.full(m, zero)

@@ -65,7 +65,7 @@ CASES = {
     "flicker 10 %": Case({"flicker": {"share": 0.1}}),
     "vignetting 40 %": Case({"vignetting": 0.4}),
     "shake 2 px": Case({"shake": {"rms_px": 2.0}}),
-    "exposure 60 %": Case({"exposure_s": 0.02}),
+    "exposure 60 %": Case({"exposure_s": 0.02}, declare={"camera": {"exposure_s": 0.02}}),
     "occluder 0.5 s": Case(scene={"occluders": [{"from_s": 2.0, "for_s": 0.5}]}),
     "k1 = −0.15, calibrated": Case(
         {"codec": "ffv1", "distance_m": 0.6},

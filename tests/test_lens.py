@@ -13,7 +13,7 @@ from anglecam.calibration import Calibration, read_calibration, write_calibratio
 from anglecam.errors import InputError, RigError
 from anglecam.lens import Lens, lens_from_rig
 from anglecam.rig import Rig, read_rig
-from anglecam.shutter import measurement_time
+from anglecam.shutter import mean_off_middle, measurement_time
 
 SIZE = (640, 480)
 PIVOT = np.array([240.0, 300.0])
@@ -236,3 +236,12 @@ def test_a_rolling_shutter_shifts_time_by_the_mouths_row():
     time = measurement_time([1.0, 2.0, 3.0], [0.0, 239.5, np.nan], 480, 2e-5)
     np.testing.assert_allclose(time, [1.0 - 239.5 * 2e-5, 2.0, 3.0], atol=1e-15)
     np.testing.assert_array_equal(measurement_time([1.0, 2.0], [0.0, 9.0], 480, None), [1.0, 2.0])
+
+
+def test_the_mean_over_an_exposure_lies_off_its_middle_by_what_is_stated():
+    t, exposure, acceleration = np.arange(5) / 30.0, 0.02, 7.0
+    inside = np.linspace(-0.5, 0.5, 20001) * exposure
+    mean = np.trapezoid(0.5 * acceleration * (t[2] + inside) ** 2, inside) / exposure
+    off = mean - 0.5 * acceleration * t[2] ** 2
+    np.testing.assert_allclose(mean_off_middle(t, 0.5 * acceleration * t**2, exposure), off, rtol=1e-4)
+    assert not mean_off_middle(t, t**2, None).any()
