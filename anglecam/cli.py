@@ -17,6 +17,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from anglecam import __version__
 from anglecam.calibrate import calibrate_clip
 from anglecam.calibration import write_calibration
 from anglecam.errors import AnglecamError, InputError, RigError, blame
@@ -46,7 +47,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-screen = Console()
+screen = Console(width=None if sys.stdout.isatty() else 120)
 errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
 
 Out = Annotated[Path, typer.Option("--out", help="Folder for the results; made if missing.")]
@@ -54,6 +55,21 @@ RigFile = Annotated[
     Path | None, typer.Option("--rig", help="Rig file for all clips; default: rig.yaml beside each clip.")
 ]
 SessionFolder = Annotated[Path, typer.Argument(metavar="SESSION", help="Folder of clips or *.angles.csv of one rig.")]
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"anglecam {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _anglecam(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and leave.")
+    ] = False,
+) -> None:
+    """From clips of a moving mechanism to its angle, its model, and what the model lacks."""
 
 
 @app.command()
@@ -264,7 +280,7 @@ def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement:
             command_beside(clip),
             progress=lambda n, total: bars.update(bar, completed=n, total=total or None),
         )
-    for note in measurement.sighting.notes:
+    for note in measurement.notes:
         screen.print(f"{clip}: {note}", soft_wrap=True, highlight=False, markup=False)
     return measurement
 

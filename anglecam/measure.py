@@ -41,6 +41,15 @@ class Measurement:
     """The measured frames, and what their uncertainties are made of."""
     why_coarse: str | None
     """Why the angles are the mouth's own; ``None`` where they are the whole head's."""
+    zero: str | None
+    """Where zero is not where it should be, and why."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the user should know, a line each."""
+        by = "mouth" if self.sighting.head is None else "head's key frames"
+        coarse = () if self.why_coarse is None else (f"measured by the {by} alone: {self.why_coarse}",)
+        return (*self.sighting.notes, *coarse, *(() if self.zero is None else (self.zero,)))
 
     @property
     def contours_px(self) -> tuple[NDArray[np.int32] | None, ...]:
@@ -102,7 +111,15 @@ def measure_clip(
                 other = coarse_angles(head, rigid, head.time, rig, command)
                 if (other.sigma**2).mean() < (angles.sigma**2).mean():
                     seen, ok, time, angles = head, rigid, head.time, other
-    return Measurement(_series(path, rig, time, seen, ok, angles), seen, angles, why_coarse)
+    series = _series(path, rig, time, seen, ok, angles)
+    return Measurement(series, seen, angles, why_coarse, _zero(rig, command, time[ok]))
+
+
+def _zero(rig: Rig, command: Command | None, time: Floats) -> str | None:
+    change = None if command is None or rig.neutral != "auto" else command.first_change()
+    if change is None or (time < change).any():
+        return None
+    return f"zero is the clip's median: no frame before the first command change at {change:.3f} s could be measured"
 
 
 def _only_the_path_tells(seen: Sighting, rig: Rig) -> bool:

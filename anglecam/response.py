@@ -91,7 +91,8 @@ def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[floa
     sigma : ndarray
         (n,) standard uncertainty, rad; where it is NaN throughout, it is taken from the angle's own roughness.
     changes : sequence of float
-        Times at which a command changed, s, where they are known: a response then begins there.
+        Times at which a command changed, s, where they are known: a response then begins there, and a way on which it
+        changed again is no response to one change and is left out.
 
     Returns
     -------
@@ -107,8 +108,9 @@ def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[floa
     rests = _lasting(_distinct(_rests(t, y, s, band), t, y, band), t, y, band)
     found, frame = [], float(np.median(np.diff(t)))
     for before, after in pairwise(rests):
-        if abs(after.level - before.level) >= _LEAST_WAY * band:
-            found.append(_response(t, y, s, before, after, changes, frame))
+        meant = [c for c in changes if t[before.last] - frame <= c < t[after.first]]
+        if abs(after.level - before.level) >= _LEAST_WAY * band and len(meant) <= 1:
+            found.append(_response(t, y, s, before, after, meant[0] if meant else None, frame))
     return tuple(found)
 
 
@@ -230,13 +232,11 @@ def _rough_rise(t: Floats, y: Floats, before: _Rest, after: _Rest, band: float) 
 
 
 def _response(
-    t: Floats, y: Floats, s: Floats, before: _Rest, after: _Rest, changes: Sequence[float], frame: float
+    t: Floats, y: Floats, s: Floats, before: _Rest, after: _Rest, begun: float | None, frame: float
 ) -> Response:
     rows = slice(max(before.first, before.last - _MARGIN_FRAMES), min(after.last, after.first + _MARGIN_FRAMES) + 1)
     t, y, s = t[rows], y[rows], s[rows]
     grid = np.interp(np.arange((len(t) - 1) * _PER_FRAME + 1) / _PER_FRAME, np.arange(len(t)), t)
-    known = [c for c in changes if t[0] <= c <= t[-1]]
-    begun = known[0] if known else None
     levels = before.level, after.level
     curve = _smooth(t, y, s)
     figures = _read(curve, grid, levels, begun)

@@ -150,7 +150,10 @@ def sight_clip(path: Path, rig: Rig, progress: Callable[[int, int], None] | None
     if OK not in status:
         raise InputError(_nothing_measured(path, status, sample, rig))
     if pivot is None:
-        raise InputError(f"{path}: no pivot found: the mouth hardly moves and there is no round marker to see")
+        raise InputError(
+            f"{path}: no pivot found: the mouth's way is too short to tell, and no round marker is to be seen near its"
+            " centre; say where it is: pivot: {near: [x, y]} in rig.yaml"
+        )
     notes = [disagreement] if disagreement else []
     if shakes is not None:
         notes.append(

@@ -93,6 +93,21 @@ def test_a_swaying_mug_vignetting_and_flicker_do_no_harm(tmp_path):
     _all_right(measured, truth, 0.003)
 
 
+def test_one_step_beside_a_larger_swaying_mug_of_the_lips_colour_is_measured_from_its_rest_on(tmp_path):
+    measured, truth = _measure(
+        tmp_path,
+        seconds=2.5,
+        command={"kind": "step", "amplitude_deg": 12},
+        camera={"codec": "h264", "shake": {"rms_px": 1.0}},
+        rig={"head": "male", "skin": "brown", "lips": "plum"},
+        scene={"distractor": {"at_px": [80, 400], "sway_px": 10}},
+    )
+    error, sigma = _errors(measured, truth)
+    assert measured.series.ok.mean() > 0.95
+    assert np.abs(error).max() < 0.1
+    assert np.std(error / sigma) < 2.0
+
+
 def test_only_what_is_hidden_is_occluded_and_no_wrong_row_is_ok(tmp_path):
     measured, truth = _measure(tmp_path, seconds=3.0, scene={"occluders": [{"from_s": 1.2, "for_s": 0.5}]})
     status = np.array(measured.series.status)

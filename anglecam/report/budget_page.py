@@ -175,11 +175,14 @@ def _shown(title: str, one: FrameBudget, content: dict[str, Any]) -> dict[str, A
 
     known = 1.959964 * one.combined.standard
     low, high = one.angle_deg - one.combined.expanded, one.angle_deg + one.combined.expanded
+    # where the linear budget does not hold, the drawn interval is the one to state (JCGM 101, 5.8)
+    ends = (one.drawn.low, one.drawn.high)
+    half = one.combined.expanded if one.comparison.agrees else max(abs(end - one.angle_deg) for end in ends)
     return {
         "title": title,
         "content": content,
         "angle": f"{one.angle_deg:.{stated}f}",
-        "expanded": f"{one.combined.expanded:.{stated}f}",
+        "expanded": f"{half:.{stated}f}",
         "decimals": _decimals(one.combined.standard, 3),
         "fine": fine,
         "gum": interval(low, high),

@@ -28,11 +28,11 @@ def series_table(measurements: Sequence[Measurement]) -> Table:
         table.add_row(
             series.name,
             f"{ok.sum()} of {len(ok)}",
-            f"{degrees.min():.2f} … {degrees.max():.2f}",
+            f"{_plain(degrees.min())} … {_plain(degrees.max())}",
             f"{np.degrees(np.median(series.sigma[ok])):.4f}",
             f"{np.degrees(np.median(series.bounds[6.0][ok])):.2f}",
             measurement.angles.pivot.source,
-            "whole head" if measurement.why_coarse is None else f"{_coarse(measurement)}: {measurement.why_coarse}",
+            "whole head" if measurement.why_coarse is None else _coarse(measurement),
         )
     return table
 
@@ -52,13 +52,18 @@ def response_table(name: str, answers: Sequence[Response]) -> Table:
     for a in answers:
         table.add_row(
             f"{a.start.value:.3f}",
-            f"{np.degrees(a.from_angle.value):.2f} → {np.degrees(a.to_angle.value):.2f}",
+            f"{_plain(np.degrees(a.from_angle.value))} → {_plain(np.degrees(a.to_angle.value))}",
             _figure(a.rise_time),
             _figure(a.overshoot, 100.0),
             _figure(a.settling_time),
             _figure(a.peak_speed, 180.0 / np.pi),
         )
     return table
+
+
+def _plain(degrees: float) -> str:
+    """Write an angle; what rounds to zero has no sign."""
+    return f"{round(float(degrees), 2) + 0.0:.2f}"
 
 
 def _figure(figure: Figure, factor: float = 1.0) -> str:

@@ -8,13 +8,14 @@ is less red. What is left is told by how often it is seen, how constant it is in
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.vision.carried import carried_share
 from anglecam.vision.circle import circle_through
 from anglecam.vision.colour import ColourModel, chroma_of, hue_contrast, learn_colour
 
@@ -46,6 +47,8 @@ _BENT_PX = 0.5
 """Distance from a straight line from which on a way is surely none."""
 _STRAIGHT = 0.1
 """What a straight way counts against a bent one: a mouth that hardly moves has no other."""
+_TOGETHER = 2
+"""Power with which it counts that a patch moves with its surroundings."""
 _PER_FRAME = 12
 _TRIALS = 600
 _HUE_TOLERANCE = np.radians(25.0)
@@ -68,6 +71,7 @@ class Found:
 @dataclass(frozen=True)
 class _Patches:
     frame: NDArray[np.int64]
+    filmed: Floats
     place: Floats
     area: Floats
     contrast: Floats
@@ -119,7 +123,7 @@ def find_mouth(
         if level - usual < _LEAST_CONTRAST / 2.0:
             continue
         patches = _cut_out(maps, level, usual, placed)
-        found = [_moving_track(patches, maps, level, near_px)]
+        found = [_moving_track(patches, images, level, near_px)]
         if at_rest:
             found.append(_resting_track(patches, images, level))
         tracks += [track for track in found if track is not None]
@@ -146,7 +150,7 @@ def _hue_range(maps: Sequence[NDArray[Any]], at_rest: bool) -> tuple[float, floa
 def _cut_out(
     maps: Sequence[NDArray[Any]], level: float, usual: float, placed: Callable[[int, Floats], Floats]
 ) -> _Patches:
-    frame, place, area, contrast, label = [], [], [], [], []
+    frame, filmed, place, area, contrast, label = [], [], [], [], [], []
     for t, hue in enumerate(maps):
         _, _, stats, centres = cv2.connectedComponentsWithStats((hue > level).astype(np.uint8), connectivity=8)
         sizes = stats[:, cv2.CC_STAT_AREA]
@@ -156,12 +160,14 @@ def _cut_out(
             x, y, w, h = stats[k, :4]
             part = hue[y : y + h, x : x + w]
             frame.append(t)
+            filmed.append(centres[k])
             place.append(placed(t, centres[k]))
             area.append(sizes[k])
             contrast.append(np.percentile(part[part > level], 75) - usual)
             label.append(k)
     return _Patches(
         np.array(frame, np.int64),
+        np.array(filmed, float).reshape(-1, 2),
         np.array(place, float).reshape(-1, 2),
         np.array(area, float),
         np.array(contrast, float),
@@ -169,16 +175,17 @@ def _cut_out(
     )
 
 
-def _moving_track(patches: _Patches, maps: Sequence[NDArray[Any]], level: float, hint: Floats | None) -> _Track | None:
+def _moving_track(patches: _Patches, images: Sequence[Image], level: float, hint: Floats | None) -> _Track | None:
     """Find the circle on which one patch of constant size and colour travels, by random triples of poses."""
-    frames = len(maps)
+    frames = len(images)
     poses = _poses(patches)
     if len(poses) < 2 or frames < 2:
         return None
-    longest = 1.5 * float(np.hypot(*maps[0].shape))
+    longest = 1.5 * float(np.hypot(*images[0].shape[:2]))
     rng = np.random.default_rng(0)
     best: _Track | None = None
     seen: set[tuple[int, ...]] = set()
+    carried: dict[tuple[int, int], float] = {}
     for trial in range(_TRIALS):
         # In a clip that hardly moves there are but two poses to be had.
         some = rng.choice(poses, size=min(2 + (trial % 4 > 0), len(poses)), replace=False)
@@ -193,9 +200,33 @@ def _moving_track(patches: _Patches, maps: Sequence[NDArray[Any]], level: float,
         if circle is None:
             continue
         track = _follow(patches, frames, level, *circle, float(np.median(size)), float(np.median(tint)))
-        if track is not None and (best is None or track.score > best.score):
+        if track is None or (best is not None and track.score <= best.score):
+            continue
+        ends = _ends(track)
+        if ends not in carried:
+            carried[ends] = _carried(track, ends, images)
+        track = replace(track, score=track.score * carried[ends] ** _TOGETHER)
+        if best is None or track.score > best.score:
             best = track
     return best
+
+
+def _ends(track: _Track) -> tuple[int, int]:
+    """Name the first of a track's patches, and the one farthest from it."""
+    place = track.patches.place[track.members]
+    return int(track.members[0]), int(track.members[np.argmax(np.hypot(*(place - place[0]).T))])
+
+
+def _carried(track: _Track, ends: tuple[int, int], images: Sequence[Image]) -> float:
+    """Tell how surely a patch is a part of what moves around it."""
+    patches, rows = track.patches, list(ends)
+    centre = patches.place[track.members].mean(axis=0) if track.circle is None else track.circle[0]
+    (here, there), arm = patches.filmed[rows], patches.place[rows] - centre
+    shaken = (there - patches.place[ends[1]]) - (here - patches.place[ends[0]])
+    turn = float(np.arctan2(arm[0, 1], arm[0, 0]) - np.arctan2(arm[1, 1], arm[1, 0]))
+    first, second = (images[patches.frame[end]] for end in ends)
+    area = float(np.median(patches.area[track.members]))
+    return carried_share(first, second, here, there, here + shaken, turn, area)
 
 
 def _poses(patches: _Patches) -> NDArray[np.int64]:

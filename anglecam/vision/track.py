@@ -32,6 +32,8 @@ _LEAST_SHARE = 0.04
 some tenths of a pixel."""
 _FAST_PX = 4.0
 """Way from frame to frame that can smear a mouth beyond recognition."""
+_ONE_POSE = 0.05
+"""Turns closer than this are one pose to light and perspective, rad."""
 _LEAST_OFF_PX = 0.4
 """A distance from the circle that no whole mouth shows."""
 
@@ -236,19 +238,24 @@ def _join_hidden(status: list[str]) -> None:
 
 
 def _departure(value: Floats, pose: Floats, blur: Floats) -> Floats:
-    """Return the departure of a value from its robust trend: quadratic in pose (light, perspective), linear in blur."""
+    """Return the departure of a value from its robust trend: quadratic in pose (light, perspective), linear in blur.
+
+    Every pose counts alike: after one step from rest to rest most frames are in one of two, and the other is no
+    outlier.
+    """
     x = pose - np.median(pose)
-    terms = [np.ones_like(x)]
-    if np.ptp(x) > 0.05 and len(x) >= 12:
-        terms += [x, x**2, blur]
-    A = np.column_stack(terms)
+    if np.ptp(x) <= _ONE_POSE or len(x) < 12:
+        return value - np.median(value)
+    A = np.column_stack([np.ones_like(x), x, x**2, blur])
+    _, place, count = np.unique(np.round(x / _ONE_POSE), return_inverse=True, return_counts=True)
+    weight = 1.0 / np.sqrt(count[place])
     keep = np.ones(len(x), bool)
-    rest = value - np.median(value)
-    for _ in range(5):
-        keep = np.abs(rest - np.median(rest)) <= 3.0 * max(1.4826 * np.median(np.abs(rest - np.median(rest))), 1e-9)
-        if keep.sum() < 6:
-            break
-        rest = value - A @ np.linalg.lstsq(A[keep], value[keep], rcond=None)[0]
+    rest = np.zeros(len(x))
+    for _ in range(6):
+        known = weight * keep
+        rest = value - A @ np.linalg.lstsq(known[:, None] * A, known * value, rcond=None)[0]
+        spread = 1.4826 * float(np.median(np.abs(rest - np.median(rest))))
+        keep = np.abs(rest - np.median(rest)) <= 3.0 * max(spread, 1e-9)
     return rest
 
 
