@@ -1,4 +1,4 @@
-"""Four-bar kinematics of the nodding mechanism, Eqs. (1)-(3) of the paper, exact in both directions.
+"""Four-bar kinematics of the nodding mechanism, Eqs. (1)-(2) of the paper, exact in both directions.
 
 The servo turns the crank AC about A, the coupler CD pulls the rocker BD, and the rocker turns with the head about
 the shaft B. θ_s is the angle of the crank at A, from the line A→B; θ_f the angle of the rocker at B, from the line
@@ -6,18 +6,33 @@ B→A. With B to the right of A both joints C and D lie above that line.
 
 Eqs. (1)-(2) as printed take L3 for the ground link and then give 80°, 57° and 26° where Table 3 and Fig. 4 say 70°,
 45° and 20°. The table follows with the ground link L5 = 55 mm and the coupler L3 = 41 mm, which is what stands here.
-Eq. (3) is printed the wrong way round: −0.36 is dθ_f/dθ_s, the slope of Fig. 4.
+
+For one angle of the crank the links close in two ways, one the mirror image of the other on the diagonal BC; for one
+angle of the rocker, on the diagonal AD. Either way "open" is the paper's, Fig. 3, and "crossed" the other:
+
+    θ_f = β ± α            + open: D beyond the line B→C, seen along growing θ_f
+    θ_s = ∠BAD ± ∠DAC      + open: C beyond the line A→D, seen along growing θ_s
+
+The two names do not mean one thing. A crank that runs through its dead centre goes on to the crossed position of the
+crank while the rocker stays in its open one; only taking the links apart brings the rocker over.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
+Branch = Literal["open", "crossed"]
+
+NEUTRAL_SERVO = math.radians(135.0)
+"""θ_s at neutral, Table 3, rad."""
+
+_SIDE: dict[Branch, float] = {"open": 1.0, "crossed": -1.0}
 
 
 @dataclass(frozen=True)
@@ -34,18 +49,7 @@ class FourBar:
     """A to C, r."""
 
 
-@dataclass(frozen=True)
-class StraightLine:
-    """θ_f ≈ slope·θ_s + intercept, the dashed line of Fig. 4."""
-
-    slope: float
-    """γ, without unit."""
-    intercept: float
-    """rad."""
-    r_squared: float
-
-
-def head_angle(linkage: FourBar, theta_s: ArrayLike) -> Floats:
+def head_angle(linkage: FourBar, theta_s: ArrayLike, branch: Branch = "open") -> Floats:
     """Angle of the rocker for an angle of the crank, Eqs. (1)-(2).
 
     Parameters
@@ -54,6 +58,8 @@ def head_angle(linkage: FourBar, theta_s: ArrayLike) -> Floats:
         Link lengths, m.
     theta_s : array_like
         Crank angle, rad.
+    branch : {"open", "crossed"}
+        Side of the line B→C that D is on.
 
     Returns
     -------
@@ -70,25 +76,25 @@ def head_angle(linkage: FourBar, theta_s: ArrayLike) -> Floats:
     lam = np.sqrt(r**2 + L5**2 - 2 * r * L5 * np.cos(servo))  # Eq. (1), BC
     # atan2 in place of Eq. (2)'s arcsine: the same while BC leans towards A, right beyond it.
     beta = np.arctan2(r * np.sin(servo), L5 - r * np.cos(servo))
-    return np.asarray(beta + _corner(lam, L6, L3, "crank", servo))
+    return np.asarray(beta + _SIDE[branch] * _corner(lam, L6, L3, "crank", servo))
 
 
-def servo_angle(linkage: FourBar, theta_f: ArrayLike) -> Floats:
+def servo_angle(linkage: FourBar, theta_f: ArrayLike, branch: Branch = "open") -> Floats:
     """Angle of the crank for an angle of the rocker: Eq. (2) solved the other way, in closed form.
-
-    Of the two positions of the crank it takes the one of Fig. 3, beyond the line A→D.
 
     Parameters
     ----------
     linkage : FourBar
         Link lengths, m.
     theta_f : array_like
-        Rocker angle, rad.
+        Rocker angle, rad; a negative one puts D below the line A→B, the rocker's crossed position in the paper's neck.
+    branch : {"open", "crossed"}
+        Side of the line A→D that C is on.
 
     Returns
     -------
     ndarray
-        θ_s, rad, between 0 and 2π.
+        θ_s, rad; for rocker angles in (0, π) open from 0 to 2π, crossed from −π to π, both without a jump.
 
     Raises
     ------
@@ -99,10 +105,10 @@ def servo_angle(linkage: FourBar, theta_f: ArrayLike) -> Floats:
     r, L3, L5, L6 = linkage.crank, linkage.coupler, linkage.ground, linkage.rocker
     diagonal = np.sqrt(L5**2 + L6**2 - 2 * L5 * L6 * np.cos(rocker))  # AD
     towards_d = np.arctan2(L6 * np.sin(rocker), L5 - L6 * np.cos(rocker))
-    return np.asarray(towards_d + _corner(diagonal, r, L3, "rocker", rocker))
+    return np.asarray(towards_d + _SIDE[branch] * _corner(diagonal, r, L3, "rocker", rocker))
 
 
-def joints(linkage: FourBar, theta_f: ArrayLike) -> dict[str, Floats]:
+def joints(linkage: FourBar, theta_f: ArrayLike, branch: Branch = "open") -> dict[str, Floats]:
     """Place the four joints for an angle of the rocker, with the shaft B at the origin.
 
     Parameters
@@ -111,6 +117,8 @@ def joints(linkage: FourBar, theta_f: ArrayLike) -> dict[str, Floats]:
         Link lengths, m.
     theta_f : array_like
         Rocker angle, rad.
+    branch : {"open", "crossed"}
+        Side of the line A→D that C is on.
 
     Returns
     -------
@@ -123,7 +131,7 @@ def joints(linkage: FourBar, theta_f: ArrayLike) -> dict[str, Floats]:
         If the links cannot close at one of the angles.
     """
     rocker = np.asarray(theta_f, dtype=float)
-    servo = servo_angle(linkage, rocker)
+    servo = servo_angle(linkage, rocker, branch)
     B = np.zeros((*rocker.shape, 2))
     A = B + [-linkage.ground, 0.0]
     C = A + linkage.crank * np.stack([np.cos(servo), np.sin(servo)], axis=-1)
@@ -132,50 +140,47 @@ def joints(linkage: FourBar, theta_f: ArrayLike) -> dict[str, Floats]:
 
 
 def reach(linkage: FourBar) -> tuple[float, float]:
-    """Smallest and largest rocker angle at which the links close, rad.
+    """Smallest and largest rocker angle from the line B→A, to either side of it, at which the links close, rad.
+
+    Returns
+    -------
+    tuple of float
+        Between 0 and π. A rocker that reaches 0 or π passes through the line there.
 
     Raises
     ------
     ValueError
         If they close at none.
     """
-
-    def rocker_at(diagonal: float) -> float:
-        L5, L6 = linkage.ground, linkage.rocker
-        return math.acos(min(1.0, max(-1.0, (L5**2 + L6**2 - diagonal**2) / (2 * L5 * L6))))
-
-    shortest, longest = abs(linkage.coupler - linkage.crank), linkage.coupler + linkage.crank
-    low, high = rocker_at(shortest), rocker_at(longest)
-    if not low < high:
-        raise ValueError("the four links cannot close at any angle")
-    return low, high
+    return _spread(linkage.ground, linkage.rocker, linkage.crank, linkage.coupler)
 
 
-def straight_line(linkage: FourBar, low: float, high: float) -> StraightLine:
-    """Fit the straight line of Fig. 4 and Eq. (3) to θ_f(θ_s), every tenth of a degree.
-
-    Parameters
-    ----------
-    linkage : FourBar
-        Link lengths, m.
-    low, high : float
-        Range of θ_s, rad; the paper's operation is 60° to 220°.
+def crank_reach(linkage: FourBar) -> tuple[float, float]:
+    """Smallest and largest crank angle from the line A→B, to either side of it, at which the links close, rad.
 
     Returns
     -------
-    StraightLine
-        Slope γ = dθ_f/dθ_s, intercept and coefficient of determination.
+    tuple of float
+        Between 0 and π. A crank that reaches 0 or π passes through the line there; one that reaches both turns fully.
 
     Raises
     ------
     ValueError
-        If the links cannot close somewhere in the range.
+        If they close at none.
     """
-    servo = np.linspace(low, high, 1 + round(math.degrees(high - low) / 0.1))
-    head = head_angle(linkage, servo)
-    slope, intercept = np.polyfit(servo, head, 1)
-    left = head - (slope * servo + intercept)
-    return StraightLine(float(slope), float(intercept), float(1 - left.var() / head.var()))
+    return _spread(linkage.ground, linkage.crank, linkage.rocker, linkage.coupler)
+
+
+def _spread(ground: float, turning: float, across: float, coupler: float) -> tuple[float, float]:
+    """Bound a turning link's angle from the ground by what the other two links can span, rad."""
+
+    def angle_at(diagonal: float) -> float:
+        return math.acos(min(1.0, max(-1.0, (ground**2 + turning**2 - diagonal**2) / (2 * ground * turning))))
+
+    low, high = angle_at(abs(coupler - across)), angle_at(coupler + across)
+    if not low < high:
+        raise ValueError("the four links cannot close at any angle")
+    return low, high
 
 
 def _corner(first: Floats, second: float, opposite: float, turned: str, at: Floats) -> Floats:

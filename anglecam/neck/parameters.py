@@ -1,0 +1,94 @@
+"""What a nodding neck is made of: the quantities of Table 5 and of the text, in SI."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from anglecam.neck.fourbar import FourBar
+
+
+@dataclass(frozen=True)
+class Servo:
+    """An RC servo with potentiometer feedback, Fig. 5."""
+
+    motor_constant: float = 3.3e-3
+    """K_m, N·m/A or V·s/rad."""
+    amplifier_gain: float = 37.0
+    """G_a, V/V."""
+    gear_ratio: float = 1.0 / 12.0
+    """G_g, motor torque over gear torque, Eq. (9)."""
+    output_impedance: float = 0.5
+    """R_a, Ω."""
+    sensor_gain: float = 1.4
+    """h, V/rad."""
+    rotor_inertia: float = 0.11475e-10
+    """J_r, kg·m²."""
+    command_gain: float = 1.0
+    """C_i of Eq. (29), V/rad: input voltage for a wanted angle. The paper prints none."""
+
+    @property
+    def torque_gain(self) -> float:
+        """c3 = K_m·G_a/(G_g·R_a), N·m/V."""
+        return self.motor_constant * self.amplifier_gain / (self.gear_ratio * self.output_impedance)
+
+    @property
+    def back_emf_damping(self) -> float:
+        """K_m²/(G_g²·R_a) of Eq. (11), N·m·s: c3·c4 with c4 = K_m/(G_a·G_g)."""
+        return self.motor_constant**2 / (self.gear_ratio**2 * self.output_impedance)
+
+
+@dataclass(frozen=True)
+class Head:
+    """The head as a body on the nodding shaft, Fig. 6 (c)."""
+
+    mass: float = 2.31
+    """M_h, kg. Table 4 and the text say 2.31, Table 5 says 2.319."""
+    centre_of_mass: float = 0.05
+    """L, from the pivot, m."""
+    own_inertia: float = 0.075e-3
+    """J_cg, kg·m²."""
+    neutral: float = math.radians(45.0)
+    """θ0, of the centre of mass from upright at neutral, rad."""
+    gravity: float = 9.81
+    """g, m/s²."""
+
+    @property
+    def inertia(self) -> float:
+        """J = J_cg + M_h·L² about the pivot, kg·m², Eq. (27)."""
+        return self.own_inertia + self.mass * self.centre_of_mass**2
+
+    @property
+    def weight_moment(self) -> float:
+        """M_h·g·L, N·m."""
+        return self.mass * self.gravity * self.centre_of_mass
+
+
+@dataclass(frozen=True)
+class Spring:
+    """The spring that holds the head upright, Fig. 6 (a) and (b)."""
+
+    rate: float = 1877.8
+    """K, N/m: 10.72 lb/in."""
+    base: float = 0.048
+    """L2, m: from the pivot to where the spring is held."""
+    arm: float = 0.059
+    """L6, m: from the pivot to where it pulls at the head."""
+
+
+@dataclass(frozen=True)
+class NeckParameters:
+    """All that the paper's equations of motion hold; the defaults are the paper's prototype, Table 5."""
+
+    servo: Servo = field(default_factory=Servo)
+    head: Head = field(default_factory=Head)
+    spring: Spring = field(default_factory=Spring)
+    linkage: FourBar = field(default_factory=FourBar)
+    damping: float = 0.15
+    """C, N·m·s."""
+    gamma: float = -0.36
+    """γ of Eqs. (3) and (28), without unit."""
+
+
+PAPER = NeckParameters()
+"""The prototype as Table 5 has it."""

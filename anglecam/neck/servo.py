@@ -1,0 +1,162 @@
+"""The RC servo of Fig. 5, block by block: Eqs. (5)-(12).
+
+    e = U_in − h·θ_a                                                                                     Eq. (5)
+    E_m = e·G_a − R_a·I_m                                                                                Eq. (6)
+    E_m = K_m·ω_m,   T_m = K_m·I_m,   T_m = G_g·T_g,   T_g = J_r·θ̈_a + T                                 Eqs. (7)-(10)
+    c3·U_in = J_r·θ̈_a + K_m²/(G_g²·R_a)·θ̇_a + c3·h·θ_a + T,   c3 = K_m·G_a/(G_g·R_a)                     Eq. (11)
+    T = c3·U_in − γ·(J_r·Δθ̈ + K_m²/(G_g²·R_a)·Δθ̇ + c3·h·Δθ)                                             Eq. (12)
+
+Eq. (10) says ω_m = θ̇_a, but then the motor's damping in Eq. (11) would hold G_g where it holds G_g². It follows with
+ω_m = θ̇_a/G_g, which is also what a gear without loss does whose torques obey Eq. (9), and so it is here. Eqs. (11) and
+(12) agree in every sign. Eq. (12) puts the gear's torque on the head as it is; a lever 1/γ between the two, as virtual
+work would have it, is not in the paper (see `anglecam.neck.linear` on γ). J_r is added to the gear's side unreflected.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from anglecam.neck.parameters import Servo
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TorqueSpeed:
+    """The straight line between torque and speed that a servo gives at a constant error, its angle held or not."""
+
+    stall_torque: float
+    """At standstill, N·m."""
+    no_load_speed: float
+    """Of the servo's arm without load, rad/s."""
+
+    def torque(self, omega_a: ArrayLike) -> Floats:
+        """Return the torque, N·m, at a speed of the servo's arm, rad/s."""
+        return np.asarray(self.stall_torque * (1.0 - np.asarray(omega_a, dtype=float) / self.no_load_speed))
+
+
+def error_signal(servo: Servo, voltage: ArrayLike, theta_a: ArrayLike) -> Floats:
+    """Compare the input with the potentiometer, Eq. (5).
+
+    Parameters
+    ----------
+    servo : Servo
+        Its sensor gain h.
+    voltage : array_like
+        U_in, V.
+    theta_a : array_like
+        Angle of the servo's arm from neutral, rad.
+
+    Returns
+    -------
+    ndarray
+        e, V.
+    """
+    return np.asarray(np.asarray(voltage, dtype=float) - servo.sensor_gain * np.asarray(theta_a, dtype=float))
+
+
+def motor_speed(servo: Servo, omega_a: ArrayLike) -> Floats:
+    """Speed of the motor, rad/s, at a speed of the servo's arm, rad/s: ω_m = θ̇_a/G_g, see the module on Eq. (10)."""
+    return np.asarray(np.asarray(omega_a, dtype=float) / servo.gear_ratio)
+
+
+def back_emf(servo: Servo, omega_m: ArrayLike) -> Floats:
+    """Voltage that the turning motor makes, V, at its speed, rad/s, Eq. (7)."""
+    return np.asarray(servo.motor_constant * np.asarray(omega_m, dtype=float))
+
+
+def motor_current(servo: Servo, error: ArrayLike, omega_m: ArrayLike) -> Floats:
+    """Work out the motor's current, Eqs. (6)-(7): I_m = (G_a·e − K_m·ω_m)/R_a.
+
+    Parameters
+    ----------
+    servo : Servo
+        Motor and amplifier; no inductance and no limit of voltage, as in the paper.
+    error : array_like
+        e, V.
+    omega_m : array_like
+        Speed of the motor, rad/s.
+
+    Returns
+    -------
+    ndarray
+        I_m, A.
+    """
+    amplified = servo.amplifier_gain * np.asarray(error, dtype=float)
+    return np.asarray((amplified - back_emf(servo, omega_m)) / servo.output_impedance)
+
+
+def gear_torque(servo: Servo, current: ArrayLike) -> Floats:
+    """Torque behind the gear, N·m, at a current of the motor, A, Eqs. (8)-(9): T_g = K_m·I_m/G_g."""
+    return np.asarray(servo.motor_constant * np.asarray(current, dtype=float) / servo.gear_ratio)
+
+
+def servo_torque(
+    servo: Servo, voltage: ArrayLike, theta_a: ArrayLike, omega_a: ArrayLike, alpha_a: ArrayLike = 0.0
+) -> Floats:
+    """Work out the torque that leaves the servo from the motion of its own arm, Eq. (11) solved for T.
+
+    Parameters
+    ----------
+    servo : Servo
+        Motor, amplifier, gear and sensor.
+    voltage : array_like
+        U_in, V.
+    theta_a, omega_a, alpha_a : array_like
+        Angle (rad), speed (rad/s) and acceleration (rad/s²) of the servo's arm from neutral.
+
+    Returns
+    -------
+    ndarray
+        T, N·m.
+    """
+    error = error_signal(servo, voltage, theta_a)
+    current = motor_current(servo, error, motor_speed(servo, omega_a))
+    return np.asarray(gear_torque(servo, current) - servo.rotor_inertia * np.asarray(alpha_a, dtype=float))
+
+
+def drive_torque(
+    servo: Servo, gamma: float, voltage: ArrayLike, delta: ArrayLike, omega: ArrayLike, alpha: ArrayLike = 0.0
+) -> Floats:
+    """Work out the torque on the head from the head's motion, Eq. (12).
+
+    Parameters
+    ----------
+    servo : Servo
+        Motor, amplifier, gear and sensor.
+    gamma : float
+        γ of Eq. (3), θ_a = γ·Δθ.
+    voltage : array_like
+        U_in, V.
+    delta, omega, alpha : array_like
+        Angle from neutral (rad), speed (rad/s) and acceleration (rad/s²) of the head.
+
+    Returns
+    -------
+    ndarray
+        T, N·m.
+    """
+    arm = (gamma * np.asarray(motion, dtype=float) for motion in (delta, omega, alpha))
+    return servo_torque(servo, voltage, *arm)
+
+
+def torque_speed(servo: Servo, error: float) -> TorqueSpeed:
+    """Draw the torque-speed line at a constant error, Eqs. (6)-(9).
+
+    Parameters
+    ----------
+    servo : Servo
+        Motor, amplifier and gear.
+    error : float
+        e, V; what reaches the motor is G_a·e, so that a supply of 6 V ends the line at e = 6 V/G_a.
+
+    Returns
+    -------
+    TorqueSpeed
+        Stall torque c3·e and no-load speed G_a·G_g·e/K_m.
+    """
+    speed = servo.amplifier_gain * servo.gear_ratio * error / servo.motor_constant
+    return TorqueSpeed(stall_torque=servo.torque_gain * error, no_load_speed=speed)

@@ -1,0 +1,224 @@
+"""From a wanted response to a neck: spring, link and gains that meet Eqs. (34)-(35) and reach far enough.
+
+The design is the least change of a given neck, the sum of the squared logarithms of its changed quantities, that
+meets every constraint. a, b and c of each candidate follow from Eq. (28), so Eq. (34) holds throughout; Eq. (35) is
+one of the constraints. When L6 changes, the coupler L3 changes so that the chain closes at neutral, and γ follows from
+the links.
+
+With C and the motor as they are, a is fixed and rise time and overshoot cannot both be chosen: a = 2ζω. What damps is
+the derivative gain K_d, the paper's remedy, or C itself, "improving the viscous damping C"; either can be free.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.estimate.step_figures import StepFigures
+from anglecam.neck.constraints import Constraint, least
+from anglecam.neck.fourbar import reach, servo_angle
+from anglecam.neck.linear import LinearNeck, linear_neck, passive_stiffness
+from anglecam.neck.parameters import PAPER, NeckParameters
+from anglecam.neck.pd import PdGains
+from anglecam.neck.pd_tuning import Nod, nod_constraints
+from anglecam.neck.statics import pretension_angle
+from anglecam.neck.step import linear_step_figures
+from anglecam.neck.transmission import worst_transmission_angle
+from anglecam.neck.variation import PARAMETERS, neutral_head
+
+Floats = NDArray[np.float64]
+
+BOUNDS: dict[str, tuple[float, float]] = {
+    "K": (200.0, 20_000.0),
+    "L_6": (0.045, 0.075),
+    "h": (1.0, 6.0),
+    "G_a": (5.0, 1000.0),
+    "C": (0.01, 1.0),
+    "K_m": (1e-3, 2e-2),
+    "R_a": (0.1, 2.0),
+    "L_2": (0.02, 0.08),
+    "K_d": (0.0, 1.0),
+}
+"""What may be free and how far, SI: h and G_a as the text has them; K_d in V·s/rad."""
+_DAMPING_GAIN = "K_d"
+_TYPICAL_K_D = 0.05
+"""V·s/rad that costs as much as another parameter's change by a factor e."""
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What the neck is to do."""
+
+    nod: Nod
+    """Rise and overshoot."""
+    up: float = math.radians(25.0)
+    """Range of the head above neutral, rad."""
+    down: float = math.radians(23.5)
+    """Range below neutral, rad: what the paper's links have, whose Table 3 rounds it to 25°."""
+    servo_travel: float = math.radians(180.0)
+    """That the servo arm has, rad: Fig. 13."""
+    transmission_angle: float = math.radians(40.0)
+    """Least angle between coupler and rocker, rad, below which a linkage jams easily."""
+    largest_voltage: float = 6.0
+    """That holds the head at the end of its range, V."""
+    stall_torque: float | None = None
+    """Of the servo, N·m, to hold the head there; not asked if ``None``. The paper's own neck needs 0.71 N·m by Eq. (25)
+    and its servo has 0.47."""
+
+
+@dataclass(frozen=True)
+class Synthesis:
+    """A neck made to a wish."""
+
+    neck: NeckParameters
+    gains: PdGains
+    """K_d of the controller in the feedback path, V·s/rad; 0 where it was not free."""
+    linear: LinearNeck
+    """Eq. (28) of the neck without the controller."""
+    figures: StepFigures
+    """Of the neck with its controller, for a step of 1 V."""
+    command_gain: float
+    """C_i of Eq. (29) with which the head comes to rest where it is commanded, V/rad."""
+    changes: dict[str, tuple[float, float]]
+    """Of each free quantity, before and after, SI."""
+    constraints: tuple[Constraint, ...]
+    """Each with value, limit and whether it is active."""
+    unmet: tuple[str, ...]
+    """Which cannot be met, in a line each; empty where the design is feasible."""
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every constraint is met."""
+        return all(c.met for c in self.constraints)
+
+
+def synthesise(
+    wish: Wish,
+    neck: NeckParameters = PAPER,
+    free: tuple[str, ...] = ("K", "L_6", "h", "G_a", "K_d"),
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+) -> Synthesis:
+    """Find the neck nearest to a given one that does what is wished.
+
+    Parameters
+    ----------
+    wish : Wish
+        Response and range.
+    neck : NeckParameters
+        Where to start; what is not free stays as it is.
+    free : tuple of str
+        Names in `BOUNDS`.
+    bounds : mapping, optional
+        In place of those in `BOUNDS`, SI.
+
+    Returns
+    -------
+    Synthesis
+        Where the wish cannot be granted the nearest miss, which says what stands against it.
+
+    Raises
+    ------
+    ValueError
+        For a name that cannot be free, an empty choice or bounds that are none.
+    """
+    limits = {name: _limits(name, bounds) for name in free}
+    if not limits:
+        raise ValueError("nothing is free to change")
+    start = {name: 0.0 if name == _DAMPING_GAIN else PARAMETERS[name].read(neck) for name in free}
+    # Logarithms of what is positive, so that a change by a factor costs the same up and down; K_d begins at 0.
+    lower, upper = (np.array([_inward(name, limits[name][i]) for name in free]) for i in (0, 1))
+    origin = np.array([_inward(name, start[name]) for name in free])
+
+    def candidate(x: Floats) -> tuple[NeckParameters, PdGains]:
+        made, derivative = neck, 0.0
+        for name, inside in zip(free, x, strict=True):
+            if name == _DAMPING_GAIN:
+                derivative = float(inside) * _TYPICAL_K_D
+            elif inside != origin[free.index(name)]:
+                made = PARAMETERS[name].changed(made, math.exp(inside))
+        return made, PdGains(0.0, derivative)
+
+    def evaluate(x: Floats) -> tuple[float, tuple[Constraint, ...]]:
+        return float(((x - origin) ** 2).sum()), design_constraints(wish, *candidate(x))
+
+    best = least(evaluate, lower, upper, [origin])
+    made, gains = candidate(best.at)
+    linear = linear_neck(made)
+    after = [gains.derivative if n == _DAMPING_GAIN else PARAMETERS[n].read(made) for n in free]
+    return Synthesis(
+        replace(made, servo=replace(made.servo, command_gain=linear.b / linear.c)),
+        gains,
+        linear,
+        _figures(linear, gains),
+        linear.b / linear.c,
+        {name: (start[name], value) for name, value in zip(free, after, strict=True)},
+        best.constraints,
+        best.unmet,
+    )
+
+
+def design_constraints(wish: Wish, neck: NeckParameters, gains: PdGains) -> tuple[Constraint, ...]:
+    """Hold a neck against a wish.
+
+    Parameters
+    ----------
+    wish : Wish
+        What it is to do.
+    neck : NeckParameters
+        Whose links close at neutral.
+    gains : PdGains
+        Of its controller.
+
+    Returns
+    -------
+    tuple of Constraint
+        Always the same ones in the same order: rise (two), overshoot, stability, upright without servo, pretension,
+        range (two), servo travel, transmission angle, voltage and, if asked for, torque.
+    """
+    linear, passive = linear_neck(neck), passive_stiffness(neck)
+    figures = _figures(linear, gains)
+    low, high = reach(neck.linkage)
+    middle = neutral_head(neck.linkage)
+    ends = servo_angle(neck.linkage, np.clip([middle - wish.up, middle + wish.down], low, high))
+    first, last = float(ends.min()), float(ends.max())
+    mu = worst_transmission_angle(neck.linkage, first, last).mu
+    farthest = max(wish.up, wish.down)
+    rows = (
+        *nod_constraints(wish.nod, figures.rise_time, figures.overshoot),
+        Constraint("stiffness with servo, Eq. (35)", "N·m", linear.stiffness, 0.0, True, 1.0),
+        Constraint("stiffness of spring and weight, Eq. (25)", "N·m", passive, 0.0, True, 1.0),
+        Constraint("pretension angle, Eq. (24)", "rad", pretension_angle(neck), 0.0, True, 0.1),
+        Constraint("range upward", "rad", middle - low, wish.up, True, 0.1),
+        Constraint("range downward", "rad", high - middle, wish.down, True, 0.1),
+        Constraint("servo travel", "rad", last - first, wish.servo_travel, False, 0.1),
+        Constraint("transmission angle", "rad", min(mu, math.pi - mu), wish.transmission_angle, True, 0.1),
+        Constraint("voltage at the end", "V", linear.b / linear.c * farthest, wish.largest_voltage, False, 1.0),
+    )
+    if wish.stall_torque is None:
+        return rows
+    torque = abs(neck.gamma) * passive * farthest
+    return (*rows, Constraint("servo torque at the end", "N·m", torque, wish.stall_torque, False, wish.stall_torque))
+
+
+def _figures(linear: LinearNeck, gains: PdGains) -> StepFigures:
+    """Figures of Eq. (30) with −K_p·θ − K_d·θ̇ in its input."""
+    damping = linear.a + linear.c * gains.derivative
+    return linear_step_figures([linear.c], [1.0, damping, linear.b + linear.c * gains.proportional])
+
+
+def _limits(name: str, bounds: Mapping[str, tuple[float, float]] | None) -> tuple[float, float]:
+    if name not in BOUNDS:
+        raise ValueError(f"{name} cannot be free; there are {', '.join(BOUNDS)}")
+    low, high = (bounds or {}).get(name, BOUNDS[name])
+    if not (low < high and (low > 0.0 or (name == _DAMPING_GAIN and low == 0.0))):
+        raise ValueError(f"{name} between {low:g} and {high:g}: bounds are positive and increase")
+    return low, high
+
+
+def _inward(name: str, value: float) -> float:
+    """Return what the optimiser moves."""
+    return value / _TYPICAL_K_D if name == _DAMPING_GAIN else math.log(value)

@@ -1,0 +1,91 @@
+"""Fits of the laboratory's neck at ±25°: linear, third-order and large-angle side by side."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error
+from anglecam.estimate.start import start_parameters
+from anglecam.neck.parameters import PAPER
+from anglecam.simulate.large_angle import LargeAngle
+from anglecam.simulate.plant import Plant
+from anglecam.simulate.third_order import ThirdOrder
+from support.large_angle import COMMANDS, LABORATORY, noisy, true_angle
+
+SIGMA_DEG = 0.2
+MODEL = LargeAngle(LABORATORY)
+
+
+@pytest.fixture(scope="module")
+def angles():
+    return {name: true_angle(name) for name in COMMANDS}
+
+
+def records(angles, seed):
+    rng = np.random.default_rng(seed)
+    *fitted, held = [noisy(name, angle, rng, SIGMA_DEG) for name, angle in angles.items()]
+    return fitted, held
+
+
+def missed_deg(fit: Fit, held, angle) -> float:
+    """RMS distance of a held-out prediction from the true angle, each about its own zero."""
+    wrong = held.angle - predict_output_error(fit, [held]).residuals[0] - angle
+    return float(np.degrees(np.std(wrong)))
+
+
+def test_only_the_large_angle_fit_predicts_held_out_data_to_the_noise_floor(angles):
+    fitted, held = records(angles, 0)
+    linear = fit_output_error(Plant(), fitted, start_parameters(fitted))
+    a, b, c = linear.parameters
+    third = fit_output_error(
+        ThirdOrder(), fitted, [np.array([a + p, b + a * p, b * p, 0.0, c, c * p]) for p in (20.0, 60.0)]
+    )
+    large = fit_output_error(MODEL, fitted, MODEL.starts(linear.parameters))
+    floor = np.degrees(np.std(held.angle - angles["held"]))
+    ratio = {f.model: np.degrees(predict_output_error(f, [held]).rmse) / floor for f in (linear, third, large)}
+    assert ratio[large.model] < 1.02
+    assert ratio[linear.model] > 1.15
+    assert ratio[third.model] > 1.15
+    assert missed_deg(large, held, angles["held"]) < 0.05 < 0.1 < missed_deg(linear, held, angles["held"])
+    assert missed_deg(third, held, angles["held"]) > 0.1
+
+
+def test_physical_parameters_lie_within_their_stated_uncertainty(angles):
+    normalised, relative = [], []
+    for seed in range(14):
+        fitted, _ = records(angles, seed)
+        fit = fit_output_error(MODEL, fitted, [MODEL.nominal])
+        normalised.append((fit.parameters - MODEL.nominal) / fit.sigma)
+        relative.append(fit.sigma / MODEL.nominal)
+    spread, mean = np.std(normalised, axis=0, ddof=1), np.mean(normalised, axis=0)
+    assert np.all((spread > 0.52) & (spread < 1.51)), spread  # 99 % limits of a standard deviation over 14 draws
+    assert np.all(np.abs(mean) < 2.6 / np.sqrt(14)), mean
+    assert np.median(relative, axis=0) == pytest.approx([0.004, 0.004, 0.02, 0.007], rel=0.35)  # C, c3, h, K
+
+
+def test_a_wrong_guess_of_every_quantity_is_mended(angles):
+    fitted, _ = records(angles, 1)
+    servo, spring = PAPER.servo, PAPER.spring
+    wrong = replace(
+        PAPER,
+        damping=3.0 * PAPER.damping,
+        servo=replace(servo, amplifier_gain=0.5 * servo.amplifier_gain, sensor_gain=2.0 * servo.sensor_gain),
+        spring=replace(spring, rate=1.4 * spring.rate),
+    )
+    model = LargeAngle(replace(LABORATORY, parameters=wrong))
+    linear = fit_output_error(Plant(), fitted, start_parameters(fitted))
+    fit = fit_output_error(model, fitted, model.starts(linear.parameters))
+    assert np.all(np.abs(fit.parameters - MODEL.nominal) < 4.0 * fit.sigma)
+
+
+def test_springs_that_do_not_quite_carry_the_head_are_found_out(angles):
+    fitted, _ = records(angles, 2)
+    model = LargeAngle(replace(LABORATORY, pretension_error=0.15), (*MODEL.free, "pretension_error_nm"))
+    declared = [replace(r, zero_known=True) for r in fitted]
+    fit = fit_output_error(model, declared, [model.nominal])
+    excess, sigma = fit.parameters[-1], fit.sigma[-1]
+    assert sigma < 0.002
+    assert abs(excess) < 4.0 * sigma  # the laboratory's are balanced
