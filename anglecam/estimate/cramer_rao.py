@@ -1,0 +1,74 @@
+"""The Cramér–Rao bound: no unbiased estimator of a model's parameters has a smaller covariance.
+
+    cov ≥ σ² [(JᵀJ)⁻¹]_pp,   J = ∂(angles)/∂(parameters, every recording's own unknowns)
+
+The unknowns of a recording, its first state and perhaps its zero, are in J because they have to be estimated too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.estimate.output_error import Fit, Model, fit_output_error
+from anglecam.estimate.record import Record
+
+Floats = NDArray[np.float64]
+
+
+def cramer_rao_bound(
+    model: Model, parameters: Floats, records: Sequence[Record], own: Sequence[Floats], sigma: float
+) -> Floats:
+    """Bound the covariance of a model's parameters for given commands, frame times and noise.
+
+    Parameters
+    ----------
+    model : Model
+        The plant.
+    parameters : (p,) ndarray
+        Its true parameters, SI.
+    records : sequence of Record
+        For their frame times and commands; their angles are not used.
+    own : sequence of ndarray
+        Each recording's true unknowns: initial states, then the zero (rad) unless declared.
+    sigma : float
+        Standard deviation of white noise on every angle, rad.
+
+    Returns
+    -------
+    (p, p) ndarray
+        SI.
+    """
+    exact = [
+        replace(r, angle=model.predict(parameters, r.time, r.command, o[: model.states]) + o[model.states :].sum())
+        for r, o in zip(records, own, strict=True)
+    ]
+    # a fit that begins at the truth ends there, and leaves its derivatives
+    return parameter_covariance(fit_output_error(model, exact, [parameters], own=own), sigma)
+
+
+def parameter_covariance(fit: Fit, sigma: float | None = None) -> Floats:
+    """Return the covariance of fitted parameters: the bound where the fit ended.
+
+    Parameters
+    ----------
+    fit : Fit
+        With no parameter at a bound of its own.
+    sigma : float, optional
+        Standard deviation of the noise, rad; what the residual shows otherwise.
+
+    Returns
+    -------
+    (p, p) ndarray
+        SI.
+    """
+    count, unknowns = fit.jacobian.shape
+    variance = fit.cost / (count - unknowns) if sigma is None else sigma**2
+    norm = np.linalg.norm(fit.jacobian, axis=0)
+    triangle = np.linalg.qr(fit.jacobian / norm, mode="r")
+    half = np.linalg.solve(triangle, np.eye(unknowns)) / norm[:, None]
+    p = len(fit.parameters)
+    return variance * (half @ half.T)[:p, :p]

@@ -1,0 +1,173 @@
+"""One pass of an extended Kalman filter through a recording, with filterpy.
+
+    state (θ, θ̇, a, b, c[, z]):   θ̈ = c·u − a·θ̇ − b·θ,   ȧ = ḃ = ċ = ż = 0                        (Eq. (30))
+    measured: θ + z + noise of variance r
+
+z is the zero of a recording's angle, one state more where it is not declared. Between two frames, whatever their
+distance, the mean is integrated as the other estimators integrate it, and its derivative is the filter's F.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
+from numba import njit
+from numpy.typing import NDArray
+
+from anglecam.estimate.record import Record
+from anglecam.session import Command
+from anglecam.simulate.integrator import DRY_IDS, LOAD_IDS, WIDTH, integrate
+from anglecam.simulate.plant import MAX_STEP
+
+Floats = NDArray[np.float64]
+
+SHARED = slice(2, 5)
+"""Where a, b, c stand in the state; what stands elsewhere is the recording's own."""
+_STEPS = np.array([0.1, 1.0, 1.0, 10.0, 10.0])
+"""Least magnitudes of θ, θ̇, a, b, c, SI, that difference quotients are taken against."""
+_NO_LOADS, _NO_DRIES = np.zeros((max(1, len(LOAD_IDS)), WIDTH)), np.zeros((max(1, len(DRY_IDS)), WIDTH))
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """What one pass leaves of a recording of n frames; s states: 5, or 6 with the zero."""
+
+    state: Floats
+    """(n, s) after each frame, SI."""
+    covariance: Floats
+    """(n, s, s) after each frame, SI."""
+    prior: Floats
+    """(n, s) state before each frame."""
+    prior_covariance: Floats
+    """(n, s, s) before each frame."""
+    transition: Floats
+    """(n, s, s) F that led to each frame from the one before; to the first, what keeps the parameters alone."""
+    process: Floats
+    """(n, s, s) Q on the way to each frame; to the first, the covariance before it of all but the parameters."""
+    measurement_variance: float
+    """r, rad²."""
+    gain: Floats
+    """(n, s) Kalman gain."""
+    innovation: Floats
+    """(n,) measured minus predicted angle, one frame ahead, rad."""
+    innovation_variance: Floats
+    """(n,) S, rad²."""
+
+    @property
+    def normalised(self) -> Floats:
+        """(n,) innovations divided by the filter's own standard deviation of them."""
+        return self.innovation / np.sqrt(self.innovation_variance)
+
+
+class _Filter(ExtendedKalmanFilter):
+    """filterpy's filter with the nonlinear prediction that it leaves to a subclass."""
+
+    def __init__(self, states: int) -> None:
+        super().__init__(dim_x=states, dim_z=1)
+        self.predicted = np.zeros(states)
+
+    def predict_x(self, u: object = 0) -> None:
+        """Put the integrated mean in place of F·x."""
+        self.x = self.predicted
+
+
+def filter_record(
+    record: Record,
+    mean: Floats,
+    covariance: Floats,
+    *,
+    process_variance: float,
+    measurement_variance: float,
+    about: Floats | None = None,
+) -> Filtered:
+    """Pass an extended Kalman filter through a recording once.
+
+    Parameters
+    ----------
+    record : Record
+        Frames at any instants.
+    mean : (s,) ndarray
+        θ (rad), θ̇ (rad/s), a (1/s), b (1/s²), c (1/s²) and perhaps z (rad) before the first frame.
+    covariance : (s, s) ndarray
+        Of that; rows of zeros for what is known.
+    process_variance : float
+        Diagonal of Q over one median frame interval, in the square of each state's unit; a longer gap adds the more.
+        What is known at the start, and the zero, stays as it is.
+    measurement_variance : float
+        r, rad².
+    about : (n, s) ndarray, optional
+        Trajectory to linearise about; about the filter's own running estimate otherwise.
+
+    Returns
+    -------
+    Filtered
+        Of the whole recording; not finite from where the estimate ran away.
+    """
+    n, s = len(record.time), len(mean)
+    command = record.command or Command(np.zeros(1), np.zeros(1))
+    H = measured(s)
+    drift = process_variance * np.eye(s)
+    drift[np.diag(covariance) == 0.0] = 0.0
+    drift[5:] = 0.0
+    gaps = np.diff(record.time, prepend=record.time[0]) / record.interval
+    ekf = _Filter(s)
+    ekf.x, ekf.P = mean.copy(), covariance.copy()
+    ekf.R = np.array([[measurement_variance]])
+    state, prior, gain = np.empty((n, s)), np.empty((n, s)), np.empty((n, s))
+    posterior, prior_covariance = np.empty((n, s, s)), np.empty((n, s, s))
+    transition, process = np.zeros((n, s, s)), np.zeros((n, s, s))
+    transition[0, SHARED, SHARED], process[0] = np.eye(3), covariance
+    process[0, SHARED, :] = process[0, :, SHARED] = 0.0
+    innovation, variance = np.empty(n), np.empty(n)
+    for i in range(n):
+        if i > 0:
+            origin = ekf.x if about is None else about[i - 1]
+            reached, F = _advance(origin, record.time[i - 1 : i + 1], command)
+            transition[i], process[i] = F, gaps[i] * drift
+            ekf.F, ekf.Q = transition[i], process[i]
+            ekf.predicted = reached + F @ (ekf.x - origin)
+            ekf.predict()
+        prior[i], prior_covariance[i] = ekf.x, ekf.P
+        ekf.update(record.angle[i : i + 1], HJacobian=lambda _: H, Hx=lambda x: H @ x)
+        state[i], posterior[i], gain[i] = ekf.x, ekf.P, ekf.K[:, 0]
+        innovation[i], variance[i] = ekf.y[0], ekf.S[0, 0]
+    return Filtered(
+        state,
+        posterior,
+        prior,
+        prior_covariance,
+        transition,
+        process,
+        measurement_variance,
+        gain,
+        innovation,
+        variance,
+    )
+
+
+def measured(states: int) -> Floats:
+    """Return H (1, s): an angle is measured from its zero."""
+    return np.array([[1.0, 0.0, 0.0, 0.0, 0.0, 1.0]])[:, :states]
+
+
+def _advance(state: Floats, span: Floats, command: Command) -> tuple[Floats, Floats]:
+    """Integrate the state over ``span`` (2,) and give the derivative of its end."""
+    reached, F = state.copy(), np.eye(len(state))
+    steps = 1e-5 * np.maximum(np.abs(state[:5]), _STEPS)
+    reached[:2], F[:2, :5] = _flow(state[:5], span, command.time, command.angle, steps, _NO_LOADS, _NO_DRIES, MAX_STEP)
+    return reached, F
+
+
+@njit
+def _flow(state, span, switches, values, steps, loads, dries, max_step):  # type: ignore[no-untyped-def]  # compiled
+    slopes = np.empty((2, 5))
+    for j in range(5):
+        low, high = state.copy(), state.copy()
+        low[j] -= steps[j]
+        high[j] += steps[j]
+        under = integrate(span, low[0], low[1], switches, values, low[2:], loads, dries, max_step)[1]
+        over = integrate(span, high[0], high[1], switches, values, high[2:], loads, dries, max_step)[1]
+        slopes[:, j] = (over - under) / (high[j] - low[j])
+    return integrate(span, state[0], state[1], switches, values, state[2:], loads, dries, max_step)[1], slopes

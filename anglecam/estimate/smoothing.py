@@ -1,0 +1,107 @@
+"""Fixed-interval smoothing: what the whole data say of every frame, not only of those before it.
+
+The filter's estimate x, P of a frame is joined by what later frames say of it (Fraser and Potter, IEEE Trans. Autom.
+Control 14, 1969). That is gathered backwards as information Λ, λ on the error of x: with the innovation y and gain K,
+
+    before a frame's measurement   λ ← λ + (ΛK + Hᵀ/r)·y         Λ ← Λ + HᵀH/r
+    back to the frame before       λ ← Fᵀ(1 + ΛQ)⁻¹λ             Λ ← Fᵀ(1 + ΛQ)⁻¹ΛF
+    smoothed                       P ← (P⁻¹ + Λ)⁻¹               x ← x + Pλ
+
+The result is Rauch, Tung and Striebel's. Their gain is F⁻¹ where Q = 0: it would run a damped plant backwards in time,
+and of a motion that decays by e⁻¹⁰⁰ nothing is left but rounding. Information decays with the motion; and a covariance
+far smaller than the filter's, as all are in the first frames, is not left to the difference of two large ones.
+
+To step from a recording to the one before is the same: F keeps the parameters alone, Q is what its first state may be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.estimate.kalman import SHARED, Filtered, measured
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Smoothed:
+    """A recording's states given all frames of all recordings."""
+
+    state: Floats
+    """(n, s) θ (rad), θ̇ (rad/s), a (1/s), b (1/s²), c (1/s²) and perhaps the zero (rad)."""
+    covariance: Floats
+    """(n, s, s), SI."""
+
+
+def smooth(passed: Sequence[Filtered]) -> tuple[Smoothed, ...]:
+    """Smooth recordings that were filtered one after another.
+
+    Parameters
+    ----------
+    passed : sequence of Filtered
+        In the order in which the parameters were handed on.
+
+    Returns
+    -------
+    tuple of Smoothed
+        One for each recording.
+    """
+    result = []
+    for one, later in zip(passed, _later_frames(passed), strict=True):
+        covariance = np.array(
+            [_joined(P, information) for P, (information, _) in zip(one.covariance, later, strict=True)]
+        )
+        moved = [P @ vector for P, (_, vector) in zip(covariance, later, strict=True)]
+        result.append(Smoothed(one.state + np.array(moved), covariance))
+    return tuple(result)
+
+
+def smooth_first_states(passed: Sequence[Filtered]) -> tuple[Floats, ...]:
+    """Return only each recording's (s,) smoothed state at its first frame."""
+    firsts = [later[0] for later in _later_frames(passed)]
+    return tuple(
+        one.state[0] + _joined(one.covariance[0], information) @ vector
+        for one, (information, vector) in zip(passed, firsts, strict=True)
+    )
+
+
+def _later_frames(passed: Sequence[Filtered]) -> list[list[tuple[Floats, Floats]]]:
+    """Gather, for each frame of each recording, what all later ones say of the error of its filtered state: Λ and λ."""
+    result = []
+    shared_information, shared_vector = np.zeros((3, 3)), np.zeros(3)
+    for one in reversed(passed):
+        n, s = one.state.shape
+        H, r = measured(s)[0], one.measurement_variance
+        weight, towards = np.outer(H, H) / r, H / r
+        information, vector = np.zeros((s, s)), np.zeros(s)
+        information[SHARED, SHARED], vector[SHARED] = shared_information, shared_vector
+        later = []
+        for i in range(n - 1, -1, -1):
+            later.append((information, vector))
+            vector = vector + (information @ one.gain[i] + towards) * one.innovation[i]
+            information = information + weight
+            F, Q = one.transition[i], one.process[i]
+            back = F.T @ np.linalg.inv(np.eye(s) + information @ Q) if Q.any() else F.T
+            information, vector = back @ information @ F, back @ vector
+            information = 0.5 * (information + information.T)
+        shared_information, shared_vector = information[SHARED, SHARED], vector[SHARED]
+        result.append(later[::-1])
+    return result[::-1]
+
+
+def _joined(covariance: Floats, information: Floats) -> Floats:
+    """Return (P⁻¹ + Λ)⁻¹ = R(1 + RᵀΛR)⁻¹Rᵀ with P = RRᵀ, for a P that may be singular."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))  # where the head rests its rate's variance is 0 ± rounding
+    divisor = np.where(scale > 0.0, scale, 1.0)
+    with np.errstate(all="ignore"):
+        relative = covariance / np.outer(divisor, divisor)
+    if not np.all(np.isfinite(relative)):
+        return np.full_like(covariance, np.nan)
+    values, vectors = np.linalg.eigh(relative)
+    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    half = np.linalg.solve(np.linalg.cholesky(np.eye(len(root)) + root.T @ information @ root), root.T)
+    return half.T @ half
