@@ -14,19 +14,21 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from anglecam import __version__
 from anglecam.calibrate import calibrate_clip
 from anglecam.calibration import write_calibration
 from anglecam.errors import AnglecamError, InputError, RigError, blame
+from anglecam.export import fitted_model, transfer_as_dict, write_mat
 from anglecam.files import write_json
-from anglecam.identify import ESTIMATORS, Estimator, declared_start, identify_records
+from anglecam.identify import ESTIMATORS, Estimator, Identified, declared_start, identify_records
 from anglecam.loop.close import close_records
 from anglecam.loop.holdout import split_records
 from anglecam.loop.result import verdict_as_dict
 from anglecam.measure import Measurement, measure_clip
+from anglecam.neck.file import read_neck
+from anglecam.neck_cli import app as neck
 from anglecam.recordings import Measured, measure_session
 from anglecam.report.budget_page import budget_table, write_budget
 from anglecam.report.calibration_figure import plot_calibration
@@ -37,6 +39,7 @@ from anglecam.response import Response, responses, responses_as_dicts
 from anglecam.rig import Rig, read_rig
 from anglecam.series import write_series
 from anglecam.session import SERIES_ENDING, Command, Session, command_beside, find_clips, read_session, rig_beside
+from anglecam.terminal import errors, make_folder, screen
 from anglecam.video.overlay import write_overlay
 
 app = typer.Typer(
@@ -47,8 +50,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
-screen = Console(width=None if sys.stdout.isatty() else 120)
-errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+app.add_typer(neck, name="neck")
 
 Out = Annotated[Path, typer.Option("--out", help="Folder for the results; made if missing.")]
 RigFile = Annotated[
@@ -81,7 +83,7 @@ def measure(
 ) -> None:
     """Measure the angle in every frame: NAME.angles.csv and a plot for each clip, and how it answers every change."""
     declared = read_rig(rig) if rig else None
-    _make_folder(out)
+    make_folder(out)
     problems: list[AnglecamError] = []
     done: dict[str, Path] = {}
     rows, tables = [], []
@@ -120,7 +122,7 @@ def budget(
 ) -> None:
     """Say what the angle's uncertainty is made of: NAME.budget.json and a page for each clip."""
     declared = read_rig(rig) if rig else None
-    _make_folder(out)
+    make_folder(out)
     problems: list[AnglecamError] = []
     with _progress() as bars:
         for clip in _expand(clips, problems):
@@ -146,7 +148,7 @@ def calibrate(
         columns, rows = (int(side) for side in board.lower().split("x"))
     except ValueError:
         raise RigError(f"--board {board}: say how many inner corners there are, such as 9x6") from None
-    _make_folder(out)
+    make_folder(out)
     with blame(clip):
         found = calibrate_clip(clip, (columns, rows))
     write_calibration(found.calibration, out / f"{clip.stem}.calibration.yaml")
@@ -162,18 +164,24 @@ def identify(
     session: SessionFolder,
     out: Out,
     estimator: Annotated[str, typer.Option("--estimator", help=f"One of {', '.join(ESTIMATORS)}.")] = "oe2",
+    neck: Annotated[
+        Path | None, typer.Option("--neck", help="What is known of the neck, for --estimator neck; else the paper's.")
+    ] = None,
 ) -> None:
-    """Fit a model to a session: model.json."""
+    """Fit a model to a session: model.json, and model.mat for MATLAB."""
     if estimator not in ESTIMATORS:  # before any clip is measured
         raise RigError(f"--estimator {estimator}: choose one of {', '.join(ESTIMATORS)}")
     chosen: Estimator = estimator  # type: ignore[assignment]
+    if neck is not None and estimator != "neck":
+        raise RigError(f"--neck {neck}: only --estimator neck looks at it")
+    declared = read_neck(neck).large_angle if estimator == "neck" else None
     opened, measured = _open(session, out)
     fitted = [r for r in measured.records if r.name not in opened.rig.held_out]
     held_out = [r for r in measured.records if r.name in opened.rig.held_out]
     if not fitted:
         raise RigError(f"{session}: every recording that can be used is held out; nothing is left to fit")
-    model = identify_records(fitted, opened.rig, chosen, held_out=held_out)
-    write_json(out / "model.json", model.as_dict())
+    model = identify_records(fitted, opened.rig, chosen, held_out=held_out, neck=declared)
+    _write_model(model, out, "model")
     screen.print(model_table([model]))
     _end(measured.problems)
 
@@ -204,7 +212,7 @@ def close(
         )
         bars.update(bar, description="report")
         for model, name in zip(models, ("ekf", "model"), strict=True):
-            write_json(out / f"{name}.json", model.as_dict())
+            _write_model(model, out, name)
         write_json(out / "loop.json", verdict_as_dict(verdict))
         title = session.resolve().name
         write_report(out / "report.html", title, verdict, measured.series, models, measured.problems)
@@ -234,7 +242,7 @@ def main() -> None:
 def _open(session: Path, out: Path) -> tuple[Session, Measured]:
     """Read a session and measure its clips, writing their series to ``out``."""
     opened = read_session(session)
-    _make_folder(out)
+    make_folder(out)
     _say_what_is_not_applied(opened.rig, session / "rig.yaml")
     for note in opened.notes:
         errors.print(note)
@@ -261,13 +269,11 @@ def _expand(paths: list[Path], problems: list[AnglecamError]) -> Iterator[Path]:
             yield path
 
 
-def _make_folder(out: Path) -> None:
-    if out.is_file():
-        raise RigError(f"--out {out}: is a file; give a folder")
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as problem:
-        raise RigError(f"--out {out}: this folder cannot be made ({problem.strerror})") from problem
+def _write_model(model: Identified, out: Path, name: str) -> None:
+    """Write a model as ``NAME.json`` and for MATLAB as ``NAME.mat``."""
+    exported = fitted_model(model)
+    write_json(out / f"{name}.json", model.as_dict() | {"transfer_function": transfer_as_dict(exported)})
+    write_mat(exported, out / f"{name}.mat")
 
 
 def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement:

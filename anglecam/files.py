@@ -44,8 +44,12 @@ def write_atomically(path: Path) -> Iterator[IO[str]]:
 def write_json(path: Path, content: Any) -> None:
     """Write JSON with every float at full precision; a number that is not finite becomes ``null``."""
     with write_atomically(path) as stream:
-        json.dump(_finite(content), stream, indent=1, allow_nan=False)
-        stream.write("\n")
+        stream.write(json_text(content) + "\n")
+
+
+def json_text(content: Any) -> str:
+    """Return JSON as `write_json` writes it."""
+    return json.dumps(_finite(content), indent=1, allow_nan=False)
 
 
 def _finite(value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Recordings to a model: the paper's filter, or output error of second or third order."""
+"""Recordings to a model: the paper's filter, or output error of second or third order or of the neck itself."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from anglecam.estimate.output_error import Fit, fit_output_error, predict_output
 from anglecam.estimate.record import Record
 from anglecam.estimate.start import start_parameters
 from anglecam.estimate.step_figures import NO_STEP, StepFigures, step_figures
+from anglecam.neck.large_angle import LargeAngleNeck, linearise
 from anglecam.rig import Rig
+from anglecam.simulate.large_angle import DEFAULT, FREE_SWING, LargeAngle
 from anglecam.simulate.plant import Plant
 from anglecam.simulate.third_order import ThirdOrder
 
 Floats = NDArray[np.float64]
-Estimator = Literal["ekf", "oe2", "oe3"]
+Estimator = Literal["ekf", "oe2", "oe3", "neck"]
 ESTIMATORS: tuple[str, ...] = get_args(Estimator)
 
 
@@ -33,13 +35,18 @@ class Identified:
     names: tuple[str, ...]
     values: Floats
     """In the units of ``names``."""
-    sigmas: Floats
-    """Standard uncertainties, in the same units."""
+    covariance: Floats
+    """(p, p), in the products of those units."""
     fit: Fit
     """Free run on the recordings that were fitted."""
     held_out: Fit | None
     """Free run on those that were not; ``None`` where none is declared."""
     step: StepFigures
+
+    @property
+    def sigmas(self) -> Floats:
+        """Standard uncertainties, in the units of ``names``."""
+        return np.sqrt(np.diag(self.covariance))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of ``model.json``."""
@@ -52,6 +59,7 @@ class Identified:
         return {
             "estimator": self.estimator,
             "parameters": parameters,
+            "covariance": {"names": list(self.names), "matrix": self.covariance},
             "rmse_deg": {
                 "fit": np.degrees(self.fit.rmse),
                 "held_out": np.degrees(self.held_out.rmse) if self.held_out else None,
@@ -69,7 +77,12 @@ class Identified:
 
 
 def identify_records(
-    fitted: Sequence[Record], rig: Rig, estimator: Estimator, *, held_out: Sequence[Record] = ()
+    fitted: Sequence[Record],
+    rig: Rig,
+    estimator: Estimator,
+    *,
+    held_out: Sequence[Record] = (),
+    neck: LargeAngleNeck | None = None,
 ) -> Identified:
     """Fit a model to recordings of one rig.
 
@@ -79,11 +92,13 @@ def identify_records(
         With or without commands; initial states are unknown in each.
     rig : Rig
         For the starting values of the model, where declared.
-    estimator : {'ekf', 'oe2', 'oe3'}
+    estimator : {'ekf', 'oe2', 'oe3', 'neck'}
         The paper's extended Kalman filter (SYS1), output error of second order, output error of third order with
-        zeros (SYS2, Eq. (36)).
+        zeros (SYS2, Eq. (36)), output error of the neck at large angles, Eq. (31), in physical parameters.
     held_out : sequence of Record
         Recordings to predict only.
+    neck : LargeAngleNeck, optional
+        What is known of the neck, for that estimator; the paper's otherwise.
 
     Returns
     -------
@@ -93,7 +108,7 @@ def identify_records(
     Raises
     ------
     RigError
-        Where there is no such estimator.
+        Where there is no such estimator, or the neck as it is declared cannot move as it did.
     """
     if estimator not in ESTIMATORS:
         raise RigError(f"no estimator {estimator!r}; choose one of {', '.join(ESTIMATORS)}")
@@ -104,17 +119,19 @@ def identify_records(
     plant = Plant(driven=driven)
     fit = fit_output_error(plant, fitted, starts)
     if estimator == "ekf":
-        fit, values, sigmas = _by_filter(fit, fitted, starts[0])
+        fit, values, covariance = _by_filter(fit, fitted, starts[0])
     else:
         if estimator == "oe3":
             fit = _third_order(fit, fitted)
-        values, sigmas = fit.parameters, fit.coloured_sigma(fitted, phi(fit))
+        elif estimator == "neck":
+            fit = _large_angle(fit, fitted, neck or LargeAngleNeck())
+        values, covariance = fit.parameters, fit.coloured_covariance(fitted, phi(fit))
     scale = fit.model.to_file
     return Identified(
         estimator,
         fit.model.names,
         values * scale,
-        sigmas * scale,
+        covariance * np.outer(scale, scale),
         fit,
         predict_output_error(fit, held_out) if held_out else None,
         _step(fit) if driven else NO_STEP,
@@ -138,7 +155,7 @@ def _by_filter(fit: Fit, records: Sequence[Record], start: Floats) -> tuple[Fit,
     estimate = fit_ekf(records, initial, settings_for(records, initial, sigma))
     n = len(fit.parameters)
     free_run = fit_output_error(fit.model, records, [estimate.parameters[:n]], own=fit.own, fixed=True)
-    return free_run, estimate.parameters[:n], np.sqrt(np.diag(estimate.covariance))[:n]
+    return free_run, estimate.parameters[:n], estimate.covariance[:n, :n]
 
 
 def _third_order(second: Fit, records: Sequence[Record]) -> Fit:
@@ -152,8 +169,27 @@ def _third_order(second: Fit, records: Sequence[Record]) -> Fit:
     return fit_output_error(ThirdOrder(driven=bool(c)), records, starts)
 
 
+def _large_angle(second: Fit, records: Sequence[Record], neck: LargeAngleNeck) -> Fit:
+    driven = len(second.parameters) == 3
+    model = LargeAngle(neck, DEFAULT if driven else FREE_SWING)
+    starts = model.starts(second.parameters) if driven else [model.nominal]
+    fit = fit_output_error(model, records, starts)
+    if not np.isfinite(fit.cost):
+        raise RigError(
+            "the neck as it is declared cannot move as it did: from every start it leaves the reach of its linkage;"
+            " check linkage_slope and spring.common_stretch_m in the neck file"
+        )
+    return fit
+
+
 def _step(fit: Fit) -> StepFigures:
     p = fit.parameters
+    if isinstance(fit.model, LargeAngle):
+        # a unit step is beyond any linkage: the figures are those of small angles
+        neck = fit.model.neck_at(p)
+        near = linearise(neck)
+        p = np.array([near.a, near.b, near.c * neck.parameters.servo.command_gain])
+        return step_figures(Plant(), p, np.roots([1.0, near.a, near.b]), p[2] / p[1])
     if isinstance(fit.model, Plant):
         return step_figures(fit.model, p, np.roots([1.0, p[0], p[1]]), p[2] / p[1] if p[1] else 0.0)
     return step_figures(fit.model, p, np.roots([1.0, *p[:3]]), p[5] / p[2] if p[2] else 0.0)

@@ -5,28 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from anglecam.errors import RigError
+from anglecam.declared import Declared, Finite, Positive, read_declared
 
 Byte = Annotated[int, Field(ge=0, le=255)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 SlantDeg = Annotated[float, Field(gt=-80, lt=80, allow_inf_nan=False)]
 
 
-class _Declared(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Mouth(_Declared):
+class Mouth(Declared):
     """The mark at the far end of the lever: its colour, or ``None`` to find it."""
 
     rgb: tuple[Byte, Byte, Byte] | None = None
 
 
-class Pivot(_Declared):
+class Pivot(Declared):
     """Where the mechanism turns and how that place is marked."""
 
     near: tuple[Finite, Finite] | None = None
@@ -35,7 +28,7 @@ class Pivot(_Declared):
     """``none``: the centre of rotation fitted to the mouth's path."""
 
 
-class Camera(_Declared):
+class Camera(Declared):
     """What is known about the camera."""
 
     calibration: str | None = None
@@ -60,13 +53,13 @@ class Camera(_Declared):
         return self
 
 
-class Sync(_Declared):
+class Sync(Declared):
     """What ties the command's clock to the clip's."""
 
     lamp: tuple[Finite, Finite] | None = None
 
 
-class Model(_Declared):
+class Model(Declared):
     """Starting values of θ̈ = c·u − a·θ̇ − b·θ (Eq. (30) of the paper)."""
 
     a: Finite = 26.0
@@ -79,7 +72,7 @@ class Model(_Declared):
     """The centre of mass from upright at neutral, degrees."""
 
 
-class Rig(_Declared):
+class Rig(Declared):
     """One rig, as ``rig.yaml`` declares it."""
 
     mouth: Mouth | Literal["auto"] = "auto"
@@ -125,39 +118,8 @@ def read_rig(path: Path) -> Rig:
     RigError
         Naming the file, the key and the cause.
     """
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise RigError(f"{path}: cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise RigError(f"{path}: not a UTF-8 text file") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        problem = getattr(error, "problem", None) or "not valid YAML"
-        mark = getattr(error, "problem_mark", None)
-        where = f", line {mark.line + 1}" if mark else ""
-        raise RigError(f"{path}: not YAML ({problem}{where})") from error
-    if content is None:
-        return Rig()
-    if not isinstance(content, dict):
-        raise RigError(f"{path}: expected keys and values, found a {type(content).__name__}")
-    try:
-        rig = Rig.model_validate(content)
-    except ValidationError as error:
-        raise RigError(f"{path}: {_first(error)}") from error
+    rig = read_declared(path, Rig)
     if rig.camera.calibration is None:
         return rig
     beside = {"calibration": str(path.parent / rig.camera.calibration)}
     return rig.model_copy(update={"camera": rig.camera.model_copy(update=beside)})
-
-
-def _first(error: ValidationError) -> str:
-    """Say the most telling of pydantic's findings in one line."""
-    findings = error.errors()
-    unknown = [f for f in findings if f["type"] == "extra_forbidden"]
-    finding = (unknown or findings)[0]
-    key = ".".join(str(part) for part in finding["loc"] if part not in ("Mouth", "literal['auto']", "float"))
-    if unknown:
-        return f"unknown key {key}"
-    said = finding["msg"].removeprefix("Value error, ").replace("tuple", "list")
-    got = "" if finding["type"] == "value_error" else f" (got {str(finding['input'])[:60]})"
-    return f"{key}: {said[0].lower()}{said[1:]}{got}"

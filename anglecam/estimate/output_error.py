@@ -80,10 +80,19 @@ class Fit:
     @cached_property
     def sigma(self) -> Floats:
         """(p,) standard uncertainties of ``parameters``, SI, of noise that the whitening made white."""
-        return self._sigma(lambda jacobian: jacobian)
+        return _deviations(self.covariance)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """(p, p) covariance of ``parameters``, SI, likewise; NaN for a parameter that its bound holds."""
+        return self._covariance(lambda jacobian: jacobian)
 
     def coloured_sigma(self, records: Sequence[Record], phi: float) -> Floats:
-        """Return the same for a fit without whitening whose noise is nevertheless AR(1) with φ = ``phi``.
+        """Return (p,) standard uncertainties from `coloured_covariance`."""
+        return _deviations(self.coloured_covariance(records, phi))
+
+    def coloured_covariance(self, records: Sequence[Record], phi: float) -> Floats:
+        """Return `covariance` for a fit without whitening whose noise is nevertheless AR(1) with φ = ``phi``.
 
         The covariance is the sandwich (JᵀJ)⁻¹ JᵀRJ (JᵀJ)⁻¹, R the correlation of the noise.
         """
@@ -93,9 +102,9 @@ class Fit:
             parts = zip(records, pairwise(edges), strict=True)
             return np.concatenate([_correlate(r, phi, jacobian[i:j]) for r, (i, j) in parts])
 
-        return self._sigma(correlate)
+        return self._covariance(correlate)
 
-    def _sigma(self, correlate: Callable[[Floats], Floats]) -> Floats:
+    def _covariance(self, correlate: Callable[[Floats], Floats]) -> Floats:
         p = len(self.parameters)
         margin = 1e-6 * self.model.scales
         free = (self.parameters > self.model.lower + margin) & (self.parameters < self.model.upper - margin)
@@ -106,9 +115,16 @@ class Fit:
         variance = self.cost / max(1, len(self.white) - jacobian.shape[1])
         bread = np.linalg.pinv(jacobian.T @ jacobian)
         covariance = variance * bread @ (jacobian.T @ correlate(jacobian)) @ bread
-        sigma = np.full(p, np.nan)  # a parameter held by its bound has none
-        sigma[free] = (np.sqrt(np.diag(covariance)) / norm)[: int(free.sum())]
-        return sigma
+        covariance /= np.outer(norm, norm)
+        n = int(free.sum())
+        told = np.full((p, p), np.nan)  # a parameter held by its bound has none
+        told[np.ix_(free, free)] = covariance[:n, :n]
+        return told
+
+
+def _deviations(covariance: Floats) -> Floats:
+    """Return the standard uncertainties in a covariance."""
+    return np.sqrt(np.diag(covariance))
 
 
 def whiten(record: Record, phi: float, values: Floats) -> Floats:

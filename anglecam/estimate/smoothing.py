@@ -99,9 +99,11 @@ def _joined(covariance: Floats, information: Floats) -> Floats:
     divisor = np.where(scale > 0.0, scale, 1.0)
     with np.errstate(all="ignore"):
         relative = covariance / np.outer(divisor, divisor)
-    if not np.all(np.isfinite(relative)):
+    if not (np.all(np.isfinite(relative)) and np.all(np.isfinite(information))):
         return np.full_like(covariance, np.nan)
     values, vectors = np.linalg.eigh(relative)
     root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    half = np.linalg.solve(np.linalg.cholesky(np.eye(len(root)) + root.T @ information @ root), root.T)
-    return half.T @ half
+    # of a pass that ran away rounding leaves eigenvalues below 1: its fit refuses it, not this
+    surer, axes = np.linalg.eigh(np.eye(len(root)) + root.T @ information @ root)
+    half = root @ axes / np.sqrt(np.maximum(surer, 1.0))
+    return half @ half.T

@@ -185,7 +185,7 @@ def read_neck(path: Path | None) -> Neck:
     Parameters
     ----------
     path : Path or None
-        A YAML file; see `NeckFile` and ``configs/neck.yaml``.
+        A YAML file; see `NeckFile` and ``configs/necks/paper.yaml``.
 
     Returns
     -------
@@ -225,9 +225,7 @@ def neck_of(told: NeckFile) -> Neck:
         damping=PAPER.damping if told.damping_N_m_s is None else told.damping_N_m_s,
         gamma=gamma,
     )
-    film = Film(
-        told.film.viscosity_N_s_per_m2, told.film.diameter_m, told.film.width_m, told.film.thickness_m
-    )
+    film = Film(told.film.viscosity_N_s_per_m2, told.film.diameter_m, told.film.width_m, told.film.thickness_m)
     example = _example(told, parameters, film)
     return Neck(
         parameters=parameters,

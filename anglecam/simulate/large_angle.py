@@ -100,6 +100,8 @@ QUANTITIES = (
 )
 """C; c3; h; K; torque at neutral that the springs carry too much; θ0; common stretch of two springs."""
 DEFAULT = ("damping_nms", "torque_gain_nm_per_v", "sensor_gain_v_per_rad", "spring_rate_n_per_m")
+FREE_SWING = ("damping_nms", "spring_rate_n_per_m")
+"""What a swing without a command can tell: of c3 and h only their product is in it, one with K but for the bend."""
 
 
 @dataclass(frozen=True)

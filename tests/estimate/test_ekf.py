@@ -12,6 +12,8 @@ from anglecam.estimate.ekf import PAPER, fit_ekf, settings_for
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.record import Record
 from anglecam.estimate.smoothing import smooth
+from anglecam.identify import identify_records
+from anglecam.rig import Rig
 from anglecam.session import Command
 from anglecam.simulate.plant import Plant
 from support.motion import Plant as TruePlant
@@ -133,3 +135,10 @@ class TestSelfTestOfThePaper:
         let_go = np.median([fit_ekf(r, self.start, free).parameters for r in records], axis=0) / self.true
         assert np.all((held_back > 0.9) & (held_back < 0.98)), held_back  # 900 is three deviations of √1000 away
         assert np.all(let_go[1:] > 1.0), let_go
+
+
+def test_a_pass_that_runs_away_is_refused_and_the_filter_ends_where_output_error_does():
+    records = session(TruePlant(), 4)[:-1]
+    by_filter, by_output_error = (identify_records(records, Rig(), name) for name in ("ekf", "oe2"))
+    assert by_filter.values == pytest.approx(by_output_error.values, rel=1e-4)
+    assert np.all(np.isfinite(by_filter.sigmas))

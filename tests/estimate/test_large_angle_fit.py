@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anglecam.errors import RigError
 from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error
 from anglecam.estimate.start import start_parameters
+from anglecam.identify import identify_records
 from anglecam.neck.parameters import PAPER
+from anglecam.rig import Rig
 from anglecam.simulate.large_angle import LargeAngle
 from anglecam.simulate.plant import Plant
 from anglecam.simulate.third_order import ThirdOrder
@@ -89,3 +92,15 @@ def test_springs_that_do_not_quite_carry_the_head_are_found_out(angles):
     excess, sigma = fit.parameters[-1], fit.sigma[-1]
     assert sigma < 0.002
     assert abs(excess) < 4.0 * sigma  # the laboratory's are balanced
+
+
+def test_identify_fits_the_neck_and_says_so_where_it_is_declared_wrongly(angles):
+    fitted, held = records(angles, 2)
+    model = identify_records(fitted, Rig(), "neck", held_out=[held], neck=LABORATORY)
+    assert model.names == MODEL.names
+    assert np.all(np.abs(model.fit.parameters - MODEL.nominal) < 4.0 * model.sigmas / MODEL.to_file)
+    assert model.held_out is not None
+    assert np.degrees(model.held_out.rmse) < 1.05 * SIGMA_DEG
+    assert model.step.overshoot == pytest.approx(0.1, abs=0.05)
+    with pytest.raises(RigError, match="common_stretch_m"):
+        identify_records(fitted, Rig(), "neck", neck=replace(LABORATORY, common_stretch=None))

@@ -11,20 +11,23 @@ ours: several heights, each from where the one before it ended, within what its 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.estimate.output_error import Model, fit_output_error
-from anglecam.estimate.record import Record
-from anglecam.estimate.step_figures import StepFigures
+from anglecam.estimate.record import Record, record_from_series
+from anglecam.estimate.step_figures import NO_STEP, StepFigures
 from anglecam.export import FittedModel
 from anglecam.neck.large_angle import LargeAngleNeck, acceleration, equilibrium, linearise
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.pd import PdGains, simulate_pd, sys2
 from anglecam.neck.step import linear_step_figures
-from anglecam.session import Command
+from anglecam.response import responses
+from anglecam.series import read_series
+from anglecam.session import Command, command_beside, rig_beside
 from anglecam.simulate.large_angle import LargeAngle
 from anglecam.simulate.plant import Plant
 from anglecam.simulate.third_order import ThirdOrder
@@ -82,36 +85,44 @@ class System:
         if self.transfer is not None:
             return linear_step_figures(*self.transfer)
         assert isinstance(self.model, LargeAngle)
-        neck = self.model.neck_at(self.parameters)
-        voltage = neck.parameters.servo.command_gain * height
-        near = linearise(neck, equilibrium(neck, voltage))
-        slowest = -float(np.roots([1.0, near.a, near.b]).real.max())
-        motion = simulate_pd(
-            lambda delta, omega, u: float(acceleration(neck, delta, omega, u)),
-            PdGains(),
-            voltage,
-            _TIME_CONSTANTS / slowest,
-        )
-        told = motion.figures
-        return StepFigures(told.rise_time, told.overshoot, told.settling_time, float(told.steady_state / height))
+        try:
+            told = _large_angle_figures(self.model.neck_at(self.parameters), height)
+        except ValueError:  # nothing balances there, or the head leaves its links
+            return NO_STEP
+        return replace(told, steady_state=float(told.steady_state) / height)
 
-    def predict(self, record: Record) -> tuple[Floats, float]:
-        """Run it beside a measurement, from a fitted first state.
 
-        Parameters
-        ----------
-        record : Record
-            With a command; the model is held, only the first state and the zero are the recording's own.
+def _large_angle_figures(neck: LargeAngleNeck, height: float) -> StepFigures:
+    """Simulate a step until it rests; steady state in rad. Raises `ValueError` where it cannot rest."""
+    voltage = neck.parameters.servo.command_gain * height
+    near = linearise(neck, equilibrium(neck, voltage))
+    slowest = -float(np.roots([1.0, near.a, near.b]).real.max())
+    if slowest <= 0.0:
+        return NO_STEP
+    motion = simulate_pd(
+        lambda delta, omega, u: float(acceleration(neck, delta, omega, u)),
+        PdGains(),
+        voltage,
+        _TIME_CONSTANTS / slowest,
+    )
+    return motion.figures
 
-        Returns
-        -------
-        angle : (n,) ndarray
-            rad.
-        rmse : float
-            Of measured minus predicted, rad.
-        """
-        run = fit_output_error(self.model, [record], [self.parameters], fixed=True)
-        return record.angle - run.residuals[0], run.rmse
+
+@dataclass(frozen=True)
+class SideBySide:
+    """Models driven by one command; arrays of length n."""
+
+    time: Floats
+    """s."""
+    command: Command
+    """rad."""
+    systems: tuple[System, ...]
+    angles: tuple[Floats, ...]
+    """Of each system, rad."""
+    measured: Floats | None
+    """rad."""
+    rmse: dict[str, float]
+    """Of measured minus each system's angle, rad, by its name; empty without a measurement."""
 
 
 def paper_systems(neck: LargeAngleNeck) -> tuple[System, ...]:
@@ -157,3 +168,77 @@ def fitted_system(model: FittedModel) -> System:
         raise ValueError("the model was fitted to free swings: it has no input to step")
     kind: Model = Plant() if len(model.denominator) == 3 else ThirdOrder()
     return System("fitted", model.name, kind, model.values, (model.numerator, model.denominator))
+
+
+def side_by_side(systems: Sequence[System], record: Record | None = None) -> SideBySide:
+    """Drive models by `SERIES`, or by the command of a measurement.
+
+    Parameters
+    ----------
+    systems : sequence of System
+        To drive; they are held as they are.
+    record : Record, optional
+        With a command; the first state, and the zero unless declared, are fitted to it for each model.
+
+    Returns
+    -------
+    SideBySide
+        Ready to plot.
+    """
+    if record is None or record.command is None:
+        time = np.arange(0.0, float(SERIES.time[-1]) + 1.5, 0.005)
+        return SideBySide(time, SERIES, tuple(systems), tuple(s.run(time, SERIES) for s in systems), None, {})
+    runs = [fit_output_error(s.model, [record], [s.parameters], fixed=True) for s in systems]
+    return SideBySide(
+        record.time,
+        record.command,
+        tuple(systems),
+        tuple(record.angle - run.residuals[0] for run in runs),
+        record.angle,
+        {s.name: run.rmse for s, run in zip(systems, runs, strict=True)},
+    )
+
+
+def driven_record(path: Path) -> Record | None:
+    """Read a measured series whose command stands beside it.
+
+    Parameters
+    ----------
+    path : Path
+        ``NAME.angles.csv``, with ``NAME.command.csv`` and ``rig.yaml`` beside it if there are any.
+
+    Returns
+    -------
+    Record or None
+        ``None`` where nothing was commanded.
+
+    Raises
+    ------
+    AnglecamError
+        Where a file cannot be used.
+    """
+    command = command_beside(path)
+    if command is None or command.first_change() is None:
+        return None
+    return record_from_series(read_series(path), command, zero_known=rig_beside(path).neutral != "auto")
+
+
+def first_step(path: Path) -> tuple[Floats, Floats]:
+    """Read a measured series without a command, from its first response on if it has one.
+
+    Returns
+    -------
+    time, angle : (n,) ndarray
+        s from the start of that response, and rad from where it began; of frames that were measured.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be used.
+    """
+    series = read_series(path)
+    found = responses(series.time, series.angle, series.sigma)
+    start, zero = (found[0].start.value, found[0].from_angle.value) if found else (float(series.time[0]), 0.0)
+    end = found[1].start.value if len(found) > 1 else np.inf
+    seen = series.ok & (series.time < end)
+    return series.time[seen] - start, series.angle[seen] - zero

@@ -1,0 +1,258 @@
+"""A fitted model for other programs: python-control, scipy.signal, MATLAB and JSON.
+
+    θ(s)/U(s) = num(s)/den(s),   highest power of s first
+
+Command U and angle θ are both of the head and in one unit, degrees in files, so the numbers are the same in radians.
+Parameters are those of the estimator, in the units that their names end in, with their whole covariance. A model at
+large angles goes out as its linearisation at neutral, Eq. (33), beside its physical parameters.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import io, signal
+
+from anglecam.errors import InputError
+from anglecam.identify import Identified
+from anglecam.neck.large_angle import linearise
+from anglecam.simulate.large_angle import LargeAngle
+
+if TYPE_CHECKING:
+    import control
+
+Floats = NDArray[np.float64]
+
+SECOND_ORDER = ("a_per_s", "b_per_s2", "c_per_s2")
+THIRD_ORDER = ("d2_per_s", "d1_per_s2", "d0_per_s3", "n2_per_s", "n1_per_s2", "n0_per_s3")
+
+
+@dataclass(frozen=True)
+class FittedModel:
+    """A model as it leaves anglecam."""
+
+    name: str
+    """The estimator's, or what the model is called."""
+    names: tuple[str, ...]
+    """Of the parameters; each ends in its unit."""
+    values: Floats
+    """(p,) in those units."""
+    covariance: Floats
+    """(p, p) in their products; NaN where it is not known."""
+    numerator: Floats
+    """Angle per command; highest power of s first, empty where nothing was commanded."""
+    denominator: Floats
+    """Likewise, its first coefficient 1."""
+
+    @property
+    def sigmas(self) -> Floats:
+        """(p,) standard uncertainties, in the units of ``names``."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def poles(self) -> NDArray[np.complex128]:
+        """Roots of the denominator, 1/s."""
+        return np.roots(self.denominator).astype(complex)
+
+
+def fitted_model(model: Identified) -> FittedModel:
+    """Take the model that `anglecam.identify.identify_records` found.
+
+    Parameters
+    ----------
+    model : Identified
+        Of second or third order, or of the neck at large angles.
+
+    Returns
+    -------
+    FittedModel
+        With its covariance.
+    """
+    if isinstance(model.fit.model, LargeAngle):
+        scale = model.fit.model.to_file
+        return fitted_large_angle(model.fit.model, model.values / scale, model.covariance / np.outer(scale, scale))
+    return _by_names(model.estimator, model.names, model.values, model.covariance)
+
+
+def fitted_large_angle(model: LargeAngle, parameters: Floats, covariance: Floats) -> FittedModel:
+    """Take a model at large angles that output error has fitted.
+
+    Parameters
+    ----------
+    model : LargeAngle
+        What was fitted.
+    parameters : (p,) ndarray
+        SI, in the order of ``model.names``.
+    covariance : (p, p) ndarray
+        SI.
+
+    Returns
+    -------
+    FittedModel
+        With the transfer function that is left of it at neutral.
+    """
+    neck = model.neck_at(parameters)
+    near = linearise(neck)
+    gain = near.c * neck.parameters.servo.command_gain
+    scale = model.to_file
+    return FittedModel(
+        "large angle",
+        model.names,
+        parameters * scale,
+        covariance * np.outer(scale, scale),
+        np.array([gain]),
+        np.array([1.0, near.a, near.b]),
+    )
+
+
+def read_model(path: Path) -> FittedModel:
+    """Read a ``model.json`` of ``anglecam identify``.
+
+    Parameters
+    ----------
+    path : Path
+        The file; one without ``covariance`` gives standard uncertainties without correlation.
+
+    Returns
+    -------
+    FittedModel
+        Of second or third order.
+
+    Raises
+    ------
+    InputError
+        Naming the file and what is wrong with it.
+    """
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+        parameters = told["parameters"]
+        order = THIRD_ORDER if "d0_per_s3" in parameters else SECOND_ORDER
+        names = tuple(name for name in order if parameters.get(name, {}).get("value") is not None)
+        values = np.array([float(parameters[name]["value"]) for name in names])
+        covariance = _covariance(told.get("covariance"), parameters, names)
+        name = str(told.get("estimator", "model"))
+    except OSError as fault:
+        raise InputError(f"{path}: cannot be read ({fault.strerror or fault})") from fault
+    except (ValueError, KeyError, TypeError, AttributeError) as fault:
+        raise InputError(f"{path}: not a model.json of anglecam identify") from fault
+    if len(names) < 2 or not np.isfinite(values).all():
+        raise InputError(f"{path}: not a model.json of anglecam identify: no a_per_s and b_per_s2 in it")
+    return _by_names(name, names, values, covariance)
+
+
+def transfer_function(model: FittedModel) -> control.TransferFunction:
+    """Return a model as python-control has it.
+
+    Raises
+    ------
+    ValueError
+        Where nothing was commanded, so that nothing is known of the input.
+    """
+    import control
+
+    return control.tf(*_driven(model), name=model.name.replace(" ", "_"), inputs=["command"], outputs=["angle"])
+
+
+def scipy_system(model: FittedModel) -> signal.TransferFunction:
+    """Return a model as scipy.signal has it; raises `ValueError` where nothing was commanded."""
+    return signal.TransferFunction(*_driven(model))
+
+
+def model_as_dict(model: FittedModel) -> dict[str, Any]:
+    """Return a model with its covariance, its transfer function and their units, for a JSON file."""
+    parameters = zip(model.names, model.values, model.sigmas, strict=True)
+    return {
+        "model": model.name,
+        "parameters": {name: {"value": v, "sigma": s, "unit": unit_of(name)} for name, v, s in parameters},
+        "covariance": {"names": list(model.names), "matrix": model.covariance},
+        "transfer_function": transfer_as_dict(model),
+    }
+
+
+def transfer_as_dict(model: FittedModel) -> dict[str, Any]:
+    """Return a model's transfer function for a JSON file; the numerator is empty where nothing was commanded."""
+    return {
+        "numerator": model.numerator,
+        "denominator": model.denominator,
+        "variable": "s, 1/s; highest power first",
+        "input": "command, deg",
+        "output": "angle, deg",
+    }
+
+
+def write_mat(model: FittedModel, path: Path) -> None:
+    """Write a model as a MATLAB file: one struct ``model``, for ``tf(model.num, model.den)``.
+
+    Parameters
+    ----------
+    model : FittedModel
+        To write.
+    path : Path
+        A ``.mat`` file, version 5; replaced if it is there.
+    """
+
+    def cells(texts: tuple[str, ...]) -> NDArray[np.object_]:
+        column = np.empty((len(texts), 1), dtype=object)
+        column[:, 0] = texts
+        return column
+
+    content = {
+        "name": model.name,
+        "num": model.numerator.reshape(1, -1),
+        "den": model.denominator.reshape(1, -1),
+        "poles_per_s": model.poles.reshape(-1, 1),
+        "names": cells(model.names),
+        "units": cells(tuple(unit_of(name) for name in model.names)),
+        "values": model.values.reshape(-1, 1),
+        "covariance": model.covariance,
+        "input": "command",
+        "input_unit": "deg",
+        "output": "angle",
+        "output_unit": "deg",
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    io.savemat(path, {"model": content}, appendmat=False, oned_as="column")
+
+
+_UNITS = {"nms": "N*m*s", "nm": "N*m", "n": "N", "m": "m", "v": "V", "rad": "rad", "deg": "deg", "s": "s", "s2": "s^2"}
+_UNITS |= {"s3": "s^3"}
+
+
+def unit_of(name: str) -> str:
+    """Return the unit that a parameter's name ends in: ``b_per_s2`` → ``1/s^2``; empty for a name without one."""
+    words = name.split("_")
+    if "per" in words:
+        at = words.index("per")
+        above = _UNITS.get(words[at - 1], "1")
+        return f"{above}/{_UNITS.get(words[at + 1], words[at + 1])}"
+    return _UNITS.get(words[-1], "")
+
+
+def _by_names(name: str, names: tuple[str, ...], values: Floats, covariance: Floats) -> FittedModel:
+    """Build the transfer function that the parameters' names tell of."""
+    half = 3 if names[0] == THIRD_ORDER[0] else 2
+    return FittedModel(name, names, values, covariance, values[half:], np.array([1.0, *values[:half]]))
+
+
+def _covariance(told: dict[str, Any] | None, parameters: dict[str, Any], names: tuple[str, ...]) -> Floats:
+    """Return (p, p) in the order of ``names``, from the file's covariance or else its standard uncertainties."""
+    if told is None:
+        return np.diag([_number(parameters[name]["sigma"]) ** 2 for name in names])
+    at = [told["names"].index(name) for name in names]
+    whole = np.array([[_number(cell) for cell in row] for row in told["matrix"]]).reshape(len(told["names"]), -1)
+    return np.asarray(whole[np.ix_(at, at)], dtype=float)
+
+
+def _number(cell: float | None) -> float:
+    return np.nan if cell is None else float(cell)
+
+
+def _driven(model: FittedModel) -> tuple[Floats, Floats]:
+    if len(model.numerator) == 0:
+        raise ValueError("nothing was commanded: the model has no input")
+    return model.numerator, model.denominator
