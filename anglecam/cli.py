@@ -183,6 +183,10 @@ def identify(
     model = identify_records(fitted, opened.rig, chosen, held_out=held_out, neck=declared)
     _write_model(model, out, "model")
     screen.print(model_table([model]))
+    for doubt in model.doubts:
+        screen.print(doubt, soft_wrap=True, highlight=False, markup=False)
+    if estimator == "neck" and neck is None:
+        screen.print("the neck is the paper's: one spring, constant γ; declare yours with --neck", soft_wrap=True)
     _end(measured.problems)
 
 

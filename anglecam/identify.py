@@ -25,6 +25,8 @@ from anglecam.simulate.third_order import ThirdOrder
 Floats = NDArray[np.float64]
 Estimator = Literal["ekf", "oe2", "oe3", "neck"]
 ESTIMATORS: tuple[str, ...] = get_args(Estimator)
+DOUBTFUL = 3.0
+"""Times the stated noise that a model may leave over before its uncertainties are called into question."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,22 @@ class Identified:
     held_out: Fit | None
     """Free run on those that were not; ``None`` where none is declared."""
     step: StepFigures
+    fitted: tuple[Record, ...]
+    """The recordings that were fitted."""
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why the parameters or their uncertainties are not to be relied on, a line each; empty where they are."""
+        held = [name for name, sigma in zip(self.names, self.sigmas, strict=True) if not np.isfinite(sigma)]
+        told = [f"{', '.join(held)}: held by a bound of what is possible, so without an uncertainty"] if held else []
+        stated = np.concatenate([r.sigma for r in self.fitted])
+        noise = float(np.sqrt(np.mean(stated**2))) if np.all(np.isfinite(stated)) else np.nan
+        if self.fit.rmse > DOUBTFUL * noise:
+            told.append(
+                f"the model leaves over {np.degrees(self.fit.rmse):.2g}°, {self.fit.rmse / noise:.0f} times the angle's"
+                f" uncertainty: it lacks something, and its ± do not hold; anglecam close looks for what"
+            )
+        return tuple(told)
 
     @property
     def sigmas(self) -> Floats:
@@ -135,6 +153,7 @@ def identify_records(
         fit,
         predict_output_error(fit, held_out) if held_out else None,
         _step(fit) if driven else NO_STEP,
+        tuple(fitted),
     )
 
 

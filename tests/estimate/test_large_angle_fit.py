@@ -104,3 +104,13 @@ def test_identify_fits_the_neck_and_says_so_where_it_is_declared_wrongly(angles)
     assert model.step.overshoot == pytest.approx(0.1, abs=0.05)
     with pytest.raises(RigError, match="common_stretch_m"):
         identify_records(fitted, Rig(), "neck", neck=replace(LABORATORY, common_stretch=None))
+
+
+def test_a_model_that_lacks_something_is_doubted_and_a_bound_is_named(angles):
+    fitted, _ = records(angles, 3)
+    sure = [replace(r, sigma=np.full(len(r.time), np.radians(SIGMA_DEG / 10.0))) for r in fitted]
+    linear = identify_records(sure, Rig(), "oe2")
+    assert "lacks something" in linear.doubts[0]
+    assert not identify_records(fitted, Rig(), "neck", neck=LABORATORY).doubts
+    held = replace(linear, covariance=np.diag([1.0, np.nan, 1.0]))
+    assert held.doubts[0].startswith("b_per_s2: held by a bound")
