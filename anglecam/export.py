@@ -21,7 +21,7 @@ from scipy import io, signal
 from anglecam.errors import InputError
 from anglecam.identify import Identified
 from anglecam.neck.large_angle import linearise
-from anglecam.simulate.large_angle import LargeAngle
+from anglecam.simulate.large_angle import QUANTITIES, LargeAngle
 
 if TYPE_CHECKING:
     import control
@@ -48,6 +48,11 @@ class FittedModel:
     """Angle per command; highest power of s first, empty where nothing was commanded."""
     denominator: Floats
     """Likewise, its first coefficient 1."""
+
+    @property
+    def linearised(self) -> bool:
+        """Whether the parameters are those of a model at large angles and the transfer function what is left of it."""
+        return self.names[0] not in (SECOND_ORDER[0], THIRD_ORDER[0])
 
     @property
     def sigmas(self) -> Floats:
@@ -121,7 +126,7 @@ def read_model(path: Path) -> FittedModel:
     Returns
     -------
     FittedModel
-        Of second or third order.
+        Of second or third order, or of the neck at large angles with its linearisation at neutral.
 
     Raises
     ------
@@ -131,15 +136,20 @@ def read_model(path: Path) -> FittedModel:
     try:
         told = json.loads(path.read_text(encoding="utf-8"))
         parameters = told["parameters"]
-        order = THIRD_ORDER if "d0_per_s3" in parameters else SECOND_ORDER
+        large = {q.name for q in QUANTITIES} >= set(parameters)
+        order = tuple(parameters) if large else THIRD_ORDER if "d0_per_s3" in parameters else SECOND_ORDER
         names = tuple(name for name in order if parameters.get(name, {}).get("value") is not None)
         values = np.array([float(parameters[name]["value"]) for name in names])
         covariance = _covariance(told.get("covariance"), parameters, names)
         name = str(told.get("estimator", "model"))
+        transfer = told["transfer_function"] if large and names else None
+        sides = transfer and [np.asarray(transfer[side], dtype=float) for side in ("numerator", "denominator")]
     except OSError as fault:
         raise InputError(f"{path}: cannot be read ({fault.strerror or fault})") from fault
     except (ValueError, KeyError, TypeError, AttributeError) as fault:
         raise InputError(f"{path}: not a model.json of anglecam identify") from fault
+    if sides and np.isfinite(values).all():
+        return FittedModel(f"{name} at neutral", names, values, covariance, *sides)
     if len(names) < 2 or not np.isfinite(values).all():
         raise InputError(f"{path}: not a model.json of anglecam identify: no a_per_s and b_per_s2 in it")
     return _by_names(name, names, values, covariance)

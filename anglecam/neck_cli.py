@@ -18,7 +18,7 @@ from rich.table import Table
 from anglecam.errors import RigError
 from anglecam.files import json_text, write_json
 from anglecam.neck.file import read_neck
-from anglecam.report.neck_numbers import Numbers
+from anglecam.report.neck_numbers import Numbers, without_dust
 from anglecam.terminal import make_folder, screen
 
 app = typer.Typer(
@@ -46,11 +46,13 @@ def kinematics(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Four-bar and turning mechanism: Table 3, Fig. 4, limits, transmission angle, commands of wanted nods."""
+    """Work out four-bar and turning mechanism: Table 3, limits, commands of wanted nods."""
     from anglecam.report.neck_figures import kinematics_figure, turning_figure
     from anglecam.report.neck_numbers import kinematics_numbers
     from anglecam.report.neck_tables import kinematics_tables
 
+    if any(math.isnan(a) for a in angle or ()):
+        raise RigError("--angle nan: not a number")
     with _call(neck):
         made = read_neck(neck)
         numbers = kinematics_numbers(made, [math.radians(a) for a in angle or ()])
@@ -70,7 +72,7 @@ def statics(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Spring against weight: balance, pretension, neutral, what is left to the servo, Eqs. (17)-(25)."""
+    """Hold spring against weight: balance, pretension, the servo's torque."""
     from anglecam.report.neck_figures import statics_figure
     from anglecam.report.neck_numbers import statics_numbers
     from anglecam.report.neck_tables import statics_tables
@@ -93,7 +95,10 @@ def response(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Step responses of Eqs. (28), (31), SYS1, SYS2 and a fitted model side by side, Figs. 10, 11, 14, 15."""
+    """Step the paper's models and a fitted one side by side.
+
+    Eqs. (28) and (31), SYS1 and SYS2, as in Figs. 10, 11, 14 and 15.
+    """
     from anglecam.export import read_model
     from anglecam.neck_systems import driven_record, first_step, fitted_system, paper_systems, side_by_side
     from anglecam.report.neck_loop_figures import series_figure, step_figure
@@ -103,7 +108,8 @@ def response(
     with _call(neck):
         if not 0.0 < abs(step) < 180.0:
             raise ValueError(f"--step {step:g}: a step has a height, below 180°")
-        systems = list(paper_systems(read_neck(neck).large_angle))
+        made = read_neck(neck)
+        systems = list(paper_systems(made.large_angle))
         if model is not None:
             systems.append(fitted_system(read_model(model)))
         height = math.radians(step)
@@ -114,7 +120,8 @@ def response(
             "step": lambda path: step_figure(systems, height, beside, path),
             "series": lambda path: series_figure(runs, path),
         }
-        _tell("response", response_numbers(systems, height, runs.rmse), response_tables, figures, out, as_json)
+        numbers = response_numbers(systems, height, runs.rmse, made.parameters)
+        _tell("response", numbers, response_tables, figures, out, as_json)
 
 
 @app.command()
@@ -141,9 +148,13 @@ def design(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Follow the paper's design procedure: a, b, c to what the neck is made of, and a wish to another neck."""
+    """Follow the design procedure: motion to neck, wish to neck.
+
+    From a, b, c to what the neck is made of, and from a wish to another neck.
+    """
     from anglecam.neck.linear import linear_neck
-    from anglecam.neck.synthesis import synthesise
+    from anglecam.neck.pd_tuning import ADULT
+    from anglecam.neck.synthesis import Wish, synthesise
     from anglecam.neck_procedure import explain, identified_motion, routes_of, wish_of
     from anglecam.report.neck_loop_figures import design_figure, synthesis_figure
     from anglecam.report.neck_loop_numbers import design_numbers
@@ -158,7 +169,8 @@ def design(
         wanted = wish_of(wish_rise, wish_overshoot, wish_up, wish_down, wish_torque)
         names = tuple(free.replace(",", " ").split())
         synthesis = None if wanted is None else synthesise(wanted, start, names)
-        numbers = design_numbers(found, routes, explained, synthesis)
+        reach = wanted or Wish(ADULT)
+        numbers = design_numbers(found, routes, explained, synthesis, made.parameters, max(reach.up, reach.down))
         figures: dict[str, Callable[[Path], None]] = {"design": lambda path: design_figure(found, routes, path)}
         if synthesis is not None:
             figures["synthesis"] = lambda path: synthesis_figure(synthesis, linear_neck(start), path)
@@ -168,8 +180,8 @@ def design(
 @app.command()
 def pd(
     model: ModelFile = None,
-    proportional: Annotated[list[float] | None, typer.Option("--kp", help="K_p; repeatable.")] = None,
-    derivative: Annotated[list[float] | None, typer.Option("--kd", help="K_d, s; repeatable.")] = None,
+    proportional: Annotated[list[float] | None, typer.Option("--kp", metavar="NUMBER", help="K_p; repeatable.")] = None,
+    derivative: Annotated[list[float] | None, typer.Option("--kd", metavar="NUMBER", help="K_d; repeatable.")] = None,
     tune: Annotated[bool, typer.Option("--tune", help="Find gains for a human-like nod, the paper's adult.")] = False,
     like: Annotated[
         Path | None, typer.Option("--like", metavar="NAME.responses.json", help="Tune to this measured nod.")
@@ -183,10 +195,14 @@ def pd(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """PD control, Eq. (37): of SYS2, of a fitted model, or with --neck of that neck; Fig. 16, tuning, margins."""
+    """Close a PD loop and tune it: responses, margins, gains.
+
+    Eq. (37) and Fig. 16: of SYS2, of a fitted model, or with --neck of that neck.
+    """
     from anglecam.neck.pd import PdGains, close_loop, gains_table
     from anglecam.neck.pd_tuning import tune_pd
     from anglecam.neck_procedure import chosen_plant, default_gains, simulated_loop, wanted_nod
+    from anglecam.report.neck_demand import saturation_notes
     from anglecam.report.neck_loop_figures import pd_figure, tuning_figure
     from anglecam.report.neck_loop_numbers import pd_numbers
     from anglecam.report.neck_loop_tables import pd_tables
@@ -197,10 +213,11 @@ def pd(
         if not all(math.isfinite(gain) for gain in [*(proportional or ()), *(derivative or ())]):
             raise ValueError("--kp and --kd: a gain is a finite number")
         made = None if neck is None else read_neck(neck)
-        plant, name, unit, on_axis = chosen_plant(model, made)
+        chosen = chosen_plant(model, made)
+        plant = chosen.transfer
         K_p, K_d = default_gains(plant)
         loops = gains_table(plant, proportional or K_p, derivative or K_d)
-        figures: dict[str, Callable[[Path], None]] = {"pd": lambda path: pd_figure(loops, on_axis, name, path)}
+        figures: dict[str, Callable[[Path], None]] = {"pd": lambda path: pd_figure(loops, chosen, path)}
         tuned = simulated = None
         notes: list[str] = []
         nod = wanted_nod(tune, like, rise, overshoot)
@@ -210,17 +227,22 @@ def pd(
             if made is not None:
                 try:
                     simulated = simulated_loop(made.large_angle, tuned.loop)
+                    asked = made.parameters.servo.amplifier_gain * float(simulated.voltage[0])
+                    notes += saturation_notes(asked, "at the step's start: Eq. (31) has no such limit")
                 except ValueError as refusal:
                     notes.append(f"at large angles, Eq. (31): {refusal}")
             alone = close_loop(plant, PdGains())
             figures["tuned"] = lambda path: tuning_figure(alone, tuned, simulated, path)
-        numbers = pd_numbers(name, unit, loops, tuned, simulated)
+        numbers = pd_numbers(chosen, loops, tuned, simulated)
         _tell("pd", numbers, pd_tables, figures, out, as_json, notes)
 
 
 @app.command()
 def sensitivity(neck: NeckFile = None, out: Out = None, as_json: Json = False) -> None:
-    """How the response moves with what the neck is made of: Fig. 9 a-f and normalised sensitivities."""
+    """Vary what the neck is made of, and see the response move.
+
+    Fig. 9 a-f and normalised sensitivities.
+    """
     from anglecam.neck.sensitivity import figure_9, sensitivities
     from anglecam.report.neck_figures import sensitivity_figure
     from anglecam.report.neck_numbers import sensitivity_numbers
@@ -243,7 +265,10 @@ def power(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Energy and power of each nod, and how the voltage sags with the current, as in Figs. 12 and 13."""
+    """Measure each nod's energy and power, and the supply's sag.
+
+    As in Figs. 12 and 13.
+    """
     from anglecam.neck.power import power_use, read_power_log
     from anglecam.report.neck_figures import power_figure
     from anglecam.report.neck_numbers import power_numbers
@@ -266,6 +291,7 @@ def _tell(
     notes: Sequence[str] = (),
 ) -> None:
     """Print what was worked out and, where asked for, write it with its figures."""
+    numbers = without_dust(numbers)
     if out is not None:
         make_folder(out)
     if as_json:
@@ -273,7 +299,7 @@ def _tell(
     else:
         for made in tables(numbers):
             screen.print(made)
-        for note in notes:
+        for note in [*numbers.get("notes", ()), *notes]:
             screen.print(note, soft_wrap=True, highlight=False, markup=False)
     if out is not None:
         write_json(out / f"{verb}.json", numbers)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -88,6 +89,11 @@ def identified_motion(
     if given or sigma:
         raise ValueError("--model has its own a, b, c and their uncertainties: leave out --a, --b, --c and --sigma")
     read = read_model(model)
+    if read.linearised:
+        raise InputError(
+            f"{model}: a model of the neck at large angles: it holds C, c3, h and K themselves, which the design "
+            "relations would only find from a, b and c"
+        )
     if read.names != SECOND_ORDER:
         raise InputError(
             f"{model}: the design relations need a, b and c: a driven model of second order (--estimator oe2 or ekf)"
@@ -158,24 +164,36 @@ def wanted_nod(tune: bool, like: Path | None, rise: float | None, overshoot: flo
     return _nod(rise, overshoot)
 
 
-def chosen_plant(model: Path | None, neck: Neck | None) -> tuple[control.TransferFunction, str, str, str]:
-    """Return what is to be controlled: SYS2, a fitted model or a neck by Eq. (28).
+@dataclass(frozen=True)
+class Plant:
+    """What is to be controlled, and the units of its loop."""
 
-    Returns
-    -------
-    plant : control.TransferFunction
-    name : str
-    unit : str
-        Of its output per input, as a key ends in it.
-    on_axis : str
-        The same as an axis names it.
-    """
+    transfer: control.TransferFunction
+    name: str
+    unit: str
+    """Of its output per step of the input, as a key ends in it."""
+    output: str
+    """The same as it is printed."""
+    gain_unit: str
+    """Of K_p."""
+    rate_unit: str
+    """Of K_d."""
+    gains_of: str
+    """Of what K_p and K_d are the gains, in words."""
+
+
+def chosen_plant(model: Path | None, neck: Neck | None) -> Plant:
+    """Return what is to be controlled: SYS2, a fitted model or a neck by Eq. (28)."""
     if model is not None:
         read = read_model(model)
-        return transfer_function(read), f"the fitted model ({read.name})", "", ", °/°"
+        of = "K_p and K_d from angle to command, both of the head"
+        return Plant(transfer_function(read), f"the fitted model ({read.name})", "", "°/°", "°/°", "°·s/°", of)
     if neck is not None:
-        return linear_plant(linear_neck(neck.parameters)), "the neck by Eq. (28)", "rad_per_V", ", rad/V"
-    return sys2(), "SYS2", "deg", ", °"
+        plant, of = linear_plant(linear_neck(neck.parameters)), "K_p and K_d from the head's angle to the servo's input"
+        return Plant(plant, "the neck by Eq. (28)", "rad_per_V", "rad/V", "V/rad", "V·s/rad", of)
+    step = math.degrees(STEP)
+    of = f"Eq. (37) in the paper's input unit: 1 stands for a command of {step:g}°, so K_p = 0.01 is {0.01 * step:g}°/°"
+    return Plant(sys2(), "SYS2", "deg", "°", "1/°", "s/°", of)
 
 
 def default_gains(plant: control.TransferFunction) -> tuple[list[float], list[float]]:

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.estimate.output_error import Model, fit_output_error
+from anglecam.estimate.output_error import Model
 from anglecam.estimate.record import Record, record_from_series
 from anglecam.estimate.step_figures import NO_STEP, StepFigures
 from anglecam.export import FittedModel
@@ -167,7 +167,8 @@ def fitted_system(model: FittedModel) -> System:
     if not len(model.numerator):
         raise ValueError("the model was fitted to free swings: it has no input to step")
     kind: Model = Plant() if len(model.denominator) == 3 else ThirdOrder()
-    return System("fitted", model.name, kind, model.values, (model.numerator, model.denominator))
+    parameters = np.concatenate([model.denominator[1:], model.numerator])
+    return System("fitted", model.name, kind, parameters, (model.numerator, model.denominator))
 
 
 def side_by_side(systems: Sequence[System], record: Record | None = None) -> SideBySide:
@@ -178,7 +179,8 @@ def side_by_side(systems: Sequence[System], record: Record | None = None) -> Sid
     systems : sequence of System
         To drive; they are held as they are.
     record : Record, optional
-        With a command; the first state, and the zero unless declared, are fitted to it for each model.
+        With a command. Nothing is fitted: every model begins at rest at the measured start, and a zero that is not
+        declared is for all of them the one with which the head rests where it is first commanded: a wrong gain shows.
 
     Returns
     -------
@@ -188,15 +190,27 @@ def side_by_side(systems: Sequence[System], record: Record | None = None) -> Sid
     if record is None or record.command is None:
         time = np.arange(0.0, float(SERIES.time[-1]) + 1.5, 0.005)
         return SideBySide(time, SERIES, tuple(systems), tuple(s.run(time, SERIES) for s in systems), None, {})
-    runs = [fit_output_error(s.model, [record], [s.parameters], fixed=True) for s in systems]
-    return SideBySide(
-        record.time,
-        record.command,
-        tuple(systems),
-        tuple(record.angle - run.residuals[0] for run in runs),
-        record.angle,
-        {s.name: run.rmse for s, run in zip(systems, runs, strict=True)},
+    change = record.command.first_change()
+    still = record.time < (record.time[0] if change is None else change)
+    start = float(record.angle[still].mean() if still.any() else record.angle[0])
+    first = float(record.command.at(record.time[:1])[0])
+    zero = 0.0 if record.zero_known else start - first
+    angles = tuple(
+        zero + s.model.predict(s.parameters, record.time, record.command, _at_rest(s, start - zero, first))
+        for s in systems
     )
+    rmse = {s.name: float(np.sqrt(np.mean((record.angle - a) ** 2))) for s, a in zip(systems, angles, strict=True)}
+    return SideBySide(record.time, record.command, tuple(systems), angles, record.angle, rmse)
+
+
+def _at_rest(system: System, angle: float, command: float) -> Floats:
+    """Return the state of rest at an angle, rad, with a command, rad: of SYS2's form the inner two stand still too."""
+    state = np.zeros(system.model.states)
+    state[0] = angle
+    if isinstance(system.model, ThirdOrder):
+        d2, d1, _, n2, n1, _ = system.parameters
+        state[1:] = d2 * angle - n2 * command, d1 * angle - n1 * command
+    return state
 
 
 def driven_record(path: Path) -> Record | None:

@@ -11,8 +11,13 @@ import numpy as np
 import pytest
 
 from anglecam import cli
+from anglecam.estimate.record import Record
 from anglecam.files import write_json
+from anglecam.neck.file import read_neck
+from anglecam.neck_systems import paper_systems, second_order, side_by_side
+from anglecam.report.neck_tables import with_sigma
 from anglecam.series import AngleSeries, write_series
+from anglecam.session import Command
 from support.motion import Plant
 from support.series import session
 
@@ -136,6 +141,26 @@ def test_a_fitted_model_and_a_measurement_stand_beside_them(numbers, run, model_
     assert (tmp_path / "out" / "step.png").exists()
 
 
+def test_a_wrong_gain_shows_beside_a_measurement():
+    rig, driven = np.arange(0.0, 4.0, 1 / 30), Command(np.array([0.0, 1.0]), np.radians([5.0, 25.0]))
+    truth = second_order("truth", "", (26.0, 524.0, 524.0))
+    zero = np.radians(7.0)  # of the camera: not declared
+    angle = zero + truth.model.predict(truth.parameters, rig, driven, np.radians([5.0, 0.0]))
+    record = Record("step", rig, angle, driven, False, np.full(len(rig), 1e-3))
+    right, wrong = side_by_side([truth, second_order("wrong", "", (26.0, 524.0, 1.1 * 524.0))], record).rmse.values()
+    assert right == pytest.approx(0.0, abs=1e-9)
+    # from 5 to 25° it is off by 10 % of the command: 2.5° for three of four seconds, 0.5° before
+    assert np.degrees(wrong) == pytest.approx(np.sqrt(0.75 * 2.5**2 + 0.25 * 0.5**2), rel=0.03)
+    third = paper_systems(read_neck(None).large_angle)[2]
+    runs = side_by_side([third], Record("still", rig, 0.0 * rig, Command(np.zeros(1), np.zeros(1)), False, angle))
+    np.testing.assert_allclose(runs.angles[0], 0.0, atol=1e-12)
+
+
+def test_an_uncertainty_of_rounding_counts_as_exact():
+    assert with_sigma({"value": 6.0, "sigma": 1e-14}) == "6"
+    assert with_sigma({"value": 6.0, "sigma": 0.01}) == "6.000 ± 0.010"
+
+
 def test_design_has_the_papers_constants_and_says_what_contradicts(numbers, run):
     told = numbers("design")
     first, second, _ = told["routes"]
@@ -181,7 +206,12 @@ def test_a_wish_makes_a_neck(numbers, tmp_path, run):
     assert {"name", "value", "limit", "unit", "sense", "met", "active"} <= made["constraints"][0].keys()
     status, out, _ = run("design", "--wish-rise", "0.3", "--wish-up", "40", "--free", "h,K_d", "--out", tmp_path)
     assert status == 0
-    assert "range upward ≥ 0.6981 rad" in out
+    assert "range upward ≥ 40 °" in out
+    assert "(nearest found: 31.13 °)" in out
+    assert "servo torque at the end (shaft)" in out
+    assert "overshoot ≤ 0.5 %" in out
+    changes = numbers("design", "--wish-rise", "0.3", "--free", "K,K_d")["synthesis"]["changes"]
+    assert changes["K"]["before"] == 1877.8  # as declared, not what the motion gave back
     assert "cannot be met" in out
     assert (tmp_path / "synthesis.png").exists()
 
@@ -253,6 +283,7 @@ WRONG_CALLS = [
     (("design", "--wish-rise", "-1"), "cannot be wanted"),
     (("design", "--wish-rise", "0.3", "--free", "Q"), "Q cannot be free"),
     (("response", "--step", "0"), "a step has a height"),
+    (("kinematics", "--angle", "nan"), "not a number"),
     (("pd", "--kp", "nan"), "a gain is a finite number"),
     (("kinematics", "--neck", "nowhere.yaml"), "nowhere.yaml: cannot be read"),
 ]
@@ -285,6 +316,66 @@ def test_a_neck_that_falls_has_no_figures_and_the_models_beside_it_have(numbers,
     for name in ("small angles", "large angles"):
         assert models[name]["rise_time_s"] is None
     assert models["SYS2"]["overshoot_percent"] == pytest.approx(10.04, abs=5e-3)
+    for verb in ("response", "statics"):
+        assert "unstable, Eq. (35)" in numbers(verb, "--neck", tmp_path / "neck.yaml")["notes"][0]
+
+
+def test_the_servo_that_is_too_weak_and_saturates_is_told(numbers, run):
+    told = numbers("statics")
+    demand = told["demand"]
+    assert demand["torque_at_shaft_N_m"] == pytest.approx(0.36 * 1.814, abs=1e-3)
+    assert demand["stall_torque_N_m"] == pytest.approx(0.475, abs=5e-4)
+    # Eq. (12): c3·e = T, and the motor has G_a·e
+    assert demand["motor_voltage_V"] == pytest.approx(37.0 * 1.814 / 2.9304, rel=1e-3)
+    assert "stall torque is exceeded" in told["notes"][0]
+    assert "saturates" in told["notes"][1]
+    assert "stall torque is exceeded" in run("design")[1]
+    assert "asks 14.2 V of 6 V" in numbers("response")["notes"][0]
+    assert numbers("response", "--step", "5")["notes"] == []
+
+
+def test_gains_name_what_they_are_of(numbers, run, model_file, tmp_path):
+    told = numbers("pd")
+    assert told["gain_units"] == {"proportional": "1/°", "derivative_s": "s/°"}
+    assert "1 stands for a command of 22°, so K_p = 0.01 is 0.22°/°" in told["gains_of"]
+    (tmp_path / "neck.yaml").write_text("damping_N_m_s: 0.15\n")
+    assert "V·s/rad" in run("pd", "--neck", tmp_path / "neck.yaml")[1]
+    assert "steady state, °/°" in " ".join(run("pd", "--model", model_file)[1].split())
+
+
+def test_a_model_at_large_angles_responds_as_at_neutral_and_is_no_design(numbers, run, tmp_path):
+    parameters = {"damping_nms": {"value": 0.15, "sigma": 0.01}, "torque_gain_nm_per_v": {"value": 2.9, "sigma": 0.1}}
+    transfer = {"numerator": [507.5597], "denominator": [1.0, 25.9786, 523.7292]}
+    path = tmp_path / "model.json"
+    write_json(path, {"estimator": "neck", "parameters": parameters, "transfer_function": transfer})
+    fitted = numbers("response", "--model", path)["models"][-1]
+    assert (fitted["name"], fitted["equation"]) == ("fitted", "neck at neutral")
+    assert fitted["overshoot_percent"] == pytest.approx(11.5, abs=0.05)
+    status, _, err = run("design", "--model", path)
+    assert (status, len(err.splitlines())) == (1, 1)
+    assert "a model of the neck at large angles" in err
+    assert run("pd", "--model", path)[0] == 0
+
+
+def test_a_command_past_a_dead_centre_and_the_ranges_of_both_lines_are_told(numbers, run, tmp_path):
+    assert numbers("kinematics")["notes"] == []
+    (tmp_path / "neck.yaml").write_text("command: {down_deg_per_count: 0.7059}\n")
+    (note,) = numbers("kinematics", "--neck", tmp_path / "neck.yaml")["notes"]
+    assert "command 2 (down)" in note
+    assert "dead centre" in note
+    (tmp_path / "neck.yaml").write_text("linkage: {crank_m: 0.0155}\n")
+    assert "over a nod of ±25°" in run("kinematics", "--neck", tmp_path / "neck.yaml")[1]
+
+
+def test_json_has_no_dust_of_the_arithmetic(run):
+    out = run("statics", "--json")[1]
+    assert '"nod_deg": -15.0,' in out
+
+
+def test_help_has_whole_lines(run):
+    out = run("--help")[1]
+    assert not any(line.rstrip().endswith(("Fig.", "Eq.", "Eqs.")) for line in out.splitlines())
+    assert "list[float]" not in run("pd", "--help")[1]
 
 
 def test_a_wrong_data_file_is_one_line_and_exit_status_1(run, tmp_path):

@@ -2,7 +2,7 @@
 
 Sequential quadratic programming (Kraft's SLSQP) from several starts, because what a mechanism can do is not convex.
 Where no start ends with every constraint met, the design is sought that misses the most missed one by least; and for
-each that is still missed, how near it comes while all the others hold, which is what a designer needs to hear.
+each that is still missed, whether it alone stands against the wish: whether all the others can be met without it.
 """
 
 from __future__ import annotations
@@ -22,6 +22,10 @@ TOLERANCE = 1e-4
 _DRAWN_STARTS = 8
 _NEAREST = 3
 """Ends that are taken up again where none is feasible."""
+SHOWN = {"rad": (np.degrees(1.0), "°"), "share": (100.0, "%"), "1": (1.0, "")}
+"""Units that a person reads otherwise than they are held: factor and unit."""
+_NOTHING = 1e-9
+"""In the units of constraints: what an optimiser leaves of zero."""
 _WORST = 1e3
 """Scales beyond which a miss is no longer told apart; a system that is not stable has no figures at all."""
 
@@ -56,8 +60,15 @@ class Constraint:
         return abs(self.slack) <= TOLERANCE
 
     def __str__(self) -> str:
-        sign, unit = "≥" if self.at_least else "≤", "" if self.unit == "1" else f" {self.unit}"
-        return f"{self.name} {sign} {self.limit:.4g}{unit} (here {self.value:.4g}{unit})"
+        sign = "≥" if self.at_least else "≤"
+        return f"{self.name} {sign} {shown(self.limit, self.unit)}"
+
+
+def shown(value: float, unit: str) -> str:
+    """Write a constraint's value or limit as a person reads it: degrees, per cent, no sign of a rounding error."""
+    factor, spoken = SHOWN.get(unit, (1.0, unit))
+    seen = factor * value if abs(value) > _NOTHING else 0.0
+    return f"{seen:.4g} {spoken}".strip().replace("-", "−")
 
 
 @dataclass(frozen=True)
@@ -69,7 +80,7 @@ class Optimum:
     constraints: tuple[Constraint, ...]
     """There."""
     unmet: tuple[str, ...]
-    """A line for each constraint that cannot be met while all others are; empty where the design is feasible."""
+    """A line for each constraint that is missed there, with the numbers there; empty where the design is feasible."""
 
     @property
     def feasible(self) -> bool:
@@ -118,11 +129,9 @@ def least(evaluate: Evaluate, lower: Floats, upper: Floats, starts: Sequence[Flo
     for i in missed:
         furthest = problem.at(problem.nearest(near, i))[1]
         others = max((-c.slack for j, c in enumerate(furthest) if j != i), default=0.0)
-        if others <= 10.0 * TOLERANCE:
-            unmet.append(f"{furthest[i]} cannot be met while all else holds")
-    return Optimum(
-        near, there, tuple(unmet) or tuple(f"{there[i]} cannot be met together with the others" for i in missed)
-    )
+        why = "while all else holds" if others <= 10.0 * TOLERANCE else "together with the others"
+        unmet.append(f"{there[i]} cannot be met {why} (nearest found: {shown(there[i].value, there[i].unit)})")
+    return Optimum(near, there, tuple(unmet))
 
 
 class _Problem:

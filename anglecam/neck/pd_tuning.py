@@ -103,7 +103,7 @@ def tune_pd(
         closed = loop(x)
         return float(x @ x), (
             *nod_constraints(wanted, closed.figures.rise_time, closed.figures.overshoot),
-            Constraint("steady state taken away", "1", closed.loss, largest_loss, False, 0.01),
+            Constraint("steady state taken away", "share", closed.loss, largest_loss, False, 0.01),
             Constraint("sensitivity M_s", "1", closed.margins.sensitivity, largest_sensitivity, False, 0.1),
         )
 
@@ -118,7 +118,7 @@ def nod_constraints(wanted: Nod, rise_time: float, overshoot: float) -> tuple[Co
     return (
         Constraint("rise time", "s", rise_time, wanted.rise_time + spare, False, wanted.rise_time),
         Constraint("rise time", "s", rise_time, wanted.rise_time - spare, True, wanted.rise_time),
-        Constraint("overshoot", "1", overshoot, wanted.overshoot + wanted.overshoot_tolerance, False, 0.1),
+        Constraint("overshoot", "share", overshoot, wanted.overshoot + wanted.overshoot_tolerance, False, 0.1),
     )
 
 

@@ -66,8 +66,8 @@ class Wish:
     largest_voltage: float = 6.0
     """That holds the head at the end of its range, V."""
     stall_torque: float | None = None
-    """Of the servo, N·m, to hold the head there; not asked if ``None``. The paper's own neck needs 0.71 N·m by Eq. (25)
-    and its servo has 0.47."""
+    """Of the servo at its shaft, N·m, to hold the head there; not asked if ``None``. The paper's own neck needs
+    0.71 N·m by Eq. (25) and its servo has 0.47."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ def design_constraints(wish: Wish, neck: NeckParameters, gains: PdGains) -> tupl
     -------
     tuple of Constraint
         Always the same ones in the same order: rise (two), overshoot, stability, upright without servo, pretension,
-        range (two), servo travel, transmission angle, voltage and, if asked for, torque.
+        range (two), servo travel, transmission angle, voltage and torque, whose limit is infinite if not asked for.
     """
     linear, passive = linear_neck(neck), passive_stiffness(neck)
     figures = _figures(linear, gains)
@@ -198,10 +198,10 @@ def design_constraints(wish: Wish, neck: NeckParameters, gains: PdGains) -> tupl
         Constraint("transmission angle", "rad", min(mu, math.pi - mu), wish.transmission_angle, True, 0.1),
         Constraint("voltage at the end", "V", linear.b / linear.c * farthest, wish.largest_voltage, False, 1.0),
     )
-    if wish.stall_torque is None:
-        return rows
-    torque = abs(neck.gamma) * passive * farthest
-    return (*rows, Constraint("servo torque at the end", "N·m", torque, wish.stall_torque, False, wish.stall_torque))
+    # without a wish the row stands for information: a limit of infinity is always met
+    torque, most = abs(neck.gamma) * passive * farthest, math.inf if wish.stall_torque is None else wish.stall_torque
+    scale = 1.0 if wish.stall_torque is None else wish.stall_torque
+    return (*rows, Constraint("servo torque at the end (shaft)", "N·m", torque, most, False, scale))
 
 
 def _figures(linear: LinearNeck, gains: PdGains) -> StepFigures:

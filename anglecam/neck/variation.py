@@ -94,10 +94,15 @@ def nod_slope(linkage: FourBar, nod: float = NOD) -> float:
     ValueError
         If the links close nowhere.
     """
+    return straight_line(linkage, *nod_range(linkage, nod)).slope
+
+
+def nod_range(linkage: FourBar, nod: float = NOD) -> tuple[float, float]:
+    """Return the θ_s between which a nod to either side of neutral, rad, lies as far as the links reach, rad."""
     low, high = reach(linkage)
     middle = neutral_head(linkage)
     ends = servo_angle(linkage, np.clip([middle + nod, middle - nod], low, high))
-    return straight_line(linkage, float(ends.min()), float(ends.max())).slope
+    return float(ends.min()), float(ends.max())
 
 
 def _of(part: str, attribute: str, symbol: str, name: str, unit: str) -> Parameter:

@@ -18,6 +18,7 @@ from anglecam.neck.pd import ClosedLoop, PdGains, PdMotion, loop_response
 from anglecam.neck.pd_tuning import Tuned
 from anglecam.neck.step import linear_step
 from anglecam.neck.synthesis import Synthesis
+from anglecam.neck_procedure import Plant
 from anglecam.neck_systems import SideBySide, System
 from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, STYLE
 from anglecam.report.neck_figures import SERIES, mark_step, save
@@ -28,7 +29,7 @@ Floats = NDArray[np.float64]
 _COLOURS = {"SYS1": BEFORE, "small angles": "#b7791f", "SYS2": AFTER, "large angles": "#6b4fa0", "fitted": "#2f855a"}
 _WIDEST = 2.5
 """Times the largest command, beyond which a curve is not shown."""
-_DASHES = {"small angles": "--", "large angles": "-."}
+_DASHES = {"small angles": "--", "large angles": "-.", "fitted": ":"}
 
 
 def step_figure(systems: Sequence[System], height: float, measured: tuple[Floats, Floats] | None, path: Path) -> None:
@@ -180,17 +181,15 @@ def synthesis_figure(made: Synthesis, before: LinearNeck, path: Path) -> None:
         save(figure, path)
 
 
-def pd_figure(loops: Sequence[ClosedLoop], unit: str, plant: str, path: Path) -> None:
+def pd_figure(loops: Sequence[ClosedLoop], plant: Plant, path: Path) -> None:
     """Draw closed loops as Fig. 16 does: a panel for each K_p, a curve for each K_d.
 
     Parameters
     ----------
     loops : sequence of ClosedLoop
         All pairs of gains.
-    unit : str
-        Of the steady state, as the axis names it.
-    plant : str
-        For the title.
+    plant : Plant
+        For the title and the units.
     path : Path
         A PNG file.
     """
@@ -207,14 +206,14 @@ def pd_figure(loops: Sequence[ClosedLoop], unit: str, plant: str, path: Path) ->
         for letter, axes, K_p in zip("abcdefghijklmnop", grid.flat, proportional, strict=False):
             members = [loop for loop in loops if loop.gains.proportional == K_p]
             for loop, colour in zip(members, SERIES * len(members), strict=False):
-                label = f"$K_d$ = {loop.gains.derivative:g} s"
+                label = f"$K_d$ = {loop.gains.derivative:.4g} {plant.rate_unit}"
                 axes.plot(time, loop_response(loop, time), color=colour, lw=1.3, label=label)
-            axes.set_title(f"({letter}) $K_p$ = {K_p:g}")
+            axes.set_title(f"({letter}) $K_p$ = {K_p:.4g} {plant.gain_unit}")
         for axes in grid[-1]:
             axes.set_xlabel("time, s")
         for axes in grid[:, 0]:
-            axes.set_ylabel(f"answer to a unit step{unit}")
-        figure.suptitle(f"PD control of {plant}, as in Fig. 16", fontsize=10)
+            axes.set_ylabel(f"answer to a unit step, {plant.output}")
+        figure.suptitle(f"PD control of {plant.name}, as in Fig. 16", fontsize=10)
         figure.legend(*grid.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, fontsize=8)
         save(figure, path)
 

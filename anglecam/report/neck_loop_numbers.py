@@ -11,15 +11,17 @@ import numpy as np
 from anglecam.neck.constraints import Constraint
 from anglecam.neck.design import Relations
 from anglecam.neck.joint import Joint, Quantity
-from anglecam.neck.linear import LinearNeck
-from anglecam.neck.parameters import NeckParameters
+from anglecam.neck.linear import LinearNeck, linear_neck, passive_stiffness
+from anglecam.neck.parameters import PAPER, NeckParameters
 from anglecam.neck.pd import ClosedLoop, Margins, PdMotion
 from anglecam.neck.pd_tuning import Nod, Tuned
 from anglecam.neck.step import linear_step_figures
 from anglecam.neck.synthesis import Synthesis
-from anglecam.neck.variation import PARAMETERS
+from anglecam.neck.variation import NOD, PARAMETERS
+from anglecam.neck_procedure import Plant
 from anglecam.neck_systems import System
-from anglecam.report.neck_numbers import Numbers, step_numbers
+from anglecam.report.neck_demand import demand_notes, demand_numbers, saturation_notes
+from anglecam.report.neck_numbers import UNSTABLE, Numbers, step_numbers
 
 UNITS = {
     "a": "per_s",
@@ -60,7 +62,9 @@ def spoken_unit(name: str) -> str:
     return _SPOKEN[UNITS[name]]
 
 
-def response_numbers(systems: Sequence[System], height: float, rmse: Mapping[str, float]) -> Numbers:
+def response_numbers(
+    systems: Sequence[System], height: float, rmse: Mapping[str, float], neck: NeckParameters = PAPER
+) -> Numbers:
     """Set models side by side.
 
     Parameters
@@ -71,6 +75,8 @@ def response_numbers(systems: Sequence[System], height: float, rmse: Mapping[str
         Of the step, rad.
     rmse : mapping
         Of each system beside a measurement, rad, by its name; empty without one.
+    neck : NeckParameters
+        Whose responses some of the systems are.
 
     Returns
     -------
@@ -92,11 +98,22 @@ def response_numbers(systems: Sequence[System], height: float, rmse: Mapping[str
         if system.name in rmse:
             row["measured_rmse_deg"] = math.degrees(rmse[system.name])
         told.append(row)
-    return {"step_deg": math.degrees(height), "models": told}
+    notes = [] if linear_neck(neck).stiffness > 0.0 else [UNSTABLE]
+    # the error is the whole input while the head has not moved
+    notes += saturation_notes(
+        neck.servo.amplifier_gain * neck.servo.command_gain * height,
+        "at the step's start: the models have no such limit",
+    )
+    return {"step_deg": math.degrees(height), "models": told, "notes": notes}
 
 
 def design_numbers(
-    found: Joint, routes: Sequence[Relations], explained: NeckParameters | None, made: Synthesis | None
+    found: Joint,
+    routes: Sequence[Relations],
+    explained: NeckParameters | None,
+    made: Synthesis | None,
+    declared: NeckParameters = PAPER,
+    nod: float = NOD,
 ) -> Numbers:
     """Tell the design procedure's steps 3 to 6 and, where wished for, the neck that does what is wished.
 
@@ -110,6 +127,10 @@ def design_numbers(
         The neck whose Eq. (28) is that motion.
     made : Synthesis or None
         The neck made to a wish.
+    declared : NeckParameters
+        The neck as it was declared: what a wish is held beside, and whose servo holds the nod without one.
+    nod : float
+        The farthest nod to be held, rad.
 
     Returns
     -------
@@ -134,7 +155,11 @@ def design_numbers(
         "explained_neck": None if explained is None else neck_numbers(explained),
     }
     if made is not None:
-        numbers["synthesis"] = _synthesis(made)
+        numbers["synthesis"] = _synthesis(made, declared)
+    holding = declared if made is None else made.neck
+    at_head = abs(passive_stiffness(holding)) * nod
+    numbers["demand"] = demand_numbers(holding, nod, abs(holding.gamma) * at_head, at_head)
+    numbers["notes"] = demand_notes(numbers["demand"])
     return numbers
 
 
@@ -153,13 +178,17 @@ def _quantity(quantity: Quantity) -> Numbers:
     return {"value": quantity.value, "sigma": quantity.sigma}
 
 
-def _synthesis(made: Synthesis) -> Numbers:
+def _synthesis(made: Synthesis, declared: NeckParameters) -> Numbers:
     linear: LinearNeck = made.linear
     return {
         "feasible": made.feasible,
         "unmet": list(made.unmet),
         "changes": {
-            symbol: {"before": before, "after": after, "unit": unit_of_change(symbol)}
+            symbol: {
+                "before": before if symbol == "K_d" else PARAMETERS[symbol].read(declared),
+                "after": after,
+                "unit": unit_of_change(symbol),
+            }
             for symbol, (before, after) in made.changes.items()
         },
         "neck": neck_numbers(made.neck),
@@ -191,17 +220,13 @@ def constraint_numbers(constraint: Constraint) -> Numbers:
     }
 
 
-def pd_numbers(
-    plant: str, unit: str, loops: Sequence[ClosedLoop], tuned: Tuned | None, simulated: PdMotion | None
-) -> Numbers:
+def pd_numbers(plant: Plant, loops: Sequence[ClosedLoop], tuned: Tuned | None, simulated: PdMotion | None) -> Numbers:
     """Tell closed loops and, where gains were tuned, what came of it.
 
     Parameters
     ----------
-    plant : str
+    plant : Plant
         What is controlled.
-    unit : str
-        That its steady state is in, as a key ends in it.
     loops : sequence of ClosedLoop
         One for each pair of gains.
     tuned : Tuned or None
@@ -214,7 +239,14 @@ def pd_numbers(
     dict
         Keys end in their unit; the gains are in the plant's unit of input over that of its output.
     """
-    numbers: Numbers = {"plant": plant, "loops": [_loop(loop, unit) for loop in loops]}
+    unit = plant.unit
+    numbers: Numbers = {
+        "plant": plant.name,
+        "gains_of": plant.gains_of,
+        "gain_units": {"proportional": plant.gain_unit, "derivative_s": plant.rate_unit},
+        "steady_state_unit": plant.output,
+        "loops": [_loop(loop, unit) for loop in loops],
+    }
     if tuned is not None:
         numbers["tuned"] = {
             **_loop(tuned.loop, unit),

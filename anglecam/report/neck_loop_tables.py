@@ -7,9 +7,10 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
+from anglecam.neck.constraints import shown
 from anglecam.report.neck_loop_numbers import UNITS, key_of, spoken_unit
 from anglecam.report.neck_numbers import Numbers
-from anglecam.report.neck_tables import FIGURE_COLUMNS, amount, pairs, say, step_cells, table, with_sigma
+from anglecam.report.neck_tables import FIGURE_COLUMNS, amount, demand_fact, pairs, say, step_cells, table, with_sigma
 
 ROUTES = {
     "by_inertia": "known: inertia, spring, weight, C",
@@ -32,7 +33,7 @@ SYMBOLS = {
 }
 """Of what the routes of `anglecam.neck.design` find."""
 _NOTHING = 1e-9
-"""In the units of gains and constraints."""
+"""In the units of gains."""
 
 
 def response_tables(n: Numbers) -> list[Table]:
@@ -63,7 +64,8 @@ def design_tables(n: Numbers) -> list[Table]:
         tables.append(pairs(ROUTES.get(route["route"], route["route"]), lines))
     if "synthesis" in n:
         tables += _synthesis(n["synthesis"])
-    return tables
+    holds = "the declared neck" if "synthesis" not in n else _made(n["synthesis"])
+    return [*tables, pairs(holds, [demand_fact(n["demand"])])]
 
 
 def contradictions(n: Numbers) -> list[str]:
@@ -75,9 +77,13 @@ def contradictions(n: Numbers) -> list[str]:
 def pd_tables(n: Numbers) -> list[Table]:
     """Tabulate closed loops, and gains that were tuned."""
     steady = next(key for key in n["loops"][0] if key.startswith("steady_state"))
-    columns = ("K_p", "K_d, s", *FIGURE_COLUMNS, _heading(steady), "lost, %", "margin, °", "M_s")
+    units = n["gain_units"]
+    rest = f"steady state, {n['steady_state_unit']}"
+    gains = (f"K_p, {units['proportional']}", f"K_d, {units['derivative_s']}")
+    columns = (*gains, *FIGURE_COLUMNS, rest, "lost, %", "margin, °", "M_s")
     rows = [_loop(loop, steady) for loop in n["loops"]]
     tables = [table(columns, rows, text=0)]
+    tables[0].title, tables[0].title_justify = f"{n['plant']}; {n['gains_of']}", "left"
     if "tuned" in n:
         tuned = n["tuned"]
         tables.append(table(columns, [_loop(tuned, steady)], text=0))
@@ -103,30 +109,27 @@ def _loop(loop: Numbers, steady: str) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _heading(key: str) -> str:
-    unit = key.removeprefix("steady_state").strip("_")
-    return "steady state" + {"": "", "deg": ", °"}.get(unit, f", {unit.replace('_per_', '/')}")
-
-
 def _synthesis(made: Numbers) -> list[Table]:
     rows = [
-        (symbol, amount(change["before"], change["unit"]), amount(change["after"], change["unit"]))
+        (symbol, amount(change["before"], change["unit"]), amount(_seen(change["after"]), change["unit"]))
         for symbol, change in made["changes"].items()
     ]
     links = {symbol: made["neck"][symbol] for symbol in ("L_3", "gamma")}
     rows += [(symbol, "", amount(value["value"], value["unit"])) for symbol, value in links.items()]
     rows.append(("C_i", "", amount(made["command_gain_V_per_rad"], "V/rad")))
-    name = "made to the wish" if made["feasible"] else "nearest to the wish, which cannot be met"
-    return [table((name, "before", "after"), rows), _constraints(made["constraints"])]
+    return [table((_made(made), "declared", "after"), rows), _constraints(made["constraints"])]
+
+
+def _made(made: Numbers) -> str:
+    return "made to the wish" if made["feasible"] else "nearest to the wish, which cannot be met"
 
 
 def _constraints(rows: Sequence[Numbers]) -> Table:
     def line(c: Numbers) -> tuple[str, ...]:
         stands = "missed" if not c["met"] else "met, binds" if c["active"] else "met"
-        here, limit, unit = c["value"], c["limit"], c["unit"]
-        if unit == "rad":
-            here, limit, unit = math.degrees(here), math.degrees(limit), "°"
-        return c["name"], amount(_seen(here), unit), f"{c['sense']} {amount(limit, unit)}", stands
+        if not math.isfinite(c["limit"]):
+            return c["name"], shown(c["value"], c["unit"]), "–", "not asked"
+        return c["name"], shown(c["value"], c["unit"]), f"{c['sense']} {shown(c['limit'], c['unit'])}", stands
 
     return table(("constraint", "here", "limit", ""), map(line, rows))
 

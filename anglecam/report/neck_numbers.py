@@ -23,7 +23,8 @@ from anglecam.neck.damping import SAE_20_VISCOSITY
 from anglecam.neck.file import Neck
 from anglecam.neck.fourbar import head_angle, servo_angle
 from anglecam.neck.large_angle import holding_voltage
-from anglecam.neck.linear import passive_stiffness
+from anglecam.neck.linear import linear_neck, passive_stiffness
+from anglecam.neck.parameters import PAPER
 from anglecam.neck.power import SERVOS, PowerUse
 from anglecam.neck.sensitivity import FIGURES, Figure9, Sensitivity
 from anglecam.neck.servo import torque_speed
@@ -38,12 +39,12 @@ from anglecam.neck.turning import (
     turning_slope,
     turning_start_torque,
 )
-from anglecam.neck.variation import PARAMETERS
+from anglecam.neck.variation import NOD, PARAMETERS, nod_range, nod_slope
+from anglecam.report.neck_demand import SUPPLY, demand_notes, demand_numbers
 
 Numbers = dict[str, Any]
 
-SUPPLY = 6.0
-"""V that the paper's servo is driven with."""
+UNSTABLE = "the neck is unstable, Eq. (35): it falls from neutral, so its response has no figures"
 EVERY = math.radians(5.0)
 """Between the angles at which spring and weight are tabulated, rad."""
 
@@ -72,6 +73,7 @@ def kinematics_numbers(neck: Neck, wanted: Sequence[float] = ()) -> Numbers:
     rows = table_3(linkage, scale)
     line, found = straight_line(linkage, *STRAIGHT), limits(linkage)
     worst = worst_transmission_angle(linkage, rows[2].theta_s, rows[0].theta_s)
+    beyond = [row for row in rows if not found.crank[0] <= row.theta_s <= found.crank[1]]
     lowest, highest = nod_limits(linkage, scale)
     return {
         "table_3": [
@@ -98,6 +100,7 @@ def kinematics_numbers(neck: Neck, wanted: Sequence[float] = ()) -> Numbers:
             "range_deg": np.degrees(STRAIGHT).tolist(),
         },
         "gamma": neck.parameters.gamma,
+        "gamma_from": _origin_of_gamma(neck),
         "limits": {
             "grashof": found.kind,
             "theta_f_deg": np.degrees(found.rocker).tolist(),
@@ -111,7 +114,20 @@ def kinematics_numbers(neck: Neck, wanted: Sequence[float] = ()) -> Numbers:
         "wanted": [_wanted(neck, nod) for nod in wanted],
         "turning": _turning(neck),
         "bearing": _bearing(neck),
+        "notes": [
+            f"Table 3's command {row.command} ({row.position}) turns the servo to {math.degrees(row.theta_s):.1f}°, "
+            f"beyond a dead centre of the links, where the head has turned back"
+            for row in beyond
+        ],
     }
+
+
+def _origin_of_gamma(neck: Neck) -> str:
+    linkage, gamma = neck.parameters.linkage, neck.parameters.gamma
+    if math.isclose(gamma, nod_slope(linkage), rel_tol=1e-9):
+        low, high = np.degrees(nod_range(linkage))
+        return f"line fitted over a nod of ±{math.degrees(NOD):.0f}°, θ_s from {low:.1f}° to {high:.1f}°"
+    return "printed by the paper, over Fig. 4's range of θ_s" if gamma == PAPER.gamma else "declared"
 
 
 def _wanted(neck: Neck, nod: float) -> Numbers:
@@ -178,6 +194,9 @@ def statics_numbers(neck: Neck, theta_p: float | None = None) -> Numbers:
     curve = static_curve(p, large.preload, delta)
     voltage = holding_voltage(large, delta)
     servo = torque_speed(p.servo, SUPPLY / p.servo.amplifier_gain)
+    at_shaft = np.abs(large.ratio.slope(delta) * curve.residual)
+    hardest = int(np.nanargmax(at_shaft))
+    demand = demand_numbers(p, delta[hardest], at_shaft[hardest], np.abs(curve.residual).max())
     numbers: Numbers = {
         "spring": {
             "stiffness_N_m": p.spring.rate * p.spring.base * p.spring.arm,
@@ -200,6 +219,7 @@ def statics_numbers(neck: Neck, theta_p: float | None = None) -> Numbers:
             "stall_torque_N_m": servo.stall_torque,
             "no_load_speed_rad_per_s": servo.no_load_speed,
         },
+        "demand": demand,
         "film": {
             "damping_N_m_s": neck.film.damping,
             "damping_of_SAE_20_N_m_s": replace(neck.film, viscosity=SAE_20_VISCOSITY).damping,
@@ -212,9 +232,11 @@ def statics_numbers(neck: Neck, theta_p: float | None = None) -> Numbers:
                 "residual_N_m": float(curve.residual[i]),
                 "small_angle_N_m": float(curve.small_angle[i]),
                 "holding_voltage_V": float(voltage[i]),
+                "torque_at_shaft_N_m": float(at_shaft[i]),
             }
             for i in range(len(delta))
         ],
+        "notes": [*([] if linear_neck(p).stiffness > 0.0 else [UNSTABLE]), *demand_notes(demand)],
     }
     if theta_p is not None:
         stretched = pretension(p, theta_p, common=large.common_stretch)
@@ -288,6 +310,15 @@ def power_numbers(use: PowerUse) -> Numbers:
         "servos": SERVOS,
         "all_servos_W": use.all_servos,
     }
+
+
+def without_dust(value: Any) -> Any:
+    """Round every float in nested numbers to 12 significant digits: what is beyond is the arithmetic's."""
+    if isinstance(value, dict):
+        return {key: without_dust(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [without_dust(item) for item in value]
+    return float(f"{value:.12g}") if isinstance(value, float) else value
 
 
 def step_numbers(figures: StepFigures) -> Numbers:

@@ -10,6 +10,8 @@ from rich.table import Table
 
 from anglecam.report.neck_numbers import Numbers
 
+_ROUNDING = 1e-12
+"""Of a value, below which its standard uncertainty is the arithmetic's and the value counts as exact."""
 FIGURE_COLUMNS = ("rise, s", "overshoot, %", "settling, s")
 
 
@@ -33,9 +35,9 @@ def kinematics_tables(n: Numbers) -> list[Table]:
         (
             "straight line, Fig. 4",
             f"θ_f = {say(line['slope'], 4)}·θ_s + {say(line['intercept_deg'], 2)}°, R² = {say(line['r_squared'], 4)} "
-            f"over {span(line['range_deg'], 0)}",
+            f"over θ_s = {span(line['range_deg'], 0)}",
         ),
-        ("γ of the equations of motion", say(n["gamma"], 4)),
+        ("γ of the equations of motion", f"{say(n['gamma'], 4)}, {n['gamma_from']}"),
         ("class of the linkage (Grashof)", found["grashof"]),
         ("θ_f between dead centres", span(found["theta_f_deg"])),
         ("θ_s between dead centres", span(found["theta_s_deg"])),
@@ -91,6 +93,7 @@ def statics_tables(n: Numbers) -> list[Table]:
             f"stall torque {say(servo['stall_torque_N_m'], 3)} N·m, "
             f"c3 = {say(servo['torque_gain_N_m_per_V'], 3)} N·m/V",
         ),
+        demand_fact(n["demand"]),
         (
             "damping C of the film, Eq. (22)",
             f"{film['damping_N_m_s']:.3g} N·m·s; with SAE 20 oil {film['damping_of_SAE_20_N_m_s']:.2g} N·m·s",
@@ -104,10 +107,29 @@ def statics_tables(n: Numbers) -> list[Table]:
                 f"it rests at {say(wanted['neutral_deg'], 2)}° from neutral",
             )
         )
-    columns = ("Δθ, °", "spring, N·m", "weight, N·m", "left to the servo, N·m", "small angles, N·m", "held by, V")
-    keys = ("spring_N_m", "weight_N_m", "residual_N_m", "small_angle_N_m", "holding_voltage_V")
+    columns = (
+        "Δθ, °",
+        "spring, N·m",
+        "weight, N·m",
+        "left to the servo, N·m",
+        "small angles, N·m",
+        "held by, V",
+        "at the shaft, N·m",
+    )
+    keys = (
+        "spring_N_m", "weight_N_m", "residual_N_m", "small_angle_N_m", "holding_voltage_V", "torque_at_shaft_N_m",
+    )  # fmt: skip
     curve = ((say(row["nod_deg"], 0), *(say(row[key], 3) for key in keys)) for row in n["curve"])
     return [pairs("statics", facts), table(columns, curve, text=0)]
+
+
+def demand_fact(demand: Numbers) -> tuple[str, str]:
+    """Say what torque the servo has to hold at its shaft, beside what it has."""
+    asked, stall = demand["torque_at_shaft_N_m"], demand["stall_torque_N_m"]
+    return (
+        f"servo torque at {say(demand['nod_deg'], 0)}° (shaft)",
+        f"{say(asked, 3)} N·m of {say(stall, 3)} N·m at stall: {'exceeded' if asked > stall else 'holds'}",
+    )
 
 
 def sensitivity_tables(n: Numbers) -> list[Table]:
@@ -198,7 +220,7 @@ def amount(value: float, unit: str) -> str:
 def with_sigma(quantity: Numbers) -> str:
     """Write a value to the second digit of its uncertainty, or to four where it has none."""
     value, sigma = quantity["value"], quantity["sigma"]
-    if sigma is None or not 0.0 < sigma < math.inf:
+    if sigma is None or not _ROUNDING * abs(value) < sigma < math.inf:
         return f"{value:.4g}".replace("-", "−")
     digits = max(0, 1 - math.floor(math.log10(sigma)))
     return f"{value:.{digits}f} ± {sigma:.{digits}f}".replace("-", "−")

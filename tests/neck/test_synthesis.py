@@ -71,8 +71,11 @@ def test_a_range_beyond_the_links_is_named():
     made = synthesise(Wish(Nod(0.1, 0.1), up=0.7), free=("K", "L_6", "K_d"))
     assert not made.feasible
     (line,) = (u for u in made.unmet if u.startswith("range upward"))
-    assert "≥ 0.7 rad" in line
+    assert "≥ 40.11 °" in line
     assert "cannot be met" in line
+    (row,) = (c for c in made.constraints if c.name == "range upward")
+    assert f"nearest found: {math.degrees(row.value):.4g} °" in line  # the numbers of the table
+    assert len(made.unmet) == sum(not c.met for c in made.constraints)
 
 
 def test_a_rise_faster_than_the_motor_can_is_named():
@@ -88,6 +91,14 @@ def test_the_papers_servo_cannot_hold_its_head_at_25_degrees():
     made = synthesise(Wish(Nod(), stall_torque=0.47))
     assert made.feasible
     assert made.constraints[-1].active
+
+
+def test_the_torque_at_the_shaft_is_told_where_no_limit_is_asked():
+    row = design_constraints(Wish(Nod()), PAPER, PdGains())[-1]
+    assert row.name == "servo torque at the end (shaft)"
+    assert row.value == pytest.approx(0.71, abs=5e-3)
+    assert row.met
+    assert not row.active
 
 
 def test_the_papers_links_reach_less_than_25_degrees_down():
@@ -127,4 +138,4 @@ def test_of_two_limits_that_exclude_each_other_both_are_named():
     best = least(evaluate, np.zeros(1), np.full(1, 5.0), [np.zeros(1)])
     assert best.at[0] == pytest.approx(1.5, abs=1e-3)
     assert [line.split()[0] for line in best.unmet] == ["low", "high"]
-    assert "low ≤ 1 m (here 2 m)" in best.unmet[0]
+    assert "low ≤ 1 m cannot be met while all else holds (nearest found: 1.5 m)" in best.unmet[0]

@@ -67,7 +67,7 @@ DRAWN = {
     "series": draw_series,
     "design": draw_design,
     "synthesis": draw_synthesis,
-    "pd": lambda path: neck_loop_figures.pd_figure(gains_table(sys2()), ", °", "SYS2", path),
+    "pd": lambda path: neck_loop_figures.pd_figure(gains_table(sys2()), procedure.chosen_plant(None, None), path),
     "tuned": draw_tuned,
 }
 
