@@ -307,7 +307,7 @@ def sys2_trial(rate: float, sigma: float, seed: int) -> tuple[Floats, Floats, Fl
     """Return the errors of poles and zeros over their sigmas, e'P⁻¹e/6, and held-out RMS errors of SYS1 and SYS2."""
     record = sys2_steps("fitted", rate, sigma, seed)
     fits = {name: identify_records([record], Rig(), way).fit for name, way in (("SYS1", "oe2"), ("SYS2", "oe3"))}
-    p, covariance = fits["SYS2"].parameters, parameter_covariance(fits["SYS2"])
+    p, covariance = fits["SYS2"].parameters, fits["SYS2"].covariance
     off = []
     for true, found in zip(poles_and_zeros(SYS2, 0.0 * covariance), poles_and_zeros(p, covariance), strict=True):
         error = found.value - true.value

@@ -69,12 +69,37 @@ SESSIONS = {
 }
 
 
-@pytest.mark.parametrize("name", SESSIONS)
-def test_angles_are_right_and_sigma_is_true_beside_a_second_red_object(tmp_path, name):
-    look, mouth, hint, limit, ratio = SESSIONS[name]
+@pytest.fixture(scope="module")
+def drawn(request, tmp_path_factory):
+    """Draw and measure one of `SESSIONS`."""
+    folder = tmp_path_factory.mktemp("drawn")
+    look, mouth, hint, limit, ratio = SESSIONS[request.param]
     clips = [Recording("stairs", "stairs", duration_s=4.0, amplitude_deg=14.0)]
-    truth = draw_session(tmp_path, look=look, recordings=clips, mouth=mouth, hint_error_px=hint, seed=4)["stairs"]
-    measured = measure_clip(truth.clip, read_rig(tmp_path / "rig.yaml"), read_command(tmp_path / "stairs.command.csv"))
+    truth = draw_session(folder, look=look, recordings=clips, mouth=mouth, hint_error_px=hint, seed=4)["stairs"]
+    command = read_command(folder / "stairs.command.csv")
+    return look, limit, ratio, measure_clip(truth.clip, read_rig(folder / "rig.yaml"), command), truth
+
+
+BIASED = pytest.mark.xfail(strict=True, reason="the mean error of the clip is larger than its stated uncertainty")
+
+
+@pytest.mark.parametrize(
+    "drawn",
+    [
+        pytest.param(name, marks=BIASED if name in ("disc, book near", "no marker, no hint, red lamp") else ())
+        for name in SESSIONS
+    ],
+    indirect=True,
+)
+def test_the_whole_error_mean_and_scatter_is_as_large_as_sigma(drawn):
+    _, _, ratio, measured, truth = drawn
+    error, sigma = _errors(measured.series, truth.angle_deg)
+    assert ratio[0] < np.sqrt(((error / sigma) ** 2).mean()) < ratio[1]
+
+
+@pytest.mark.parametrize("drawn", SESSIONS, indirect=True)
+def test_angles_are_right_and_sigma_is_true_beside_a_second_red_object(drawn):
+    look, limit, ratio, measured, truth = drawn
     series = measured.series
     assert series.status == ("ok",) * len(truth.angle_deg)
     error, sigma = _errors(series, truth.angle_deg)

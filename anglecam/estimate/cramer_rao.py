@@ -50,25 +50,24 @@ def cramer_rao_bound(
     return parameter_covariance(fit_output_error(model, exact, [parameters], own=own), sigma)
 
 
-def parameter_covariance(fit: Fit, sigma: float | None = None) -> Floats:
-    """Return the covariance of fitted parameters: the bound where the fit ended.
+def parameter_covariance(fit: Fit, sigma: float) -> Floats:
+    """Return the covariance of fitted parameters under noise of known size: the bound where the fit ended.
 
     Parameters
     ----------
     fit : Fit
         With no parameter at a bound of its own.
-    sigma : float, optional
-        Standard deviation of the noise, rad; what the residual shows otherwise.
+    sigma : float
+        Standard deviation of the noise, rad; `Fit.covariance` takes what the residual shows.
 
     Returns
     -------
     (p, p) ndarray
         SI.
     """
-    count, unknowns = fit.jacobian.shape
-    variance = fit.cost / (count - unknowns) if sigma is None else sigma**2
+    unknowns = fit.jacobian.shape[1]
     norm = np.linalg.norm(fit.jacobian, axis=0)
     triangle = np.linalg.qr(fit.jacobian / norm, mode="r")
     half = np.linalg.solve(triangle, np.eye(unknowns)) / norm[:, None]
     p = len(fit.parameters)
-    return variance * (half @ half.T)[:p, :p]
+    return sigma**2 * (half @ half.T)[:p, :p]

@@ -80,16 +80,12 @@ class Fit:
     @cached_property
     def sigma(self) -> Floats:
         """(p,) standard uncertainties of ``parameters``, SI, of noise that the whitening made white."""
-        return _deviations(self.covariance)
+        return np.sqrt(np.diag(self.covariance))
 
     @cached_property
     def covariance(self) -> Floats:
         """(p, p) covariance of ``parameters``, SI, likewise; NaN for a parameter that its bound holds."""
         return self._covariance(lambda jacobian: jacobian)
-
-    def coloured_sigma(self, records: Sequence[Record], phi: float) -> Floats:
-        """Return (p,) standard uncertainties from `coloured_covariance`."""
-        return _deviations(self.coloured_covariance(records, phi))
 
     def coloured_covariance(self, records: Sequence[Record], phi: float) -> Floats:
         """Return `covariance` for a fit without whitening whose noise is nevertheless AR(1) with φ = ``phi``.
@@ -120,11 +116,6 @@ class Fit:
         told = np.full((p, p), np.nan)  # a parameter held by its bound has none
         told[np.ix_(free, free)] = covariance[:n, :n]
         return told
-
-
-def _deviations(covariance: Floats) -> Floats:
-    """Return the standard uncertainties in a covariance."""
-    return np.sqrt(np.diag(covariance))
 
 
 def whiten(record: Record, phi: float, values: Floats) -> Floats:

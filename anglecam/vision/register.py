@@ -38,7 +38,7 @@ _BETTER = 0.6
 """Misfit of another turn over that of the guess below which the guess is wrong."""
 _COPY = 0.13
 """What a codec's copy hides, as a share of the turn whose change of the picture equals the tiles' misfit: films with
-known angles, encoded by x264 at crf 12 to 23, have 0.10 to 0.17. Coarser ones copy more than this tells of."""
+known angles, encoded by x264 at crf 18, have 0.11 to 0.17; at crf 28 up to 0.24, more than this tells of."""
 
 
 @dataclass(frozen=True)

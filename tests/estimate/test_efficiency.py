@@ -104,7 +104,7 @@ def test_poles_and_zeros_of_sys2_are_recovered_within_their_uncertainty():
     for seed in range(12):
         records = [stairs([1.0, 0.0, 0.5, -0.5, -1.0, 0.0, 0.8, 0.2], seed, sigma)]
         fit = identify_records(records, Rig(), "oe3").fit
-        covariance = parameter_covariance(fit)
+        covariance = fit.covariance
         parameters.append(fit.parameters - SYS2)
         covariances.append(covariance)
         found = poles_and_zeros(fit.parameters, covariance)
