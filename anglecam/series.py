@@ -63,6 +63,12 @@ class AngleSeries:
     """(n, 2) pivot, px."""
     bounds: dict[float, Floats] = field(default_factory=dict)
     """Worst-case angle error, rad, for a mouth point anywhere within the key's radius in px."""
+    picture_px: tuple[int, int] | None = None
+    """Width and height of the picture; ``None`` where it is not known."""
+    marker_px: tuple[float, float] | None = None
+    """Where a picture that nothing was undone in shows the mark on the shaft; ``None`` where it does not."""
+    only_pivot_differs: bool = False
+    """Whether the angle is that of the line from this mark, and differs from the measured one by nothing else."""
 
     @property
     def ok(self) -> NDArray[np.bool_]:

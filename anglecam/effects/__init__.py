@@ -5,9 +5,9 @@ from __future__ import annotations
 import importlib
 import pkgutil
 
-from anglecam.effects.effect import Effect, Parameter
+from anglecam.effects.effect import UNSEEN, Effect, Knots, Parameter, View
 
-__all__ = ["LEDGER", "Effect", "Parameter", "effect"]
+__all__ = ["LEDGER", "UNSEEN", "Effect", "Knots", "Parameter", "View", "effect"]
 
 
 def _collect() -> tuple[Effect, ...]:

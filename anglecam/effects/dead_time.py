@@ -10,16 +10,18 @@ lights at the first command change, what is found is the sum of both, which may 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.effects.effect import Effect, Parameter
+from anglecam.effects.effect import Effect, Knots, Parameter
 
 Floats = NDArray[np.float64]
 
 
-def _shift(time: Floats, value: Floats, parameters: Floats) -> tuple[Floats, Floats]:
-    return time + parameters[0], value
+def _shift(asked: Knots, parameters: Floats) -> Knots:
+    return replace(asked, time=asked.time + parameters[0])
 
 
 EFFECT = Effect(
@@ -36,5 +38,5 @@ EFFECT = Effect(
         "a chirp up to twice the natural frequency, filmed at 60 Hz or more, separates delay from lag"
     ),
     source="Ljung, System Identification, 2nd ed., 1999, sec. 4.2; the paper's Remarks on Fig. 14",
-    shift_command=_shift,
+    command=_shift,
 )

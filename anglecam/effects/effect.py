@@ -1,19 +1,63 @@
 """What an entry of the ledger says: one effect that a model of the form θ̈ = c·u − a·θ̇ − b·θ can lack.
 
 An effect belongs to one station of the signal's path, command → actuator → load → camera, and changes one thing
-there through one *port* of the integrator. Its parameters at their null leave the model exactly as it was.
+there through one *port*. Its parameters at their null leave the model exactly as it was.
+
+    command   what arrives:          u(t) → v(t), straight lines in, straight lines out
+    lag       how late it arrives:   τ·v̇ = u − v
+    servo     what torque comes of it:   c·v − b·θ → another torque
+    load      what the head's motion adds
+    dry       what holds it
+    when      when the camera saw what it shows
+    seen      what the camera makes of the angle
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+
+PORTS = ("command", "lag", "servo", "load", "dry", "when", "seen")
+
+
+@dataclass(frozen=True)
+class Knots:
+    """An angle made of straight lines; arrays of length m. Before the first knot its level holds."""
+
+    time: Floats
+    """s, ascending."""
+    level: Floats
+    """At each knot, rad."""
+    slope: Floats
+    """From there to the next, rad/s."""
+
+
+@dataclass(frozen=True)
+class View:
+    """How the camera sees the mechanism of a recording, where it is known."""
+
+    neutral: float = 0.0
+    """Line from pivot to mouth at the zero of the angle, upward from ahead, rad."""
+    lever_px: float | None = None
+    """Pivot to mouth; ``None`` for a series without marks."""
+    pivot_px: tuple[float, float] | None = None
+    """From the middle of the picture, to the right and down."""
+    mirrored: bool = False
+    """Whether the face looks to the left."""
+    only_pivot_differs: bool = False
+    """Whether all that the picture shows otherwise than the mechanism moves is known to come from where the mark is."""
+
+
+UNSEEN = View()
+"""Of a series from elsewhere: the face looks ahead at its zero, and more is not known."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +74,21 @@ class Parameter:
     """Values to start a fit from, SI; more than one where the fit may have several valleys."""
     to_file: float = 1.0
     """Factor from SI to the unit in ``name``."""
+    inverse: bool = False
+    """Whether files state its reciprocal: of a limit, which is absent at 0."""
+
+    def told(self, value: float, sigma: float = 0.0) -> tuple[float, float]:
+        """Return value and standard uncertainty in the unit in ``name``; infinite for a limit that is absent."""
+        if not self.inverse:
+            return value * self.to_file, sigma * abs(self.to_file)
+        if value == 0.0:
+            return math.inf, math.nan
+        return self.to_file / value, sigma * abs(self.to_file) / value**2
 
 
 @dataclass(frozen=True)
 class Effect:
-    """One entry of the ledger. At most one of the ports is filled."""
+    """One entry of the ledger. Exactly one of the ports is filled."""
 
     id: str
     station: str
@@ -45,19 +99,39 @@ class Effect:
     relaxes: str
     """Which assumption of the paper it lifts, and where the paper makes it."""
     parameters: tuple[Parameter, ...]
+    """The first is the effect's size; the others shape it."""
     aliases: tuple[str, ...]
     """Whom it can be mistaken for."""
     separating_experiment: str
     """What to record next to tell it from its aliases."""
     source: str
-    shift_command: Callable[[Floats, Floats, Floats], tuple[Floats, Floats]] | None = field(default=None, repr=False)
-    """Port *command*: (switch times s, values rad, parameters) → the same as the plant receives them."""
+    rank: int = 0
+    """Place among the effects of the same port, on the signal's way."""
+    command: Callable[[Knots, Floats], Knots] | None = field(default=None, repr=False)
+    """What is asked for, and parameters → what arrives."""
+    lag: Callable[[Floats], float] | None = field(default=None, repr=False)
+    """Parameters → τ, s."""
+    servo: Any = field(default=None, repr=False)
+    """Compiled (torque, θ, abc, parameters) → torque of servo and springs, rad/s²; given c·v − b·θ or what another
+    effect has made of it."""
     load: Any = field(default=None, repr=False)
-    """Port *load*: compiled (θ, ω, u, parameters) → angular acceleration added, rad/s²; smooth in all."""
+    """Compiled (θ, ω, parameters) → angular acceleration added, rad/s²."""
     dry: Any = field(default=None, repr=False)
-    """Port *dry*: compiled (parameters) → (level while sliding, level to break away), rad/s²; opposes motion."""
+    """Compiled (parameters) → (sliding up, sliding down, breaking away if more, Stribeck's speed): rad/s² and rad/s;
+    opposes motion."""
+    when: Callable[[Floats, Floats, Floats, View], Floats] | None = field(default=None, repr=False)
+    """(stamps s, angle rad, parameters, view) → when what the frames show happened, s."""
+    seen: Callable[[Floats, Floats, Floats, View], Floats] | None = field(default=None, repr=False)
+    """(stamps s, angle rad, parameters, view) → the angle that is measured, rad."""
+    needs: Callable[[View], bool] = field(default=lambda view: True, repr=False)
+    """Whether a view tells what the effect is reckoned from."""
 
     @property
     def null(self) -> Floats:
         """Parameter values at which the effect is absent."""
         return np.array([p.null for p in self.parameters])
+
+    @cached_property
+    def port(self) -> str:
+        """The one that is filled."""
+        return next(f.name for f in fields(self) if f.name in PORTS and getattr(self, f.name) is not None)

@@ -14,7 +14,7 @@ from anglecam.effects.effect import Effect, Parameter
 
 
 @njit
-def _load(theta: float, omega: float, command: float, parameters: NDArray) -> float:
+def _load(theta: float, omega: float, parameters: NDArray) -> float:
     return -parameters[0] * omega * abs(omega)
 
 
@@ -25,7 +25,7 @@ EFFECT = Effect(
     equation="θ̈ = c·u − a·θ̇ − b·θ − q·θ̇·|θ̇|",
     relaxes="Eq. (22): damping is viscous only, proportional to speed",
     parameters=(Parameter("q_per_rad", null=0.0, lower=0.0, upper=200.0, starts=(0.05, 1.0)),),
-    aliases=("coulomb_friction",),
+    aliases=("coulomb_friction", "torque_saturation"),
     separating_experiment="steps or free releases of two amplitudes, one at least three times the other",
     source="Batchelor, An Introduction to Fluid Dynamics, 1967, sec. 5.11",
     load=_load,

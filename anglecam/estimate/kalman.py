@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from anglecam.estimate.record import Record
 from anglecam.session import Command
-from anglecam.simulate.integrator import DRY_IDS, LOAD_IDS, WIDTH, integrate
+from anglecam.simulate.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, WIDTH, integrate
 from anglecam.simulate.plant import MAX_STEP
 
 Floats = NDArray[np.float64]
@@ -27,7 +27,7 @@ SHARED = slice(2, 5)
 """Where a, b, c stand in the state; what stands elsewhere is the recording's own."""
 _STEPS = np.array([0.1, 1.0, 1.0, 10.0, 10.0])
 """Least magnitudes of θ, θ̇, a, b, c, SI, that difference quotients are taken against."""
-_NO_LOADS, _NO_DRIES = np.zeros((max(1, len(LOAD_IDS)), WIDTH)), np.zeros((max(1, len(DRY_IDS)), WIDTH))
+_NO_SERVOS, _NO_LOADS, _NO_DRIES = (np.zeros((max(1, len(ids)), WIDTH)) for ids in (SERVO_IDS, LOAD_IDS, DRY_IDS))
 
 
 @dataclass(frozen=True)
@@ -156,18 +156,19 @@ def _advance(state: Floats, span: Floats, command: Command) -> tuple[Floats, Flo
     """Integrate the state over ``span`` (2,) and give the derivative of its end."""
     reached, F = state.copy(), np.eye(len(state))
     steps = 1e-5 * np.maximum(np.abs(state[:5]), _STEPS)
-    reached[:2], F[:2, :5] = _flow(state[:5], span, command.time, command.angle, steps, _NO_LOADS, _NO_DRIES, MAX_STEP)
+    knots = np.stack([command.time, command.angle, np.zeros(len(command.time))])
+    reached[:2], F[:2, :5] = _flow(state[:5], span, knots, steps, _NO_SERVOS, _NO_LOADS, _NO_DRIES, MAX_STEP)
     return reached, F
 
 
 @njit
-def _flow(state, span, switches, values, steps, loads, dries, max_step):  # type: ignore[no-untyped-def]  # compiled
+def _flow(state, span, knots, steps, servos, loads, dries, max_step):  # type: ignore[no-untyped-def]  # compiled
     slopes = np.empty((2, 5))
     for j in range(5):
         low, high = state.copy(), state.copy()
         low[j] -= steps[j]
         high[j] += steps[j]
-        under = integrate(span, low[0], low[1], switches, values, low[2:], loads, dries, max_step)[1]
-        over = integrate(span, high[0], high[1], switches, values, high[2:], loads, dries, max_step)[1]
+        under = integrate(span, low[0], low[1], knots, 0.0, low[2:], servos, loads, dries, max_step)[1]
+        over = integrate(span, high[0], high[1], knots, 0.0, high[2:], servos, loads, dries, max_step)[1]
         slopes[:, j] = (over - under) / (high[j] - low[j])
-    return integrate(span, state[0], state[1], switches, values, state[2:], loads, dries, max_step)[1], slopes
+    return integrate(span, state[0], state[1], knots, 0.0, state[2:], servos, loads, dries, max_step)[1], slopes

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.effects import UNSEEN, View
 from anglecam.errors import InputError
 from anglecam.series import AngleSeries
 from anglecam.session import Command
@@ -39,6 +40,8 @@ class Record:
     cross: Floats | None = None
     """Scatter of the mouth's distance from the pivot, divided by that distance, rad: what the camera adds in the
     direction in which nothing can move; ``None`` for a series without marks."""
+    view: View = UNSEEN
+    """How the camera sees the mechanism."""
 
     @property
     def interval(self) -> float:
@@ -47,9 +50,12 @@ class Record:
 
     def between(self, start: float, stop: float) -> Record:
         """Return the part with ``start ≤ time < stop`` (s); the command keeps its whole history."""
-        part = (self.time >= start) & (self.time < stop)
-        cross = None if self.cross is None else self.cross[part]
-        return replace(self, time=self.time[part], angle=self.angle[part], sigma=self.sigma[part], cross=cross)
+        return self.only((self.time >= start) & (self.time < stop))
+
+    def only(self, frames: NDArray[np.bool_]) -> Record:
+        """Return the recording with some of its (n,) frames; the command keeps its whole history."""
+        cross = None if self.cross is None else self.cross[frames]
+        return replace(self, time=self.time[frames], angle=self.angle[frames], sigma=self.sigma[frames], cross=cross)
 
 
 def record_from_series(series: AngleSeries, command: Command | None, *, zero_known: bool) -> Record:
@@ -90,8 +96,24 @@ def record_from_series(series: AngleSeries, command: Command | None, *, zero_kno
         zero_known,
         series.sigma[ok],
         cross,
+        _view(series, ok),
     )
     return record if acts else _from_release(record)
+
+
+def _view(series: AngleSeries, ok: NDArray[np.bool_]) -> View:
+    if series.line is None or series.mouth_px is None or series.pivot_px is None:
+        return UNSEEN
+    arm = (series.mouth_px - series.pivot_px)[ok]
+    if not np.any(np.isfinite(arm)):
+        return UNSEEN
+    neutral, lever = float(np.nanmedian((series.line - series.angle)[ok])), float(np.nanmedian(np.hypot(*arm.T)))
+    mirrored = bool(np.median(arm[:, 0] * np.cos(series.line[ok])) < 0.0)
+    only = series.only_pivot_differs
+    if series.picture_px is None:
+        return View(neutral, lever, None, mirrored, only)
+    x, y = np.nanmedian(series.pivot_px[ok], axis=0) - (np.array(series.picture_px) - 1.0) / 2.0
+    return View(neutral, lever, (float(x), float(y)), mirrored, only)
 
 
 def _from_release(record: Record) -> Record:

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from anglecam.effects import UNSEEN, View
 from anglecam.neck.large_angle import LargeAngleNeck, linearise, restoring_tangent, restoring_torque
 from anglecam.session import Command
 
@@ -243,7 +244,9 @@ class LargeAngle:
             pretension_error=value.get("pretension_error_nm", self.neck.pretension_error),
         )
 
-    def predict(self, parameters: Floats, time: Floats, command: Command | None, state: Floats) -> Floats:
+    def predict(
+        self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNSEEN
+    ) -> Floats:
         """Return the (n,) angle, rad, of `run`."""
         return self.run(parameters, time, command, state)[:, 0]
 

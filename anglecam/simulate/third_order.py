@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from anglecam.effects import UNSEEN, View
 from anglecam.session import Command
 
 Floats = NDArray[np.float64]
@@ -90,7 +91,9 @@ class ThirdOrder:
     def _count(self) -> int:
         return 6 if self.driven else 3
 
-    def predict(self, parameters: Floats, time: Floats, command: Command | None, state: Floats) -> Floats:
+    def predict(
+        self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNSEEN
+    ) -> Floats:
         """Run the plant freely from an initial state; see `anglecam.simulate.plant.Plant.run`."""
         switches = np.zeros(1) if command is None else command.time
         values = np.zeros(1) if command is None else command.angle

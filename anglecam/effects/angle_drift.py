@@ -1,0 +1,35 @@
+"""Angle drift: the measured angle creeps linearly, as where the camera sags on its stand.
+
+    y = θ + d·(t − t_1)
+
+The paper's camera stands still.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.effects.effect import Effect, Parameter, View
+
+Floats = NDArray[np.float64]
+
+
+def _seen(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
+    return angle + parameters[0] * (time - time[0])
+
+
+EFFECT = Effect(
+    id="angle_drift",
+    station="camera",
+    summary="The measured angle creeps at a steady rate that no torque explains.",
+    equation="y = θ + d·t",
+    relaxes="Fig. 7: the camera stands still",
+    parameters=(Parameter("drift_deg_per_s", 0.0, -0.1, 0.1, (0.002, -0.002), math.degrees(1.0)),),
+    aliases=("constant_torque",),
+    separating_experiment="a minute of rest, with something in the picture that is fixed to the ground",
+    source="JCGM 100:2008, F.2.4",
+    seen=_seen,
+)

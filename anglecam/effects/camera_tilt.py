@@ -1,0 +1,54 @@
+"""Camera tilt: the plane of motion is seen at a slant.
+
+    arm = (cos(λ − α), sin(λ − α)·cos φ − h·sin φ),   y = α + ∠arm − the same at θ = 0,   λ = λ0 + θ
+
+The camera is turned by φ about an axis at α: what lies across it is shortened, and a mark that stands before the plane
+of motion, by h lever arms, is shifted across it against the mouth. The paper's camera is square to the plane, Fig. 7.
+What perspective adds is smaller by the lever over the distance.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.effects.effect import Effect, Parameter, View
+
+Floats = NDArray[np.float64]
+
+
+def _seen(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
+    tilt, axis, height = parameters
+
+    def off(line: Floats) -> Floats:
+        """Turn of the seen line against the true one; it has no step where the line turns over."""
+        along, across = np.cos(line - axis), np.sin(line - axis)
+        seen = across * math.cos(tilt) - height * math.sin(tilt)
+        return np.arctan2(along * seen - across * along, along * along + across * seen)
+
+    return angle + off(view.neutral + angle) - off(np.asarray(view.neutral))
+
+
+def _needs(view: View) -> bool:
+    return not view.only_pivot_differs
+
+
+EFFECT = Effect(
+    id="camera_tilt",
+    station="camera",
+    summary="The camera looks at the plane of motion from the side, which makes some angles seem smaller than others.",
+    equation="tan(y − α) = tan(λ − α)·cos φ − h·sin φ/cos(λ − α)",
+    relaxes="Fig. 7: the camera is square to the plane of motion",
+    parameters=(
+        Parameter("tilt_deg", null=0.0, lower=0.0, upper=0.9, starts=(0.1, 0.3), to_file=math.degrees(1.0)),
+        Parameter("axis_deg", 0.0, -math.pi, math.pi, (0.8, 1.6, 2.4), math.degrees(1.0)),
+        Parameter("mark_before_plane_in_levers", 0.0, -2.0, 2.0, (0.8, -0.8)),
+    ),
+    aliases=("pivot_offset", "lens_distortion", "linkage_geometry"),
+    separating_experiment="a chessboard held in the plane of motion: anglecam calibrate, then camera: {calibration: …}",
+    source="Hartley, Zisserman, Multiple View Geometry, 2nd ed., 2004, sec. 6.3",
+    seen=_seen,
+    needs=_needs,
+)

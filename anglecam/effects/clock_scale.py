@@ -1,0 +1,35 @@
+"""Clock scale: the clip's clock runs fast or slow against the command's.
+
+    u arrives at (1 + ε)·t on the clip's clock
+
+The paper takes frame number over frame rate for time; a camera's nominal rate may be off by parts in a thousand, and
+counts of dropped frames by more. What the clip's own clock makes of a, b and c is in a, b and c.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.effects.effect import Effect, Knots, Parameter
+
+Floats = NDArray[np.float64]
+
+
+def _stretch(asked: Knots, parameters: Floats) -> Knots:
+    scale = 1.0 + parameters[0]
+    return Knots(asked.time * scale, asked.level, asked.slope / scale)
+
+
+EFFECT = Effect(
+    id="clock_scale",
+    station="camera",
+    summary="The camera's clock and the command's run at different rates, so that they drift apart.",
+    equation="u(t/(1 + ε))",
+    relaxes="the frame rate of 15 Hz is taken as exact",
+    parameters=(Parameter("scale_excess", null=0.0, lower=-0.3, upper=0.3, starts=(0.002, -0.002, 0.02, -0.02)),),
+    aliases=("dead_time",),
+    separating_experiment="a recording of a minute or more with a command change at its beginning and at its end",
+    source="the paper, Dynamic Model Parameter Estimation: a measurement interval of 1/15 s",
+    command=_stretch,
+)

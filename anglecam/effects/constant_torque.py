@@ -1,0 +1,36 @@
+"""Constant torque: the spring does not quite carry the head.
+
+    θ̈ = c·u − a·θ̇ − b·θ + T
+
+The paper's spring balances gravity exactly at neutral, Eqs. (23) and (24), though its steady states were "off by about
+4°". Where b > 0 the same is done by a wrong zero of the angle, which every recording has of its own unless neutral is
+declared: only then, or without stiffness, can it be told.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+from numpy.typing import NDArray
+
+from anglecam.effects.effect import Effect, Parameter
+
+
+@njit
+def _load(theta: float, omega: float, parameters: NDArray) -> float:
+    return parameters[0]
+
+
+EFFECT = Effect(
+    id="constant_torque",
+    station="load",
+    summary="A steady torque pulls the head away from where it should rest.",
+    equation="θ̈ = c·u − a·θ̇ − b·θ + T",
+    relaxes="Eqs. (23), (24): the spring balances gravity exactly at neutral",
+    parameters=(Parameter("torque_deg_per_s2", 0.0, -500.0, 500.0, (1.0, -1.0, 20.0, -20.0), math.degrees(1.0)),),
+    aliases=("coulomb_friction",),
+    separating_experiment="a rest without power, where only spring and weight hold the head",
+    source="the paper, Remarks on Fig. 14",
+    load=_load,
+)

@@ -1,0 +1,32 @@
+"""Damping asymmetry: moving one way the bearings resist a little more than moving the other way, the faster the more.
+
+    θ̈ = c·u − a·θ̇ − b·θ − e·|θ̇|,   that is a + e upward and a − e downward
+
+The paper's damping is one lubricant film, Eqs. (19)–(22), the same in both directions.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+from numpy.typing import NDArray
+
+from anglecam.effects.effect import Effect, Parameter
+
+
+@njit
+def _load(theta: float, omega: float, parameters: NDArray) -> float:
+    return -parameters[0] * abs(omega)
+
+
+EFFECT = Effect(
+    id="damping_asymmetry",
+    station="load",
+    summary="Moving one way the bearings resist more than moving the other way, the faster the more.",
+    equation="θ̈ = c·u − a·θ̇ − b·θ − e·|θ̇|",
+    relaxes="Eq. (22): damping is the same in both directions",
+    parameters=(Parameter("difference_per_s", 0.0, -100.0, 100.0, (0.2, -0.2, 2.0, -2.0)),),
+    aliases=("coulomb_friction", "constant_torque"),
+    separating_experiment="the same steps up and down at two speeds, one at least three times the other",
+    source="Janot, Gautier, Brunot, Data set and reference models of EMPS, Nonlinear Benchmarks Workshop, 2019",
+    load=_load,
+)

@@ -1,0 +1,39 @@
+"""Dead zone: the servo ignores position errors below a width.
+
+    c·dz(u − (b/c)·θ) in place of c·u − b·θ,   dz(e) = sgn(e)·max(|e| − w, 0)
+
+The paper's controller resolves 8 bits, Table 2, and its servo every error, Eq. (5). All of b is taken for the servo's
+position feedback here.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from anglecam.effects.effect import Effect, Parameter
+
+
+@njit
+def _servo(torque: float, theta: float, abc: NDArray, parameters: NDArray) -> float:
+    if parameters[0] == 0.0:
+        return torque
+    width = abs(abc[2]) * parameters[0]
+    return np.sign(torque) * max(abs(torque) - width, 0.0)
+
+
+EFFECT = Effect(
+    id="dead_zone",
+    station="command",
+    summary="The servo does not answer position errors below a certain size.",
+    equation="θ̈ = c·dz(u − (b/c)·θ) − a·θ̇",
+    relaxes="Eq. (5), Table 2: the servo resolves every command",
+    parameters=(Parameter("threshold_deg", 0.0, 0.0, math.radians(15.0), (0.003, 0.01, 0.03), math.degrees(1.0)),),
+    aliases=("backlash", "coulomb_friction"),
+    separating_experiment="small steps about one level, from above and below: in a dead zone the head stands anywhere",
+    source="Tao, Kokotović, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, 1996",
+    servo=_servo,
+)

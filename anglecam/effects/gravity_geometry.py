@@ -1,0 +1,42 @@
+"""Gravity's geometry: the weight's moment goes with the sine of the angle, not with the angle.
+
+    θ̈ = c·u − a·θ̇ − b·θ + G·(sin(θ0 + θ) − sin θ0 − θ·cos θ0),   G = M_h·g·L/J
+
+The paper expands the sine about neutral and keeps the first term, Eq. (25). θ0 is the centre of mass from upright at
+neutral; with θ0 near 0 or 180° this is a cubic, which a spring can be as well.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from anglecam.effects.effect import Effect, Parameter
+
+
+@njit
+def _load(theta: float, omega: float, parameters: NDArray) -> float:
+    if parameters[0] == 0.0:
+        return 0.0
+    neutral = parameters[1]
+    return parameters[0] * (np.sin(neutral + theta) - np.sin(neutral) - theta * np.cos(neutral))
+
+
+EFFECT = Effect(
+    id="gravity_geometry",
+    station="load",
+    summary="The weight pulls with the sine of the angle, which at large angles is not the angle.",
+    equation="θ̈ = c·u − a·θ̇ − b·θ + G·(sin(θ0 + θ) − sin θ0 − θ·cos θ0)",
+    relaxes="Eq. (25): small angles about neutral",
+    parameters=(
+        Parameter("gravity_deg_per_s2", 0.0, -2000.0, 2000.0, (30.0, -30.0, 150.0), math.degrees(1.0)),
+        Parameter("gravity_deg", 0.25 * math.pi, -math.pi, math.pi, (-0.8, 2.4), math.degrees(1.0)),
+    ),
+    aliases=("stiffening_spring", "linkage_geometry"),
+    separating_experiment="the same steps with the mount turned by 90°: gravity turns with it, the spring does not",
+    source="the paper, Eqs. (16), (23)",
+    load=_load,
+)

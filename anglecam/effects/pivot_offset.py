@@ -1,0 +1,44 @@
+"""Pivot offset: the mark that was taken for the pivot is not where the mechanism turns.
+
+    y = ∠(R·(cos λ, sin λ) − e) − the same at θ = 0,   λ = λ0 + θ
+
+The angle is then that of the line from a wrong point. The paper takes the centroid of the shaft, Fig. 7. e is counted
+ahead and up, as a share of the lever arm R.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.effects.effect import Effect, Parameter, View
+
+Floats = NDArray[np.float64]
+
+
+def _seen(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
+    ahead, up = parameters
+
+    def off(line: Floats) -> Floats:
+        """Turn of the line from the wrong point against that from the right one: without a step at ±180°."""
+        across, along = ahead * np.sin(line) - up * np.cos(line), ahead * np.cos(line) + up * np.sin(line)
+        return np.arctan2(across, 1.0 - along)
+
+    return angle + off(view.neutral + angle) - off(np.asarray(view.neutral))
+
+
+EFFECT = Effect(
+    id="pivot_offset",
+    station="camera",
+    summary="The angle was measured about a point beside the axis of rotation.",
+    equation="y = ∠(R·e^{iλ} − e), λ = λ0 + θ",
+    relaxes="Fig. 7: O is the centre of rotation",
+    parameters=(
+        Parameter("ahead_share_of_lever", null=0.0, lower=-0.5, upper=0.5, starts=(0.02, -0.02)),
+        Parameter("up_share_of_lever", null=0.0, lower=-0.5, upper=0.5, starts=(0.02, -0.02)),
+    ),
+    aliases=("camera_tilt", "lens_distortion", "linkage_geometry"),
+    separating_experiment="slow motion over the whole range, marker: none: the path of the mouth has its own centre",
+    source="the paper, Fig. 7",
+    seen=_seen,
+)

@@ -1,0 +1,39 @@
+"""Rolling shutter: the time of a row depends on its height, and so does the time at which the mouth was seen.
+
+    seen at t + s·(row − middle row),   row = row of the pivot − R·sin λ
+
+The paper takes the whole frame at one instant.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.effects.effect import Effect, Parameter, View
+
+Floats = NDArray[np.float64]
+
+
+def _when(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
+    lever, pivot = view.lever_px or 0.0, view.pivot_px or (0.0, 0.0)
+    return time + parameters[0] * (pivot[1] - lever * np.sin(view.neutral + angle))
+
+
+def _needs(view: View) -> bool:
+    return view.lever_px is not None and view.pivot_px is not None
+
+
+EFFECT = Effect(
+    id="rolling_shutter",
+    station="camera",
+    summary="Each row of the picture is taken later than the one above, so that a mouth farther down is seen later.",
+    equation="y(t) = θ(t + s·(row − middle))",
+    relaxes="a frame is one instant",
+    parameters=(Parameter("row_time_s", null=0.0, lower=-2e-4, upper=2e-4, starts=(1e-5, -1e-5, 6e-5)),),
+    aliases=("dead_time", "quadratic_drag"),
+    separating_experiment="the same motion filmed with the camera upside down",
+    source="Meingast, Geyer, Sastry, OMNIVIS 2005",
+    when=_when,
+    needs=_needs,
+)

@@ -1,0 +1,32 @@
+"""Stiffening spring: its torque grows faster than the angle, or slower.
+
+    θ̈ = c·u − a·θ̇ − b·θ − k3·θ³          k3 < 0 softens
+
+The paper takes the spring for linear in the angle, Eqs. (18a) and (25); its own Eqs. (17) and (18b) are not.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+from numpy.typing import NDArray
+
+from anglecam.effects.effect import Effect, Parameter
+
+
+@njit
+def _load(theta: float, omega: float, parameters: NDArray) -> float:
+    return -parameters[0] * theta**3
+
+
+EFFECT = Effect(
+    id="stiffening_spring",
+    station="load",
+    summary="The spring becomes stiffer, or softer, the farther it is turned.",
+    equation="θ̈ = c·u − a·θ̇ − b·θ − k3·θ³",
+    relaxes="Eqs. (18a), (25): the spring's torque is linear in the angle",
+    parameters=(Parameter("k3_per_s2", null=0.0, lower=-1e5, upper=1e5, starts=(200.0, -200.0)),),
+    aliases=("gravity_geometry", "linkage_geometry"),
+    separating_experiment="the same steps with the mount turned by 90°: gravity turns with it, the spring does not",
+    source="Nayfeh, Mook, Nonlinear Oscillations, 1979, sec. 2.3",
+    load=_load,
+)

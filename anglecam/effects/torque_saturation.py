@@ -1,0 +1,42 @@
+"""Torque saturation: the servo's part of the torque has a limit.
+
+    c·u − s·b·θ stays within ±T,   a share s of b being the servo's own and the rest a spring on the head
+
+The paper's amplifier is ideal, Eq. (6); Fig. 12 has 6 V sag to 3.5 V under load.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+from numpy.typing import NDArray
+
+from anglecam.effects.effect import Effect, Parameter
+
+
+@njit
+def _servo(torque: float, theta: float, abc: NDArray, parameters: NDArray) -> float:
+    inverse, share = parameters[0], parameters[1]
+    if inverse <= 0.0:
+        return torque
+    limit, springs = 1.0 / inverse, (1.0 - share) * abc[1] * theta
+    return min(max(torque + springs, -limit), limit) - springs
+
+
+EFFECT = Effect(
+    id="torque_saturation",
+    station="actuator",
+    summary="The servo has a largest torque: what is asked beyond it is not given.",
+    equation="|c·u − s·b·θ| ≤ T",
+    relaxes="Eq. (6), Fig. 12: an ideal amplifier gives any voltage",
+    parameters=(
+        Parameter("limit_deg_per_s2", 0.0, 0.0, 1.0, (0.005, 0.01, 0.02, 0.05), math.degrees(1.0), inverse=True),
+        Parameter("servo_share", 1.0, 0.0, 1.0, (0.3,)),
+    ),
+    aliases=("rate_limit", "quadratic_drag"),
+    separating_experiment="steps of two heights, one at least three times the other: a limit slows the larger only",
+    source="the paper, Fig. 12; HS-225MG data sheet: stall torque 0.47 N·m",
+    rank=1,
+    servo=_servo,
+)

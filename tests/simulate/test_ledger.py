@@ -1,0 +1,134 @@
+"""Every effect of the ledger against a truth that shares nothing with it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import yaml
+
+from anglecam.effects import LEDGER, UNSEEN, View, effect
+from anglecam.session import Command
+from anglecam.simulate.plant import Plant
+from synth.motion import command_rows, move
+from synth.spec import read_spec
+
+ABC = np.array([26.0, 524.0, 508.0])
+TIME = np.arange(0.0, 6.0, 1 / 30)
+COMMANDS = {
+    "stairs": {"kind": "stairs", "levels_deg": [12, -9, 15, 0, -15, 6]},
+    "chirp": {"kind": "chirp", "amplitude_deg": 9, "from_hz": 0.3, "to_hz": 5.0},
+    "triangle": {"kind": "triangle", "amplitude_deg": 14, "period_s": 4.0},
+}
+MOVED = {
+    "dead_time": ({"tau_s": 0.0437}, [0.0437]),
+    "actuator_lag": ({"tau_s": 0.05}, [0.05]),
+    "rate_limit": ({"r_deg_per_s": 150.0}, [1.0 / math.radians(150.0)]),
+    "torque_saturation": ({"limit": 60.0, "share": 0.7}, [1.0 / 60.0, 0.7]),
+    "backlash": ({"half_width_deg": 0.8}, [math.radians(0.8)]),
+    "dead_zone": ({"half_width_deg": 0.8}, [math.radians(0.8)]),
+    "coulomb_friction": ({"torque": 6.0, "downward": 4.0, "breakaway": 8.0}, [5.0, 1.0, 3.0]),
+    "quadratic_drag": ({"q": 2.0}, [2.0]),
+    "stiffening_spring": ({"k3": 400.0}, [400.0]),
+    "gravity_geometry": ({"strength": 140.0, "gravity_deg": 45.0}, [140.0, math.radians(45.0)]),
+    "linkage_geometry": ({"share": 1.0}, [1.0]),
+    "constant_torque": ({"torque": 5.0}, [5.0]),
+}
+VIEW = View(neutral=math.radians(20.0), lever_px=200.0, pivot_px=(-80.0, 60.0))
+NOD = np.radians(np.linspace(-25.0, 25.0, len(TIME)))
+
+
+@pytest.mark.parametrize("kind", COMMANDS)
+@pytest.mark.parametrize("effect_id", MOVED)
+def test_motion_with_an_effect_is_the_laboratorys(tmp_path, effect_id, kind):
+    truth, parameters = MOVED[effect_id]
+    recording = {"name": "r", "duration_s": 6.0, "command": COMMANDS[kind]}
+    plant = dict(zip("abc", ABC.tolist(), strict=True))
+    (tmp_path / "s.yaml").write_text(
+        yaml.safe_dump({"plant": plant, "effects": {effect_id: truth}, "recordings": [recording]})
+    )
+    spec = read_spec(tmp_path / "s.yaml")
+    rows = command_rows(spec.recordings[0], np.random.SeedSequence(3))
+    true = move(spec, spec.recordings[0], rows, 6.0).angle(TIME)
+    command = Command(rows[:, 0], np.radians(rows[:, 1]))
+    model = Plant((effect(effect_id),))
+    predicted = model.predict(np.append(ABC, parameters), TIME, command, np.array([true[0], 0.0]))
+    assert np.degrees(np.abs(predicted - true)).max() < 2e-4
+
+
+def _seen(effect_id: str, *parameters: float) -> np.ndarray:
+    return effect(effect_id).seen(TIME, NOD, np.array(parameters), VIEW)
+
+
+def _line(place: np.ndarray, pivot: np.ndarray) -> np.ndarray:
+    arm = place - pivot
+    return np.unwrap(np.arctan2(arm[..., 1], arm[..., 0]))
+
+
+def _mouth() -> np.ndarray:
+    return np.stack([np.cos(VIEW.neutral + NOD), np.sin(VIEW.neutral + NOD)], axis=-1)
+
+
+def _zeroed(line: np.ndarray) -> np.ndarray:
+    return line - np.interp(0.0, NOD, line)
+
+
+def test_a_pivot_beside_the_axis_turns_the_line():
+    expected = _zeroed(_line(_mouth(), np.array([0.05, -0.03])))
+    assert _zeroed(_seen("pivot_offset", 0.05, -0.03)) == pytest.approx(expected, abs=2e-6)
+
+
+def test_a_tilted_camera_shortens_what_lies_across_its_axis():
+    tilt, axis = math.radians(15.0), math.radians(30.0)
+    along = np.array([math.cos(axis), math.sin(axis)])
+    across = np.array([-along[1], along[0]])
+    mouth = _mouth()
+    height = 0.8
+    shown = (mouth @ along)[:, None] * along + math.cos(tilt) * (mouth @ across)[:, None] * across
+    shown -= height * math.sin(tilt) * across  # the line goes from a mark that stands before the plane
+    expected = _zeroed(_line(shown, np.zeros(2)))
+    assert _zeroed(_seen("camera_tilt", tilt, axis, height)) == pytest.approx(expected, abs=2e-6)
+
+
+def test_a_lens_draws_mouth_and_pivot_about_the_middle_of_the_picture():
+    kappa, centre = -0.04, np.array([VIEW.pivot_px[0], -VIEW.pivot_px[1]]) / VIEW.lever_px
+
+    def drawn(place):
+        return place * (1.0 + kappa * (place**2).sum(axis=-1, keepdims=True))
+
+    expected = _zeroed(_line(drawn(centre + _mouth()), drawn(centre)))
+    assert _zeroed(_seen("lens_distortion", kappa)) == pytest.approx(expected, abs=2e-6)
+
+
+def test_a_mouth_lower_in_the_picture_is_seen_later():
+    row_time, plant = 3e-5, Plant((effect("rolling_shutter"),))
+    command = Command(np.array([0.0, 0.5, 2.0]), np.radians([0.0, 20.0, -10.0]))
+    fine = np.arange(0.0, 6.2, 1e-4)
+    angle = Plant().predict(ABC, fine, command, np.zeros(2))
+    # the shutter passes the mouth when both are at the same row
+    late = fine - row_time * (VIEW.pivot_px[1] - VIEW.lever_px * np.sin(VIEW.neutral + angle))
+    expected = np.interp(TIME, late, angle)
+    predicted = plant.predict(np.append(ABC, row_time), TIME, command, np.zeros(2), VIEW)
+    assert np.degrees(np.abs(predicted - expected))[1:].max() < 0.02
+    assert np.degrees(np.abs(np.interp(TIME, fine, angle) - expected)).max() > 0.3
+
+
+def test_clock_and_drift_do_what_they_say():
+    command = Command(np.array([0.0, 1.0, 3.0]), np.radians([0.0, 10.0, -5.0]))
+    later = Command(command.time * 1.01, command.angle)
+    scaled = Plant((effect("clock_scale"),)).predict(np.append(ABC, 0.01), TIME, command, np.zeros(2))
+    assert scaled == pytest.approx(Plant().predict(ABC, TIME, later, np.zeros(2)), abs=1e-12)
+    assert _seen("angle_drift", 0.01) == pytest.approx(NOD + 0.01 * TIME, abs=1e-15)
+
+
+def test_the_ledger_is_the_contracts():
+    assert {e.id for e in LEDGER} >= {*MOVED, "camera_tilt", "pivot_offset", "lens_distortion", "rolling_shutter"}
+    assert {e.id for e in LEDGER} >= {"clock_scale", "angle_drift"}
+    assert len(LEDGER) == 19
+    names = [p.name for e in LEDGER for p in e.parameters]
+    assert len(set(names)) == len(names)
+    for e in LEDGER:
+        assert set(e.aliases) < {other.id for other in LEDGER} - {e.id}
+        assert e.needs(VIEW)
+    assert not effect("rolling_shutter").needs(UNSEEN)
