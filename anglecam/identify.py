@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from anglecam.errors import RigError
 from anglecam.estimate.ekf import fit_ekf, settings_for
-from anglecam.estimate.noise import autoregression, stated_noise, witness_noise
+from anglecam.estimate.noise import autoregression, noise_floor
 from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error
 from anglecam.estimate.record import Record
 from anglecam.estimate.start import start_parameters
@@ -168,7 +168,7 @@ def declared_start(rig: Rig) -> Floats:
 
 
 def _by_filter(fit: Fit, records: Sequence[Record], start: Floats) -> tuple[Fit, Floats, Floats]:
-    noise = witness_noise(records) or stated_noise(records)
+    noise = noise_floor(records)
     sigma = max(noise.sigma if noise else 0.0, fit.rmse)
     initial = start if len(start) == 3 else np.append(start, 0.0)
     estimate = fit_ekf(records, initial, settings_for(records, initial, sigma))

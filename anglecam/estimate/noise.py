@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from anglecam.estimate.record import Record
 Floats = NDArray[np.float64]
 
 DISTANCE = "distance from the pivot"
+MEASURED = "the measurement's own statement"
 LEAST_REST = 6
 """Frames; a shorter rest says nothing about colour."""
 
@@ -34,7 +35,34 @@ class Noise:
     phi_error: float
     """Standard error of ``phi``."""
     source: str
-    """`DISTANCE`, ``rest``, ``stated`` or ``residual``."""
+    """`DISTANCE`, `MEASURED`, ``rest``, ``stated`` or ``residual``."""
+
+    @property
+    def filmed(self) -> bool:
+        """Whether it is a camera's, and so goes along with the motion."""
+        return self.source in (DISTANCE, MEASURED)
+
+
+def noise_floor(records: Sequence[Record]) -> Noise | None:
+    """Say how good the angles are, apart from any model.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        Recordings by one camera.
+
+    Returns
+    -------
+    Noise or None
+        Where a film's angles are the whole head's, they are better than the mouth's distance from the pivot tells, and
+        their own statement counts; ``None`` where nothing tells.
+    """
+    witness, stated = witness_noise(records), stated_noise(records)
+    if witness is None or stated is None:
+        return witness or stated
+    if witness.filmed and stated.sigma < witness.sigma:
+        return replace(witness, sigma=stated.sigma, source=MEASURED)
+    return witness
 
 
 def witness_noise(records: Sequence[Record]) -> Noise | None:
@@ -62,10 +90,10 @@ def witness_noise(records: Sequence[Record]) -> Noise | None:
 
 
 def stated_noise(records: Sequence[Record]) -> Noise | None:
-    """Return the median stated uncertainty as white noise of unknown colour, ``None`` where none is stated."""
+    """Return the stated uncertainties, root mean square, as noise of unknown colour; ``None`` where none is stated."""
     stated = np.concatenate([r.sigma for r in records])
     stated = stated[np.isfinite(stated)]
-    return Noise(float(np.median(stated)), 0.0, 1.0, "stated") if len(stated) else None
+    return Noise(float(np.sqrt(np.mean(stated**2))), 0.0, 1.0, "stated") if len(stated) else None
 
 
 def autoregression(parts: Sequence[Floats], source: str) -> Noise:

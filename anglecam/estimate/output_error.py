@@ -20,11 +20,14 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from threadpoolctl import ThreadpoolController
 
+from anglecam.effects import UNSEEN, View
 from anglecam.estimate.record import Record
 from anglecam.session import Command
 
 Floats = NDArray[np.float64]
 
+STEP = 1e-6
+"""Of the difference quotients, as a share of a parameter."""
 _BLAS = ThreadpoolController()
 """The matrices here have some twenty columns: threads that wait for each other made a fit ten times slower."""
 
@@ -45,7 +48,7 @@ class Model(Protocol):
     @property
     def to_file(self) -> Floats: ...  # noqa: D102
     def predict(  # noqa: D102
-        self, parameters: Floats, time: Floats, command: Command | None, state: Floats
+        self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNSEEN
     ) -> Floats: ...
 
 
@@ -185,7 +188,7 @@ def fit_output_error(
     Fit
         The best of the starts.
     """
-    own = [_first_state(model, record) for record in records] if own is None else list(own)
+    own = [first_state(model, record) for record in records] if own is None else list(own)
     # a trial step may let the plant run away; its cost is then not finite and the step is refused
     with _BLAS.limit(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         fits = [_fit_once(model, records, np.clip(s, model.lower, model.upper), own, phi, fixed) for s in starts]
@@ -193,8 +196,24 @@ def fit_output_error(
 
 
 def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:
-    """Predict recordings in free run with the parameters of ``fit``; only initial states and zeros are fitted."""
-    return fit_output_error(fit.model, records, [fit.parameters], phi=fit.phi, fixed=True)
+    """Predict recordings in free run with the parameters of ``fit``; only initial states and zeros are fitted.
+
+    They start from the first frames, and also from rest: with dry friction the two may end in different valleys.
+    """
+    moving = [first_state(fit.model, record) for record in records]
+    resting = [np.concatenate([own[:1], np.zeros(fit.model.states - 1), own[fit.model.states :]]) for own in moving]
+    fits = [
+        fit_output_error(fit.model, records, [fit.parameters], own=own, phi=fit.phi, fixed=True)
+        for own in (moving, resting)
+    ]
+    return min(fits, key=lambda one: one.cost)
+
+
+def predicted_angle(fit: Fit, record: Record, own: Floats) -> Floats:
+    """Return the (n,) angle, rad, that a fitted model gives a recording from its own unknowns ``own``."""
+    model = fit.model
+    zero = 0.0 if record.zero_known else own[model.states]
+    return zero + model.predict(fit.parameters, record.time, record.command, own[: model.states], record.view)
 
 
 def _fit_once(
@@ -210,31 +229,40 @@ def _fit_once(
 
     def predict(record: Record, parameters: Floats, unknowns: Floats) -> Floats:
         zero = 0.0 if record.zero_known else unknowns[model.states]
-        return zero + model.predict(parameters, record.time, record.command, unknowns[: model.states])
+        return zero + model.predict(parameters, record.time, record.command, unknowns[: model.states], record.view)
+
+    latest: dict[bytes, list[Floats]] = {}
+
+    def predicted(x: Floats) -> list[Floats]:
+        """Predict all recordings; the Jacobian is asked for where the errors just were."""
+        if x.tobytes() not in latest:
+            parameters, unknowns = split(x)
+            latest.clear()
+            latest[x.tobytes()] = [predict(r, parameters, o) for r, o in zip(records, unknowns, strict=True)]
+        return latest[x.tobytes()]
 
     def errors(x: Floats) -> Floats:
-        parameters, unknowns = split(x)
-        parts = [whiten(r, phi, r.angle - predict(r, parameters, o)) for r, o in zip(records, unknowns, strict=True)]
+        parts = [whiten(r, phi, r.angle - p) for r, p in zip(records, predicted(x), strict=True)]
         return np.concatenate(parts)
 
     def jacobian(x: Floats) -> Floats:
         parameters, unknowns = split(x)
         result = np.zeros((rows[-1], len(x)))
-        for i, (record, o) in enumerate(zip(records, unknowns, strict=True)):
+        for i, (record, o, here) in enumerate(zip(records, unknowns, predicted(x), strict=True)):
             both = np.concatenate([parameters, o])
-            magnitudes = np.concatenate([np.maximum(model.scales, np.abs(parameters)), np.full(len(o), 0.1)])
+            steps = STEP * np.concatenate([np.maximum(model.scales, np.abs(parameters)), np.full(len(o), 0.1)])
             columns = [*shared, *range(p, p + len(o))]
             place = [*shared, *range(edges[i], edges[i + 1])]
             block = np.empty((len(record.time), len(columns)))
             for k, j in enumerate(columns):
-                step = 1e-5 * magnitudes[j]
-                low, high = both.copy(), both.copy()
-                low[j] -= step
-                high[j] += step
-                if j < p:  # a bound may be a wall of the physics: difference on its inner side there
-                    low[j], high[j] = max(low[j], model.lower[j]), min(high[j], model.upper[j])
-                change = predict(record, high[:p], high[p:]) - predict(record, low[:p], low[p:])
-                block[:, k] = change / (high[j] - low[j])
+                if j == p + model.states:  # the zero is added as it is
+                    block[:, k] = 1.0
+                    continue
+                # a bound may be a wall of the physics: difference on its inner side there
+                step = -steps[j] if j < p and both[j] + steps[j] > model.upper[j] else steps[j]
+                beside = both.copy()
+                beside[j] += step
+                block[:, k] = (predict(record, beside[:p], beside[p:]) - here) / step
             result[rows[i] : rows[i + 1], place] = -whiten(record, phi, block)
         return result
 
@@ -250,7 +278,7 @@ def _fit_once(
 
     def ended(x: Floats, white: Floats, slopes: Floats) -> Fit:
         parameters, unknowns = split(x)
-        left = tuple(r.angle - predict(r, parameters, o) for r, o in zip(records, unknowns, strict=True))
+        left = tuple(r.angle - here for r, here in zip(records, predicted(x), strict=True))
         return Fit(model, parameters, tuple(unknowns), left, slopes, phi, white)
 
     inside = np.clip(x0, np.nextafter(lower, np.inf), np.nextafter(upper, -np.inf))
@@ -262,8 +290,8 @@ def _fit_once(
         jac=lambda x: jacobian(whole(x))[:, free],
         bounds=(lower[free], upper[free]),
         x_scale="jac",
-        xtol=1e-10,
-        ftol=1e-10,
+        xtol=1e-9,
+        ftol=1e-9,
         gtol=1e-12,
         max_nfev=60,
     )
@@ -271,10 +299,16 @@ def _fit_once(
     return ended(x, errors(x), -jacobian(x))
 
 
-def _first_state(model: Model, record: Record) -> Floats:
-    """Start a recording's own unknowns at its first angle, and at rest if that is also where its command holds it."""
-    few = slice(0, min(4, len(record.time)))
-    slope = np.polyfit(record.time[few] - record.time[0], record.angle[few], 1)[0] if record.command is None else 0.0
+def first_state(model: Model, record: Record) -> Floats:
+    """Start a recording's own unknowns at its first angle, and at rest if its command has held it there.
+
+    One that begins in motion starts with its first rate: at rest a plant with dry friction may be stuck, where nothing
+    tells which way it should move.
+    """
+    change = None if record.command is None else record.command.first_change()
+    resting = change is not None and change >= record.time[0]
+    few = slice(0, min(5, len(record.time)))
+    rate, angle = np.polyfit(record.time[few] - record.time[0], record.angle[few], 2)[1:]
     state = np.zeros(model.states)
-    state[:2] = record.angle[0], slope
+    state[:2] = (record.angle[0], 0.0) if resting else (angle, rate)
     return state if record.zero_known else np.append(state, 0.0)
