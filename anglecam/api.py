@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from anglecam.errors import InputError
-from anglecam.estimate.record import Record
 from anglecam.identify import Estimator, Identified, declared_start, identify_records
 from anglecam.loop.close import Verdict, close_records
 from anglecam.measure import measure_clip
-from anglecam.recordings import measure_session
+from anglecam.recordings import Measured, measure_session, shown_to_loop
 from anglecam.rig import Rig
 from anglecam.series import AngleSeries
 from anglecam.session import Session, command_beside, read_session, rig_beside
@@ -62,7 +61,8 @@ def identify(session: str | Path, estimator: Estimator = "oe2") -> Identified:
     AnglecamError
         Where nothing can be fitted.
     """
-    opened, records = _records(session)
+    opened, measured = _measured(session)
+    records = measured.records
     held_out = [r for r in records if r.name in opened.rig.held_out]
     fitted = [r for r in records if r.name not in opened.rig.held_out]
     return identify_records(fitted, opened.rig, estimator, held_out=held_out)
@@ -88,14 +88,15 @@ def close_loop(session: str | Path, hold_out: Sequence[str] = ()) -> Verdict:
     AnglecamError
         Where nothing can be fitted.
     """
-    opened, records = _records(session)
+    opened, measured = _measured(session)
+    records = shown_to_loop(opened, measured).records
     starts = [declared_start(opened.rig)]
     return close_records(records, held_out=[*opened.rig.held_out, *hold_out], starts=starts)
 
 
-def _records(session: str | Path) -> tuple[Session, tuple[Record, ...]]:
+def _measured(session: str | Path) -> tuple[Session, Measured]:
     opened = read_session(Path(session))
     measured = measure_session(opened)
     if not measured.records:
         raise InputError(f"{session}: no recording can be used; {'; '.join(map(str, measured.problems))}")
-    return opened, measured.records
+    return opened, measured

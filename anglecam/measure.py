@@ -221,8 +221,22 @@ def _series(
         line=lines,
         mouth_px=mouths,
         pivot_px=np.where(np.isfinite(lines)[:, None], pivots, np.nan),
+        picture_px=seen.size,
+        marker_px=_marker(seen),
         bounds={r: worst_case(r, levers) for r in {*CONTRACT_RADII_PX, *rig.pixel_error_px}},
     )
+
+
+def _marker(seen: Sighting) -> tuple[float, float] | None:
+    if seen.head is not None or seen.shakes is not None or seen.lens.calibration is not None:
+        return None
+    if seen.marker is not None:
+        x, y = seen.marker.centre_px
+    elif seen.lens.is_identity:
+        return None
+    else:  # a slanted view was undone: the line is then to be seen from where the picture shows its centre
+        x, y = seen.lens.distort(seen.pivot.centre_px)
+    return float(x), float(y)
 
 
 def _duplicates(line: Floats, sigma: Floats, repeated: NDArray[np.bool_]) -> list[int]:

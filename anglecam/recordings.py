@@ -11,6 +11,7 @@ from anglecam.estimate.record import Record, record_from_series
 from anglecam.measure import measure_clip
 from anglecam.series import AngleSeries, read_series, write_series
 from anglecam.session import SERIES_ENDING, Session
+from anglecam.uncorrected import uncorrected
 
 
 @dataclass(frozen=True)
@@ -22,6 +23,41 @@ class Measured:
     """One for each of ``series`` that has enough measured frames."""
     problems: tuple[InputError, ...]
     """What could not be used, one line each."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A session as the loop is to see it: entry by entry the same recordings."""
+
+    series: tuple[AngleSeries, ...]
+    records: tuple[Record, ...]
+    differs: bool
+    """Whether the angles are those that the pictures show, because measuring has put something right."""
+
+
+def shown_to_loop(session: Session, measured: Measured) -> Shown:
+    """Return a session's angles as the pictures show them where the measurement has put something right.
+
+    Parameters
+    ----------
+    session : Session
+        What was measured.
+    measured : Measured
+        From `measure_session`.
+
+    Returns
+    -------
+    Shown
+        Of the recordings that can be used, so that the loop can name what the camera did; see `uncorrected`.
+    """
+    series, differs = uncorrected(measured.series)
+    usable = {record.name for record in measured.records}
+    kept = tuple(one for one in series if one.name in usable)
+    if not differs:
+        return Shown(kept, measured.records, differs)
+    commands = {recording.name: recording.command for recording in session.recordings}
+    known = session.rig.neutral != "auto"
+    return Shown(kept, tuple(record_from_series(one, commands[one.name], zero_known=known) for one in kept), differs)
 
 
 def measure_session(

@@ -44,6 +44,8 @@ _SMALLEST_SHARE = 0.25
 """Of the mouth's area; a smaller region is no mouth even if partly hidden."""
 _HINT_PX = 10.0
 """Standard uncertainty of a hint at the pivot."""
+_SLANTED_HINT_PX = 25.0
+"""The same where nothing is found so near: a mark before the plane of motion is shifted by a slanted view."""
 _REACH = 2.0
 """Times its stated uncertainty that the centre of rotation may be off when a marker is looked for about it …"""
 _LEAST_REACH_PX = 3.0
@@ -355,7 +357,9 @@ def _find_pivot_marker(images: Sequence[Image], rig: Rig, circle: Circle | None,
     few = images[:: max(1, len(images) // _STILL)]
     still = np.median(np.stack(few), axis=0).astype(np.uint8)
     if rig.pivot.near is not None:
-        return find_marker(still, np.array(rig.pivot.near), _HINT_PX**2 * np.eye(2))
+        hint = np.array(rig.pivot.near)
+        near = find_marker(still, hint, _HINT_PX**2 * np.eye(2))
+        return near or find_marker(still, hint, _SLANTED_HINT_PX**2 * np.eye(2))
     if circle is None:
         return find_marker(still, None, None)
     # a short arc knows well in which direction its centre lies, and badly how far off
