@@ -23,13 +23,14 @@ from anglecam.errors import AnglecamError, InputError, RigError, blame
 from anglecam.export import fitted_model, transfer_as_dict, write_mat
 from anglecam.files import write_json
 from anglecam.identify import ESTIMATORS, Estimator, Identified, declared_start, identify_records
-from anglecam.loop.close import close_records
+from anglecam.loop.close import Verdict, close_records
+from anglecam.loop.correct import corrected
 from anglecam.loop.holdout import split_records
-from anglecam.loop.result import verdict_as_dict
+from anglecam.loop.result import next_experiment, verdict_as_dict, write_next_command
 from anglecam.measure import Measurement, measure_clip
 from anglecam.neck.file import read_neck
 from anglecam.neck_cli import app as neck
-from anglecam.recordings import Measured, measure_session
+from anglecam.recordings import Measured, Shown, measure_session, shown_to_loop
 from anglecam.report.budget_page import budget_table, write_budget
 from anglecam.report.calibration_figure import plot_calibration
 from anglecam.report.figures import plot_series
@@ -198,18 +199,23 @@ def close(
         list[str] | None, typer.Option("--hold-out", metavar="NAME", help="A recording to predict only; repeatable.")
     ] = None,
 ) -> None:
-    """Find what the model lacks: loop.json and report.html."""
+    """Find what the model lacks: loop.json, report.html and, where it helps, the command to play next."""
     opened, measured = _open(session, out)
     names = [*opened.rig.held_out, *(hold_out or ())]
     unknown = sorted(set(names) - {r.name for r in opened.recordings})
     if unknown:
         raise RigError(f"--hold-out {unknown[0]}: no such recording in {session}")
-    fitted, held_out = split_records(measured.records, names)
+    shown = shown_to_loop(opened, measured)
+    if shown.differs:
+        errors.print(
+            "the angles measured are free of something that the pictures show; the loop begins with what they show"
+        )
+    fitted, held_out = split_records(shown.records, names)
     with _progress() as bars:
         bar = bars.add_task("extended Kalman filter", total=None)
         models = [identify_records(fitted, opened.rig, estimator, held_out=held_out) for estimator in ("ekf", "oe2")]
         verdict = close_records(
-            measured.records,
+            shown.records,
             held_out=names,
             starts=[declared_start(opened.rig)],
             progress=lambda stage: bars.update(bar, description=stage),
@@ -217,14 +223,29 @@ def close(
         bars.update(bar, description="report")
         for model, name in zip(models, ("ekf", "model"), strict=True):
             _write_model(model, out, name)
-        write_json(out / "loop.json", verdict_as_dict(verdict))
+        experiment = next_experiment(verdict)
+        write_next_command(experiment, out)
+        result = verdict_as_dict(verdict, experiment)
+        write_json(out / "loop.json", result)
+        _write_corrected(shown, verdict, out / "corrected")
         title = session.resolve().name
-        write_report(out / "report.html", title, verdict, measured.series, models, measured.problems)
+        write_report(
+            out / "report.html", title, verdict, result, experiment, measured.series, models, measured.problems
+        )
         bars.update(bar, description="done", completed=1, total=1)
     screen.print(model_table(models))
-    screen.print(loop_table(verdict))
+    screen.print(loop_table(verdict, experiment))
     screen.print(f"report: {out / 'report.html'}", soft_wrap=True)
     _end(measured.problems)
+
+
+def _write_corrected(shown: Shown, verdict: Verdict, folder: Path) -> None:
+    """Write the series that the loop saw without what it found the camera to do, if it found anything."""
+    for series, record in zip(shown.series, shown.records, strict=True):
+        right = corrected(series, verdict.after, record.view)
+        if right is not None:
+            make_folder(folder)
+            write_series(right, folder / f"{series.name}{SERIES_ENDING}")
 
 
 def main() -> None:

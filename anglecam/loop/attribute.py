@@ -3,118 +3,180 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm
 
 from anglecam.effects import Effect
-from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error
+from anglecam.estimate.output_error import Fit, fit_output_error
 from anglecam.estimate.record import Record
+from anglecam.loop.holdout import Prediction, predict_unseen
+from anglecam.loop.screen import Forecast
 from anglecam.simulate.plant import Plant
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+PROMISING, LEAST_PROMISING = 8, 3
+"""Most and fewest effects that are fitted, of those that the screen puts first."""
+HOPEFUL = 0.2
+"""Share of the best forecast below which an effect is not fitted, and of the best fit below which it is not tried on
+what was not fitted."""
+FULFILLED = 0.7
+"""Share of its forecast that a fit must reach, or else it begins again from the effect's own start."""
+HELD = 1e-9
+"""How far a parameter that is held may go, SI."""
+ALIAS_LEVEL = 0.05
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect added to a plant, fitted and tried on what was held out."""
+    """One effect added to a plant and fitted, and, where it is a serious one, tried on what it was not fitted to."""
 
-    effect: Effect
+    forecast: Forecast
     fit: Fit
-    prediction: Fit
-    """Of the held-out recordings."""
     log_likelihood_gain: float
     """Over the plant without it, on the fitted recordings."""
-    held_out_gain: float
-    """The same on the held-out recordings, which it was not fitted to."""
+    told: Prediction | None
+    """Of what is held out by declaration, or of all block by block where nothing is."""
+    unseen: Prediction | None
+    """Of every frame by a model that was not fitted to it."""
+    predictive_gain: float
+    """Log-likelihood gain on ``unseen``."""
+
+    @property
+    def effect(self) -> Effect:
+        """What was added."""
+        return self.forecast.effect
 
     @property
     def evidence(self) -> float:
-        """Log-likelihood gain on fitted and held-out recordings, less one for each parameter spent."""
-        return self.log_likelihood_gain + self.held_out_gain - len(self.effect.parameters)
+        """Log-likelihood gained on what was fitted and on what was not, less one for each parameter spent."""
+        return self.log_likelihood_gain + self.predictive_gain - len(self.effect.parameters)
+
+
+def promising(all_forecasts: Sequence[Forecast]) -> list[Forecast]:
+    """Choose the effects that are worth a fit from forecasts in falling order."""
+    best = all_forecasts[0].gain if all_forecasts else 0.0
+    return [f for i, f in enumerate(all_forecasts[:PROMISING]) if i < LEAST_PROMISING or f.gain >= HOPEFUL * best]
 
 
 def fit_candidates(
-    base: Fit, fitted: Sequence[Record], held_out: Sequence[Record], effects: Sequence[Effect]
+    base: Fit,
+    unseen: Prediction,
+    fitted: Sequence[Record],
+    held_out: Sequence[Record],
+    tried: Sequence[Forecast],
 ) -> list[Candidate]:
-    """Fit each effect beside what the plant already has, and predict the held-out recordings with it.
+    """Fit effects beside what the plant already has, and predict what they were not fitted to.
 
     Parameters
     ----------
     base : Fit
         Of the plant so far, on ``fitted``.
+    unseen : Prediction
+        The plant's so far, of every frame by a fit without it.
     fitted, held_out : sequence of Record
-        Recordings to fit and to predict.
-    effects : sequence of Effect
-        What to try.
+        Recordings to fit and to predict only.
+    tried : sequence of Forecast
+        What to try, and from where.
 
     Returns
     -------
     list of Candidate
-        Strongest evidence first.
+        Strongest evidence first, then those that were not tried, best fit first.
     """
-    before = predict_output_error(base, held_out)
-    found = []
-    for effect in effects:
-        fit = fit_with(base, fitted, effect)
-        prediction = predict_output_error(fit, held_out)
-        found.append(Candidate(effect, fit, prediction, _gain(base, fit), _gain(before, prediction)))
-    return sorted(found, key=lambda c: -c.evidence)
+    fits = side_by_side(lambda one: fit_with(base, fitted, one), tried)
+    gains = [_gain(base.cost, fit.cost, len(base.white)) for fit in fits]
+    serious = sorted(gains, reverse=True)[: LEAST_PROMISING - 1]
+
+    def predict(i: int) -> Candidate:
+        if gains[i] < HOPEFUL * max(gains) and gains[i] not in serious:
+            return Candidate(tried[i], fits[i], gains[i], None, None, -math.inf)
+        told, whole = predict_unseen(fits[i], fitted, held_out)
+        predictive = _gain(unseen.cost, whole.cost, sum(len(r.time) for r in whole.records))
+        return Candidate(tried[i], fits[i], gains[i], told, whole, predictive)
+
+    candidates = side_by_side(predict, range(len(tried)))
+    return sorted(candidates, key=lambda c: (-c.evidence, -c.log_likelihood_gain))
 
 
-def fit_with(base: Fit, records: Sequence[Record], effect: Effect) -> Fit:
-    """Fit the plant of ``base`` with one more effect, from every start that the effect proposes."""
+def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
+    """Fit the plant of ``base`` with one more effect, from where the screen would start, or else the effect itself."""
     if not isinstance(base.model, Plant):
         raise TypeError("only a Plant takes effects")
-    starts = []
-    for i, parameter in enumerate(effect.parameters):
-        for value in parameter.starts:
-            own = effect.null
-            own[i] = value
-            starts.append(np.append(base.parameters, own))
-    return fit_output_error(base.model.with_effect(effect), records, starts, own=base.own, phi=base.phi)
+    plant, effect = base.model, forecast.effect
+
+    def fit_from(start: NDArray[np.float64]) -> Fit:
+        # a shape without a start of its own is released last: at once, it may stand in for the size
+        late = [p for p in effect.parameters[1:] if not p.starts]
+        values = np.append(base.parameters, start)
+        if late:
+            held = [replace(p, lower=p.null - HELD, upper=p.null + HELD) if p in late else p for p in effect.parameters]
+            first = plant.with_effect(replace(effect, parameters=tuple(held)))
+            values = fit_output_error(first, records, [values], own=base.own, phi=base.phi).parameters
+        return fit_output_error(plant.with_effect(effect), records, [values], own=base.own, phi=base.phi)
+
+    fit = fit_from(forecast.start)
+    # several parameters may have several valleys
+    if len(effect.parameters) == 1 and _gain(base.cost, fit.cost, len(base.white)) >= FULFILLED * forecast.gain:
+        return fit
+    first = effect.null
+    first[0] = effect.parameters[0].starts[0]
+    return min(fit, fit_from(first), key=lambda one: one.cost)
 
 
-def alias_set(best: Candidate, base: Fit, records: Sequence[Record], others: Sequence[Candidate]) -> list[str]:
-    """Keep every effect that could have made the data in which ``best`` explains this much more than it.
+def rivals(
+    best: Fit, base: Fit, records: Sequence[Record], effect: Effect, others: Sequence[Forecast]
+) -> dict[str, Fit]:
+    """Keep every effect that could have made the data in which ``effect`` explains this much more than it.
 
     If B were true, log L(A) − log L(B) would be normal with mean −d²/2 and variance d², d being the distance in
     standard deviations of the noise from B's prediction to the nearest that A can give (Cox, J. R. Statist. Soc. B
-    24, 1962). B stays when the gap that was seen is not too large for that.
+    24, 1962). Whatever d is, the gap is then larger than z²/2 no more often than a normal variable is larger than z.
 
     Parameters
     ----------
-    best : Candidate
-        A.
+    best : Fit
+        With ``effect``.
     base : Fit
-        The plant without either.
+        The same plant without it.
     records : sequence of Record
         The fitted recordings.
-    others : sequence of Candidate
+    effect : Effect
+        A.
+    others : sequence of Forecast
         Each a B.
 
     Returns
     -------
-    list of str
-        Ids, that of ``best`` first.
+    dict
+        Id of each that stays → the same plant with it in place of ``effect``.
     """
-    variance = best.fit.cost / max(1, len(best.fit.white) - best.fit.jacobian.shape[1])
-    kept = [best.effect.id]
-    for other in others:
-        gap = best.log_likelihood_gain - other.log_likelihood_gain
-        as_if = [
-            replace(record, angle=record.angle - error)
-            for record, error in zip(records, other.fit.residuals, strict=True)
-        ]
-        nearest = fit_with(replace(base, own=best.fit.own), as_if, best.effect)
-        distance = math.sqrt(nearest.cost / variance)
-        if distance == 0.0 or norm.sf((gap + 0.5 * distance**2) / distance) > 0.05:
-            kept.append(other.effect.id)
-    return kept
+    fits = side_by_side(lambda other: fit_with(base, records, other), others)
+    widest = 0.5 * norm.isf(ALIAS_LEVEL) ** 2
+    gaps = [_gain(fit.cost, best.cost, len(best.white)) for fit in fits]
+    return {
+        other.effect.id: fit
+        for other, fit, gap in zip(others, fits, gaps, strict=True)
+        if gap <= widest and other.effect is not effect
+    }
 
 
-def _gain(before: Fit, after: Fit) -> float:
-    if not math.isfinite(after.cost):
+def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
+    """Do the same with every item, on all cores: the integrator, which takes most of the time, lets go of Python."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(pool.map(work, items))
+
+
+def _gain(before: float, after: float, n: int) -> float:
+    if not math.isfinite(after):
         return -math.inf
-    finest = len(before.white) * 1e-9**2  # rad², so that data without any noise do not divide by nothing
-    return 0.5 * len(before.white) * math.log((before.cost + finest) / (after.cost + finest))
+    finest = n * 1e-9**2  # rad², so that data without any noise do not divide by nothing
+    return 0.5 * n * math.log((before + finest) / (after + finest))

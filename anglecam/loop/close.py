@@ -1,9 +1,10 @@
-"""The loop: fit, test the residual, name the effect, add it, prove it on held-out recordings, and again.
+"""The loop: fit, test the residual, name the effect, add it, prove it on what was not fitted, and again.
 
-    base fit → gate → candidates → evidence → held-out gain → accept → gate → …
+    base fit → gate → candidates → prediction of what was not fitted → accept → gate → …
 
-An effect is added only where the gate says that something is missing *and* the held-out error falls with a 95 %
-interval above zero. What remains after that, and would still be seen, is ``unexplained``.
+An effect is added only where the gate says that something is missing *and* the error on what the model was not fitted
+to falls with a 95 % interval above zero. What remains after that, and would still be seen, is
+``unexplained``.
 """
 
 from __future__ import annotations
@@ -13,25 +14,35 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from anglecam.effects import LEDGER, Effect
-from anglecam.estimate.noise import DISTANCE, Noise, autoregression, stated_noise, witness_noise
-from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error
+from anglecam.estimate.noise import Noise, autoregression, noise_floor
+from anglecam.estimate.output_error import Fit, fit_output_error
 from anglecam.estimate.record import Record
+from anglecam.estimate.shooting import drifts, goes_astray, windows
 from anglecam.estimate.start import start_parameters
-from anglecam.loop.attribute import Candidate, alias_set, fit_candidates, fit_with
+from anglecam.loop.attribute import Candidate, fit_candidates, fit_with, promising, rivals, side_by_side
 from anglecam.loop.gate import LEVEL, Gate, test_residual
-from anglecam.loop.holdout import Gain, held_out_gain, split_records
+from anglecam.loop.holdout import Gain, Prediction, compare, predict_unseen, split_records
+from anglecam.loop.screen import Change, Forecast, changes, directions, forecasts
 from anglecam.simulate.plant import Plant
 
 MOST_EFFECTS = 3
-NEGLIGIBLE = 0.5
-"""In a film, structure smaller than this share of the noise is neither traced nor called unexplained: the pixel grid
-leaves that much along the path, the same wherever the mouth passes, which it does not leave across it."""
+LIKELIEST = 2
+"""Effects that are fitted to see what colour the noise has."""
+NEGLIGIBLE = 2.0
+"""In a film, structure smaller than this many times the angle's stated uncertainty is neither traced nor called
+unexplained: it may be the measurement's own."""
 SURE = 0.01
-"""After an effect has proven itself, what remains must be this improbable as noise to take the verdict back."""
+"""After an effect has proven itself, what remains must be this improbable as noise to be traced further, or to take the
+verdict back."""
 CONTRADICTED = 3.0
 """A model that errs this many times more on what was held out than on what was fitted lacks something there."""
+REMAINDER, REMAINDER_UNDRIVEN = 0.1, 0.75
+"""After an effect has proven itself, what remains must also be this share of what the base model left, or it does not
+take the verdict back. Where nothing is commanded, or nothing tells the noise, most of it may be what no model of a
+mechanism holds, such as the hand that let go."""
 FINEST = math.radians(1e-3)
 """No structure smaller than this is traced: forward models and files are not much finer."""
 
@@ -41,7 +52,13 @@ class Accepted:
     """An effect that was added."""
 
     effect: Effect
-    alias_set: tuple[str, ...]
+    rivals: dict[str, Fit]
+    """What it cannot be told from: the model with each of these in its place, on the fitted recordings."""
+
+    @property
+    def alias_set(self) -> tuple[str, ...]:
+        """Ids, its own first."""
+        return (self.effect.id, *self.rivals)
 
 
 @dataclass(frozen=True)
@@ -55,8 +72,8 @@ class Verdict:
     """The base model on the fitted recordings."""
     after: Fit
     """The final model on the same."""
-    before_held_out: Fit
-    after_held_out: Fit
+    before_held_out: Prediction
+    after_held_out: Prediction
     gain: Gain
     first_gate: Gate
     last_gate: Gate
@@ -65,6 +82,18 @@ class Verdict:
     noise: Noise
     fitted: tuple[Record, ...]
     held_out: tuple[Record, ...]
+    """By declaration; may be none."""
+
+
+@dataclass(frozen=True)
+class _Round:
+    """A model and what its residual says."""
+
+    fit: Fit
+    told: Prediction
+    unseen: Prediction
+    gate: Gate
+    forecasts: list[Forecast]
 
 
 def close_records(
@@ -82,7 +111,7 @@ def close_records(
     records : sequence of Record
         At least one.
     held_out : sequence of str
-        Names that are predicted only; see `split_records` for what happens without.
+        Names that are predicted only; the others are also predicted, block by block, by fits to the rest.
     starts : sequence of (3,) ndarray
         Further a, b, c (1/s, 1/s², 1/s²) to start the base fit from.
     seed : int
@@ -95,109 +124,189 @@ def close_records(
     Verdict
         With everything that the report shows.
     """
-    rng = np.random.default_rng(seed)
-    fitted, predicted = split_records(records, held_out)
-    driven = any(r.command is not None for r in fitted)
-    plant = Plant(driven=driven)
-    ledger = [e for e in LEDGER if driven or e.shift_command is None]
-    witness = witness_noise(fitted)
-    camera = witness.sigma if witness and witness.source == DISTANCE else 0.0
-    negligible = max(FINEST, NEGLIGIBLE * camera)
+    # small matrices, and several fits at a time: threads of linear algebra would only wait for each other
+    with threadpool_limits(1, "blas"):
+        return _close(records, held_out, starts, np.random.default_rng(seed), progress)
 
+
+def _close(
+    records: Sequence[Record],
+    held_out: Sequence[str],
+    starts: Sequence[np.ndarray],
+    rng: np.random.Generator,
+    progress: Callable[[str], None],
+) -> Verdict:
+    fitted, predicted = split_records(records, held_out)
+    plant = Plant(driven=any(r.command is not None for r in fitted))
     progress("base model")
     own_starts = [s[: plant.base_count] for s in starts]
-    white_fit = fit_output_error(plant, fitted, [*start_parameters(fitted), *own_starts])
+    base = fit_output_error(plant, fitted, [*start_parameters(fitted), *own_starts])
+    floor = noise_floor(fitted)
+    if drifts(base.parameters, fitted) or goes_astray(base, fitted):
+        fitted, predicted = windows(fitted, base.parameters), windows(predicted, base.parameters)
+        base = fit_output_error(plant, fitted, [base.parameters, *own_starts])
+    ledger = applicable([*fitted, *predicted])
+    camera = floor.sigma if floor and floor.filmed else 0.0
+    negligible = max(FINEST, NEGLIGIBLE * camera)
 
-    def colour(base: Fit, effects: Sequence[Effect]) -> float:
-        return _colour(base, fitted, effects, witness)
-
-    progress("noise")
-    before = _recolour(white_fit, fitted, colour(white_fit, ledger))
-    progress("residual")
-    first_gate = gate = test_residual(before, fitted, ledger, rng)
-    progress("candidates")
-    first = candidates = fit_candidates(before, fitted, predicted, ledger)
-    fit = before
-    accepted: list[Accepted] = []
-    while not gate.passed and len(accepted) < MOST_EFFECTS and candidates:
-        best = candidates[0]
-        so_far = predict_output_error(fit, predicted)
-        gain = held_out_gain(so_far, best.prediction, predicted, rng)
-        if gain.interval_95[0] <= 0.0 or so_far.rmse**2 - best.prediction.rmse**2 <= negligible**2:
-            break
-        progress(f"adding {best.effect.id}")
-        accepted.append(Accepted(best.effect, tuple(alias_set(best, fit, fitted, candidates[1:]))))
+    def look(fit: Fit, accepted: Sequence[Accepted]) -> _Round:
         left = [e for e in ledger if e not in [a.effect for a in accepted]]
-        fit = _recolour(best.fit, fitted, colour(best.fit, left))
-        gate = test_residual(fit, fitted, left, rng)
-        candidates = [] if gate.passed else fit_candidates(fit, fitted, predicted, left)
+        moved = changes(fit, fitted, left)
+        fit = _recolour(fit, fitted, _colour(fit, fitted, moved, floor))
+        ways = directions(fit, fitted, moved)
+        told, unseen = predict_unseen(fit, fitted, predicted)
+        return _Round(fit, told, unseen, test_residual(fit, fitted, ways, rng), promising(forecasts(fit, ways)))
+
+    progress("residual")
+    first = now = look(base, ())
+    progress("candidates")
+    first_candidates = candidates = fit_candidates(now.fit, now.unseen, fitted, predicted, now.forecasts)
+    accepted: list[Accepted] = []
+
+    def convincing(before: Prediction, best: Candidate) -> bool:
+        if best.unseen is None or before.rmse**2 - best.unseen.rmse**2 <= negligible**2:
+            return False
+        return compare(before, best.unseen, rng).interval_95[0] > 0.0
+
+    def add(best: Candidate, accepted: list[Accepted]) -> tuple[_Round, list[Accepted], list[Candidate]]:
+        progress(f"adding {best.effect.id}")
+        accepted = [*accepted, Accepted(best.effect, {})]
+        fit = best.fit
+        if best.unseen is not None:
+            fit, accepted = _without_the_needless(fit, best.unseen, accepted, fitted, predicted, rng)
+        then = look(fit, accepted)
+        if then.gate.p_value >= SURE or len(accepted) == MOST_EFFECTS:
+            return then, accepted, []
+        return then, accepted, fit_candidates(then.fit, then.unseen, fitted, predicted, then.forecasts)
+
+    if first.gate.passed:
+        candidates = []
+    while candidates:
+        proven = now.unseen
+        if convincing(proven, candidates[0]):
+            now, accepted, candidates = add(candidates[0], accepted)
+            continue
+        # one effect may mask another: neither helps alone, and both do together
+        if len(accepted) + 2 > MOST_EFFECTS:
+            break
+        _, both, more = add(candidates[0], accepted)
+        if not more or not convincing(proven, more[0]):
+            break
+        now, accepted, candidates = add(more[0], both)
     progress("verdict")
-    fit, accepted = _without_the_unneeded(fit, accepted, fitted, predicted, rng)
     # both ends are compared under the colour of the noise that the better model leaves
-    before = _recolour(before, fitted, fit.phi)
-    before_held_out, after_held_out = (predict_output_error(f, predicted) for f in (before, fit))
-    noise = witness or stated_noise(fitted) or _left_over(fit)
+    before = _recolour(first.fit, fitted, now.fit.phi)
+    before_told, _ = predict_unseen(before, fitted, predicted)
+    noise = floor or replace(autoregression(now.fit.residuals, "residual"), sigma=now.fit.rmse)
     level = SURE if accepted else LEVEL
-    structured = gate.p_value < level and fit.rmse**2 > camera**2 + negligible**2
-    remains = structured or after_held_out.rmse > CONTRADICTED * max(fit.rmse, FINEST)
+    structured = now.gate.p_value < level and now.fit.rmse**2 > camera**2 + negligible**2
+    share = REMAINDER if plant.driven and floor is not None else REMAINDER_UNDRIVEN
+    structured &= not accepted or _beyond(now.unseen, noise) > share * _beyond(first.unseen, noise)
+    remains = structured or now.told.rmse > CONTRADICTED * max(now.fit.rmse, negligible)
     if remains:  # nothing is named, so nothing is added
-        fit, after_held_out = before, before_held_out
-    verdict = "unexplained" if remains else "attributed" if accepted else "nothing_missing"
+        accepted = []
+    after, after_told = (before, before_told) if remains else (now.fit, now.told)
     return Verdict(
-        verdict,
-        () if remains else tuple(accepted),
+        "unexplained" if remains else "attributed" if accepted else "nothing_missing",
+        _with_aliases(after, accepted, fitted, ledger),
         before,
-        fit,
-        before_held_out,
-        after_held_out,
-        held_out_gain(before_held_out, after_held_out, predicted, rng),
-        first_gate,
-        gate,
-        tuple(first),
+        after,
+        before_told,
+        after_told,
+        compare(before_told, after_told, rng),
+        first.gate,
+        now.gate,
+        tuple(first_candidates),
         noise,
         tuple(fitted),
         tuple(predicted),
     )
 
 
-def _colour(base: Fit, records: Sequence[Record], effects: Sequence[Effect], witness: Noise | None) -> float:
-    """Return the noise's φ: of the best model's residual, but no more than the witness allows.
+def _beyond(prediction: Prediction, noise: Noise) -> float:
+    """Return what a prediction errs by beyond the noise, rad."""
+    return math.sqrt(max(prediction.rmse**2 - noise.sigma**2, 0.0))
+
+
+def applicable(records: Sequence[Record]) -> list[Effect]:
+    """List the effects that recordings can show: a free swing has no command, a series without marks no rows."""
+    driven = any(r.command is not None for r in records)
+    known = all(r.zero_known for r in records)
+    return [
+        e
+        for e in LEDGER
+        if (driven or e.port not in ("command", "lag", "servo"))
+        and (known or e.id != "constant_torque")
+        and all(e.needs(r.view) for r in records)
+    ]
+
+
+def _colour(base: Fit, records: Sequence[Record], moved: Sequence[Change], floor: Noise | None) -> float:
+    """Return the noise's φ: of the best model's residual, but no more than the noise floor's.
 
     What a model lacks makes its residual look coloured; the best candidate's residual looks least so, and a rest or
     the distance from the pivot, which no model enters, says where colour ends and structure begins.
     """
-    fits = [base, *(fit_with(base, records, effect) for effect in effects)]
+    likely = forecasts(base, directions(base, records, moved))[:LIKELIEST]
+    fits = [base, *side_by_side(lambda one: fit_with(base, records, one), likely)]
     best = min(fits, key=lambda fit: fit.cost)
     phi = autoregression(best.residuals, "residual").phi
-    return phi if witness is None else min(phi, max(0.0, witness.phi + 1.645 * witness.phi_error))
+    return phi if floor is None else min(phi, max(0.0, floor.phi + 1.645 * floor.phi_error))
 
 
 def _recolour(fit: Fit, records: Sequence[Record], phi: float) -> Fit:
     return fit_output_error(fit.model, records, [fit.parameters], own=fit.own, phi=phi)
 
 
-def _left_over(fit: Fit) -> Noise:
-    return replace(autoregression(fit.residuals, "residual"), sigma=fit.rmse)
+def _reduced(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
+    """Fit the plant again without one of its effects."""
+    if not isinstance(fit.model, Plant):
+        raise TypeError("only a Plant has effects")
+    own = [p.name for p in effect.parameters]
+    keep = [i for i, name in enumerate(fit.model.names) if name not in own]
+    smaller = replace(fit.model, effects=tuple(e for e in fit.model.effects if e is not effect))
+    return fit_output_error(smaller, records, [fit.parameters[keep]], own=fit.own, phi=fit.phi)
 
 
-def _without_the_unneeded(
+def _without_the_needless(
     fit: Fit,
+    unseen: Prediction,
     accepted: list[Accepted],
     fitted: Sequence[Record],
     predicted: Sequence[Record],
     rng: np.random.Generator,
 ) -> tuple[Fit, list[Accepted]]:
-    """Take back each effect, first to last, that later ones have made needless on held-out recordings."""
-    for entry in list(accepted):
-        if len(accepted) < 2 or not isinstance(fit.model, Plant):
-            break
-        rest = [a for a in accepted if a is not entry]
-        keep = [i for i, name in enumerate(fit.model.names) if name not in [p.name for p in entry.effect.parameters]]
-        smaller = replace(fit.model, effects=tuple(a.effect for a in rest))
-        reduced = fit_output_error(smaller, fitted, [fit.parameters[keep]], own=fit.own, phi=fit.phi)
-        gain = held_out_gain(
-            predict_output_error(reduced, predicted), predict_output_error(fit, predicted), predicted, rng
-        )
-        if gain.interval_95[0] <= 0.0:
-            fit, accepted = reduced, rest
+    """Take back each effect, first to last, without which the unseen is predicted as well."""
+    for entry in accepted[:-1]:
+        reduced = _reduced(fit, entry.effect, fitted)
+        _, without = predict_unseen(reduced, fitted, predicted)
+        if compare(without, unseen, rng).interval_95[0] <= 0.0:
+            fit, unseen, accepted = reduced, without, [a for a in accepted if a is not entry]
     return fit, accepted
+
+
+def _with_aliases(
+    fit: Fit, accepted: Sequence[Accepted], records: Sequence[Record], ledger: Sequence[Effect]
+) -> tuple[Accepted, ...]:
+    """Say of every effect, the others in place, what it cannot be told from."""
+    told = []
+    for entry in accepted:
+        effects = [a.effect for a in accepted if a is not entry]
+        # the effect goes last, where a candidate's parameters are
+        base = _reduced(fit, entry.effect, records)
+        best = _last(fit, entry.effect, records)
+        left = [e for e in ledger if e not in effects and e is not entry.effect]
+        others = promising(forecasts(base, directions(base, records, changes(base, records, left))))
+        told.append(Accepted(entry.effect, rivals(best, base, records, entry.effect, others)))
+    return tuple(told)
+
+
+def _last(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
+    """Return the same fit with one of its effects after all others."""
+    plant = fit.model
+    if not isinstance(plant, Plant):
+        raise TypeError("only a Plant has effects")
+    own = [p.name for p in effect.parameters]
+    order = sorted(range(len(plant.names)), key=lambda i: plant.names[i] in own)
+    moved = replace(plant, effects=tuple(sorted(plant.effects, key=lambda e: e is effect)))
+    return fit_output_error(moved, records, [fit.parameters[order]], own=fit.own, phi=fit.phi)

@@ -1,11 +1,11 @@
 """The gate: is there structure in the residual that noise would not leave there.
 
-Several tests look at the whitened residual of a fitted model: along the sensitivity of each effect that could be
-added, along functions of angle, velocity, command and time, and at its autocorrelation. Every statistic is a share
-of the residual's own energy, so none of them needs the noise's size. The smallest of the tests' p-values is the
-gate's statistic; its null distribution comes from a parametric bootstrap: white noise, from which what the fit
-absorbs (the space of its Jacobian) is taken out as the fit takes it out. So neither the number of tests nor what
-they share has to be known. Davison and Hinkley, Bootstrap Methods and their Application, 1997, sec. 4.2 and 4.4.
+Several tests look at the whitened residual of a fitted model: along what each effect that could be added would change,
+along functions of angle, velocity, command and time, and at its autocorrelation. Every statistic is a share of the
+residual's own energy, so none of them needs the noise's size. The smallest of the tests' p-values is the gate's
+statistic; its null distribution comes from a parametric bootstrap: white noise, from which what the fit absorbs (the
+space of its Jacobian) is taken out as the fit takes it out. So neither the number of tests nor what they share has to
+be known. Davison and Hinkley, Bootstrap Methods and their Application, 1997, sec. 4.2 and 4.4.
 """
 
 from __future__ import annotations
@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta, chi2, norm
 
-from anglecam.effects import Effect
 from anglecam.estimate.output_error import Fit, whiten
 from anglecam.estimate.record import Record
-from anglecam.simulate.plant import Plant
+from anglecam.loop.screen import Direction, absorbed_space
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +53,7 @@ class Gate:
         return self.p_value >= LEVEL
 
 
-def test_residual(fit: Fit, records: Sequence[Record], candidates: Sequence[Effect], rng: np.random.Generator) -> Gate:
+def test_residual(fit: Fit, records: Sequence[Record], ways: Sequence[Direction], rng: np.random.Generator) -> Gate:
     """Test the residual of a fitted plant.
 
     Parameters
@@ -63,8 +62,8 @@ def test_residual(fit: Fit, records: Sequence[Record], candidates: Sequence[Effe
         Of a `Plant`, whitened with the noise's colour.
     records : sequence of Record
         Those that were fitted.
-    candidates : sequence of Effect
-        What could be added.
+    ways : sequence of Direction
+        From `anglecam.loop.screen.directions` of the same fit: of what could be added.
     rng : numpy.random.Generator
         For the bootstrap.
 
@@ -73,61 +72,61 @@ def test_residual(fit: Fit, records: Sequence[Record], candidates: Sequence[Effe
     Gate
         Calibrated at `DRAWS` draws.
     """
-    used = np.linalg.norm(fit.jacobian, axis=0) > 0.0  # a parameter held by its bound may move nothing
-    absorbed, _ = np.linalg.qr(fit.jacobian[:, used])
-    n = len(fit.white)
+    absorbed = absorbed_space(fit)
+    n, free = len(fit.white), len(fit.white) - absorbed.shape[1]
     draws = rng.standard_normal((n, DRAWS))
-    draws -= absorbed @ (absorbed.T @ draws)
-    both = np.column_stack([fit.white - absorbed @ (absorbed.T @ fit.white), draws])
+    both = np.column_stack([fit.white, draws])
+    both -= absorbed @ (absorbed.T @ both)
     energy = np.sum(both**2, axis=0)
+    energy[energy == 0.0] = 1.0
 
-    free = n - absorbed.shape[1]
-    # most effects exist on one side of their null only
-    one_sided = {
-        f"effect:{e.id}" for e in candidates if e.parameters[0].null in (e.parameters[0].lower, e.parameters[0].upper)
-    }
-    bases = {f"effect:{e.id}": sensitivity(fit, records, e) for e in candidates} | _shapes(fit, records)
-    p_each, strength = {}, {}
-    for name, basis in bases.items():
+    p_each = _p_of_effects(ways, both, energy, free)
+    for name, basis in _shapes(fit, records).items():
         left = basis - absorbed @ (absorbed.T @ basis)
-        p_each[name] = _p_of_share(left, basis, both, energy, free, one_sided=name in one_sided)
-        strength[name] = float(np.linalg.norm(left[:, 0]))
-    p_each["autocorrelation"] = chi2.sf(_portmanteau(both, records), LAGS)
+        p_each[f"residual against {name}"] = _p_of_share(left, basis, both, energy, free)
+    p_each["autocorrelation"] = chi2.sf(_portmanteau(both, energy, records), LAGS)
 
     # under the null the data are one more draw: the smallest of its p-values is ranked among all draws'
     smallest = np.min(list(p_each.values()), axis=0)
     p_value = np.mean(smallest <= smallest[0])
     critical = float(np.quantile(smallest[1:], LEVEL))
-    noise = np.sqrt(fit.cost / free)
-    detectable = {
-        e.id: float((norm.isf(critical) + norm.isf(0.05)) * noise / strength[f"effect:{e.id}"])
-        for e in candidates
-        if strength[f"effect:{e.id}"] > 0.0
-    }
+    needed = float((norm.isf(critical) + norm.isf(0.05)) * np.sqrt(fit.cost / free))
     tests = tuple(Test(name, float(p[0])) for name, p in p_each.items())
-    return Gate(float(p_value), tests, detectable)
+    return Gate(float(p_value), tests, _detectable(ways, needed))
 
 
-def sensitivity(fit: Fit, records: Sequence[Record], effect: Effect) -> Floats:
-    """Return the (N, k) whitened change of the prediction for each parameter of an effect, per SI unit, at its null."""
-    plant = fit.model
-    if not isinstance(plant, Plant):
-        raise TypeError("only a Plant takes effects")
-    richer = plant.with_effect(effect)
-    blocks = []
-    for record, own in zip(records, fit.own, strict=True):
-        state = own[: plant.states]
-        base = plant.predict(fit.parameters, record.time, record.command, state)
-        columns = []
-        for i, parameter in enumerate(effect.parameters):
-            # a tenth of a small start: a one-sided quotient, since most effects exist on one side of their null only
-            step = 0.1 * (parameter.starts[0] - parameter.null)
-            values = effect.null
-            values[i] += step
-            changed = richer.predict(np.append(fit.parameters, values), record.time, record.command, state)
-            columns.append((changed - base) / step)
-        blocks.append(whiten(record, fit.phi, np.column_stack(columns)))
-    return np.concatenate(blocks)
+def _p_of_effects(ways: Sequence[Direction], residuals: Floats, energy: Floats, free: int) -> dict[str, Floats]:
+    """Return, for each effect and residual (columns), the least p-value of its directions.
+
+    Of white noise in n dimensions the share of the energy that falls into one of them is Beta(1/2, (n − 1)/2).
+    """
+    if not ways:
+        return {}
+    along = np.stack([way.change / way.size for way in ways]) @ residuals
+    share = np.minimum(along**2 / energy, 1.0)
+    p = beta.sf(share, 0.5, 0.5 * (free - 1))
+    for i, way in enumerate(ways):
+        if way.one_sided:
+            p[i] = np.where(along[i] > 0.0, 0.5 * p[i], 1.0 - 0.5 * p[i])
+    ids = np.array([way.effect.id for way in ways])
+    return {f"effect {name}": p[ids == name].min(axis=0) for name in dict.fromkeys(ids)}
+
+
+def _detectable(ways: Sequence[Direction], needed: float) -> dict[str, float]:
+    """Interpolate each effect's magnitude at which its change is as long as needed, on logarithmic scales."""
+    found: dict[str, float] = {}
+    for name in dict.fromkeys(way.effect.id for way in ways):
+        own = [way for way in ways if way.effect.id == name]
+        shape = own[0].start[1:]
+        sizes = {abs(w.start[0] - w.effect.null[0]): w.size for w in own if np.array_equal(w.start[1:], shape)}
+        magnitude = np.log(sorted(sizes))
+        length = np.log([sizes[m] for m in sorted(sizes)])
+        wanted = np.log(needed)
+        if len(magnitude) > 1 and wanted < length[0]:  # below the smallest that was tried: in proportion
+            found[name] = float(np.exp(magnitude[0] + wanted - length[0]))
+        elif wanted <= length.max():
+            found[name] = float(np.exp(np.interp(wanted, np.maximum.accumulate(length), magnitude)))
+    return found
 
 
 def _shapes(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
@@ -153,9 +152,7 @@ def _shapes(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
     return {name: np.concatenate(blocks) for name, blocks in groups.items()}
 
 
-def _p_of_share(
-    left: Floats, basis: Floats, residuals: Floats, energy: Floats, free: int, *, one_sided: bool
-) -> Floats:
+def _p_of_share(left: Floats, basis: Floats, residuals: Floats, energy: Floats, free: int) -> Floats:
     """Return, for each residual (columns), the p-value of its share of energy within the space of ``left``.
 
     Of white noise in n dimensions the share that falls into k of them is Beta(k/2, (n − k)/2).
@@ -165,17 +162,13 @@ def _p_of_share(
     k = u.shape[1]
     if k == 0:
         return np.ones(residuals.shape[1])
-    along = u.T @ residuals
-    p = beta.sf(np.sum(along**2, axis=0) / energy, 0.5 * k, 0.5 * (free - k))
-    if one_sided and left.shape[1] == 1:
-        p = np.where(along[0] * np.sign(u[:, 0] @ left[:, 0]) > 0.0, 0.5 * p, 1.0 - 0.5 * p)
-    return p
+    share = np.minimum(np.sum((u.T @ residuals) ** 2, axis=0) / energy, 1.0)
+    return np.asarray(beta.sf(share, 0.5 * k, 0.5 * (free - k)))
 
 
-def _portmanteau(residuals: Floats, records: Sequence[Record]) -> Floats:
+def _portmanteau(residuals: Floats, energy: Floats, records: Sequence[Record]) -> Floats:
     """Ljung and Box's sum of squared autocorrelations, within recordings (Biometrika 65, 1978)."""
     edges = np.cumsum([0, *(len(r.time) for r in records)])
-    energy = np.sum(residuals**2, axis=0)
     n = len(residuals)
     total = np.zeros(residuals.shape[1])
     for lag in range(1, LAGS + 1):

@@ -1,15 +1,21 @@
-"""Recordings that are never fitted, only predicted; and how much better one model predicts them than another."""
+"""Predictions of recordings that a model was not fitted to, and how much better one model predicts them than another.
+
+Every frame is predicted in free run by a model that was fitted without it: recordings that are held out by declaration
+by the model of all others, and of the others every fifth second by a fit to the rest. With a whole recording left out
+the rest may lack what tells a parameter, and the prediction errs by that more than by what the model lacks. Stone, J.
+R. Statist. Soc. B 36, 1974; Burman, Chow, Nolan, Biometrika 81, 1994.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import RigError
-from anglecam.estimate.output_error import Fit
+from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error, predicted_angle, whiten
 from anglecam.estimate.record import Record
 
 Floats = NDArray[np.float64]
@@ -17,80 +23,145 @@ Floats = NDArray[np.float64]
 DRAWS = 999
 BLOCK = 0.5
 """s; prediction errors further apart than this count as independent."""
+TURNS = 5
+"""Times that a model is fitted to what is left."""
+LEFT_OUT = 1.0
+"""s; of every recording a block of this length in `TURNS` is left out at a time."""
+
+
+FIRST_FRAMES = 8
+"""Frames that are never left out: without them nothing tells the rate that a recording starts with."""
+KEPT = -1
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Recordings predicted by a model that was not fitted to them."""
+
+    records: tuple[Record, ...]
+    residuals: tuple[Floats, ...]
+    """Measured minus predicted angle of each, rad."""
+    cost: float
+    """Sum of squared whitened residuals, rad²."""
+
+    @property
+    def rmse(self) -> float:
+        """Root mean square residual, rad."""
+        return float(np.sqrt(np.mean(np.concatenate(self.residuals) ** 2)))
 
 
 @dataclass(frozen=True)
 class Gain:
-    """By how much the held-out error falls: 1 − after/before."""
+    """By how much the error on what was not fitted falls: 1 − after/before."""
 
     ratio: float
     interval_95: tuple[float, float]
 
 
 def split_records(records: Sequence[Record], held_out: Sequence[str]) -> tuple[list[Record], list[Record]]:
-    """Divide recordings into those to fit and those to predict.
+    """Divide recordings into those to fit and those that are declared to be predicted only.
 
     Parameters
     ----------
     records : sequence of Record
         All recordings.
     held_out : sequence of str
-        Names to predict only. With none named, the last driven recording by name is held out (the last of all, if
-        none is driven); if it is the only one of its kind it is cut in time, and its last third held out.
+        Names to predict only.
 
     Returns
     -------
     fitted, predicted : list of Record
-        Neither is empty.
+        The first is not empty; the second is where nothing is declared.
 
     Raises
     ------
     RigError
         Where nothing would be left to fit.
     """
-    if held_out:
-        predicted = [r for r in records if r.name in held_out]
-        fitted = [r for r in records if r.name not in held_out]
-        if not fitted:
-            raise RigError("every recording is held out; nothing is left to fit")
-        if predicted:
-            return fitted, predicted
-    kind = [r for r in records if r.command is not None] or list(records)
-    last = max(kind, key=lambda r: r.name)
-    others = [r for r in records if r is not last]
-    if len(kind) > 1:
-        return others, [last]
-    cut = float(last.time[2 * len(last.time) // 3])
-    rest = replace(last.between(cut, np.inf), name=f"{last.name}, last third")
-    return [*others, last.between(-np.inf, cut)], [rest]
+    fitted = [r for r in records if r.name not in held_out]
+    if not fitted:
+        raise RigError("every recording is held out; nothing is left to fit")
+    return fitted, [r for r in records if r.name in held_out]
 
 
-def held_out_gain(before: Fit, after: Fit, records: Sequence[Record], rng: np.random.Generator) -> Gain:
-    """Compare two predictions of the same recordings by a paired block bootstrap.
+def predict_unseen(fit: Fit, fitted: Sequence[Record], held_out: Sequence[Record]) -> tuple[Prediction, Prediction]:
+    """Predict every recording by a model that was not fitted to it.
 
     Parameters
     ----------
-    before, after : Fit
-        Predictions, recording by recording.
-    records : sequence of Record
-        What was predicted.
+    fit : Fit
+        Of all of ``fitted``.
+    fitted, held_out : sequence of Record
+        To predict block by block, and by ``fit`` itself.
+
+    Returns
+    -------
+    told, whole : Prediction
+        Of what is held out by declaration (of all where nothing is), and of all.
+    """
+    told = predict_output_error(fit, held_out) if held_out else None
+    declared = Prediction(tuple(held_out), told.residuals, told.cost) if told else None
+    turns = _in_turns(fit, fitted)
+    if declared is None:
+        return turns, turns
+    whole = Prediction(
+        declared.records + turns.records, declared.residuals + turns.residuals, declared.cost + turns.cost
+    )
+    return declared, whole
+
+
+def _in_turns(fit: Fit, records: Sequence[Record]) -> Prediction:
+    """Predict every recording but for its first frames, where the model starts, by fits without what they predict."""
+    errors = [np.zeros(len(r.time)) for r in records]
+    left_out = [_turns(r) for r in records]
+    for turn in range(TURNS):
+        train = [record.only(frames != turn) for record, frames in zip(records, left_out, strict=True)]
+        left = fit_output_error(fit.model, train, [fit.parameters], own=fit.own, phi=fit.phi)
+        for record, frames, own, error in zip(records, left_out, left.own, errors, strict=True):
+            error[frames == turn] = (record.angle - predicted_angle(left, record, own))[frames == turn]
+    tested = tuple(record.only(frames != KEPT) for record, frames in zip(records, left_out, strict=True))
+    residuals = tuple(error[frames != KEPT] for error, frames in zip(errors, left_out, strict=True))
+    white = [whiten(record, fit.phi, error) for record, error in zip(tested, residuals, strict=True)]
+    return Prediction(tested, residuals, float(sum(e @ e for e in white)))
+
+
+def _turns(record: Record) -> NDArray[np.int_]:
+    """Return for each frame the turn in which it is left out; the first few, which tell where it starts, never are."""
+    first = record.time[min(FIRST_FRAMES, len(record.time) - 1)]
+    length = min(LEFT_OUT, (record.time[-1] - first) / TURNS)
+    turns = np.floor((record.time - first) / length).astype(int)
+    return np.where(turns < 0, KEPT, turns % TURNS)
+
+
+def compare(before: Prediction, after: Prediction, rng: np.random.Generator) -> Gain:
+    """Compare two predictions of the same recordings by a paired wild bootstrap of blocks.
+
+    With e the errors after and δ by how much those before differ, the energy falls by Σ(δ² + 2δe). The motion is what
+    it was, and so is δ; what is random is the noise in e, whose part in every block takes either sign.
+
+    Parameters
+    ----------
+    before, after : Prediction
+        Of the same recordings.
     rng : numpy.random.Generator
-        For the draws of blocks (Künsch, Ann. Statist. 17, 1989).
+        For the signs (Wu, Ann. Statist. 14, 1986).
 
     Returns
     -------
     Gain
         With its 95 % interval.
     """
-    pairs = []
-    for record, old, new in zip(records, before.residuals, after.residuals, strict=True):
+    cross = []
+    for record, old, new in zip(before.records, before.residuals, after.residuals, strict=True):
         size = max(1, round(BLOCK / record.interval))
-        starts = range(0, len(old), size)
-        pairs += [(np.sum(old[i : i + size] ** 2), np.sum(new[i : i + size] ** 2)) for i in starts]
-    energy = np.array(pairs)
-    picks = rng.integers(len(energy), size=(DRAWS, len(energy)))
-    sums = energy[picks].sum(axis=1)
-    ratios = 1.0 - np.sqrt(sums[:, 1] / sums[:, 0])
-    total = energy.sum(axis=0)
-    low, high = np.quantile(ratios, [0.025, 0.975])
-    return Gain(float(1.0 - np.sqrt(total[1] / total[0])), (float(low), float(high)))
+        product = (old - new) * new
+        cross += [np.sum(product[i : i + size]) for i in range(0, len(new), size)]
+    left = sum(float(new @ new) for new in after.residuals)
+    fall = sum(float(old @ old) for old in before.residuals) - left
+    falls = fall + 2.0 * rng.choice([-1.0, 1.0], size=(DRAWS, len(cross))) @ np.array(cross)
+    low, high = np.quantile(falls, [0.025, 0.975])
+
+    def ratio(by: float) -> float:
+        return float(1.0 - np.sqrt(left / max(left + by, 1e-3 * left))) if left > 0.0 else float(by > 0.0)
+
+    return Gain(ratio(fall), (ratio(low), ratio(high)))

@@ -1,31 +1,76 @@
-"""The verdict as ``loop.json`` holds it, and as one sentence."""
+"""The verdict as ``loop.json`` holds it, and in words."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from anglecam.effects import Effect, Parameter, effect
+from anglecam.estimate.output_error import predict_output_error
+from anglecam.loop.attribute import Candidate
 from anglecam.loop.close import Verdict
+from anglecam.loop.experiment import Experiment, separating_experiment, write_command
+from anglecam.loop.holdout import predict_unseen
 
 MODEL_NAMES = ("a_per_s", "b_per_s2", "c_per_s2")
+NEXT_COMMAND = "next.command.csv"
+UNITS = ("deg", "rad", "s", "s2", "px", "per")
+"""Words that a parameter's name may end in."""
 
 
-def verdict_as_dict(verdict: Verdict) -> dict[str, Any]:
-    """Return the content of ``loop.json``, in the units that its keys name."""
+def next_experiment(verdict: Verdict) -> Experiment | None:
+    """Choose what to record next to tell what was added from what it cannot be told from.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        From `anglecam.loop.close.close_records`.
+
+    Returns
+    -------
+    Experiment or None
+        One for all that is open; ``None`` where nothing is.
+    """
+    rivals = [fit for accepted in verdict.accepted for fit in accepted.rivals.values()]
+    return separating_experiment([verdict.after, *rivals], verdict.fitted, verdict.noise)
+
+
+def write_next_command(experiment: Experiment | None, folder: Path) -> None:
+    """Write the command to play next as ``next.command.csv``; where none tells anything apart an older one goes."""
+    path = folder / NEXT_COMMAND
+    if experiment is None or experiment.command is None or not experiment.separated:
+        path.unlink(missing_ok=True)
+    else:
+        write_command(experiment.command, path)
+
+
+def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> dict[str, Any]:
+    """Return the content of ``loop.json``, in the units that its keys name.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        From `anglecam.loop.close.close_records`.
+    experiment : Experiment, optional
+        From `next_experiment`.
+
+    Returns
+    -------
+    dict
+        Every candidate has its error on what is held out, those among them that the loop did not try there.
+    """
     model = dict(zip(verdict.after.model.names, _values(verdict), strict=True))
     return {
         "verdict": verdict.verdict,
         "effects": [
             {
                 "id": accepted.effect.id,
-                "parameters": {
-                    p.name: model[p.name] | {"null": p.null * p.to_file} for p in accepted.effect.parameters
-                },
+                "parameters": {p.name: model[p.name] | {"null": p.told(p.null)[0]} for p in accepted.effect.parameters},
                 "relaxes": accepted.effect.relaxes,
                 "alias_set": list(accepted.alias_set),
-                "separating_experiment": accepted.effect.separating_experiment,
+                "separating_experiment": _what_to_film(accepted.effect, experiment if accepted.rivals else None),
             }
             for accepted in verdict.accepted
         ],
@@ -38,19 +83,19 @@ def verdict_as_dict(verdict: Verdict) -> dict[str, Any]:
             "noise_floor": np.degrees(verdict.noise.sigma),
         },
         "held_out_gain": {"ratio": verdict.gain.ratio, "interval_95": list(verdict.gain.interval_95)},
-        "held_out": [r.name for r in verdict.held_out],
+        "held_out": list(dict.fromkeys(r.name for r in verdict.held_out)),
         "p_value": verdict.first_gate.p_value,
         "p_value_after": verdict.last_gate.p_value,
         "model": {name: model[name] for name in MODEL_NAMES if name in model},
         "detectable": [
-            {"id": name, "smallest": smallest * _first(name).to_file, "unit": unit(_first(name).name)}
+            {"id": name, "smallest": size_of(name).told(smallest)[0], "unit": split_unit(size_of(name).name)[1]}
             for name, smallest in verdict.last_gate.detectable.items()
         ],
         "candidates": [
             {
                 "id": c.effect.id,
                 "log_likelihood_gain": c.log_likelihood_gain,
-                "held_out_rmse_deg": np.degrees(c.prediction.rmse),
+                "held_out_rmse_deg": np.degrees(_held_out_error(c, verdict)),
             }
             for c in verdict.candidates
         ],
@@ -58,54 +103,102 @@ def verdict_as_dict(verdict: Verdict) -> dict[str, Any]:
 
 
 def sentence(verdict: Verdict) -> str:
-    """Say the verdict so that a student understands it."""
-    before, after = np.degrees(verdict.before_held_out.rmse), np.degrees(verdict.after_held_out.rmse)
+    """Say the verdict in one sentence that a student understands."""
+    before, after = (f"{np.degrees(p.rmse):.3g}°" for p in (verdict.before_held_out, verdict.after_held_out))
     if verdict.verdict == "nothing_missing" and not verdict.first_gate.passed:
         return (
-            f"Nothing is missing that this camera could show: what θ̈ = c·u − a·θ̇ − b·θ leaves over ({before:.3g}° on "
+            f"Nothing is missing that this camera could show: what θ̈ = c·u − a·θ̇ − b·θ leaves over ({before} on "
             f"recordings that it was not fitted to) is no larger than the camera's noise allows "
             f"({np.degrees(verdict.noise.sigma):.3g}°)."
         )
     if verdict.verdict == "nothing_missing":
         return (
-            f"Nothing is missing: what θ̈ = c·u − a·θ̇ − b·θ leaves over ({before:.3g}° on recordings that it was not "
+            f"Nothing is missing: what θ̈ = c·u − a·θ̇ − b·θ leaves over ({before} on recordings that it was not "
             f"fitted to) looks like the camera's noise and like nothing else."
         )
     if verdict.verdict == "unexplained":
         return (
-            f"Something is missing (the model errs by {before:.3g}° on recordings that it was not fitted to), and none "
+            f"Something is missing (the model errs by {before} on recordings that it was not fitted to), and none "
             f"of the effects that anglecam knows explains it."
         )
-    causes = " ".join(a.effect.summary for a in verdict.accepted)
+    first, *others = [_cause(a.effect, a.alias_set[1:]) for a in verdict.accepted]
+    causes = "; ".join([first, *(cause[0].lower() + cause[1:] for cause in others)])
+    this = "this" if len(verdict.accepted) == 1 else "these"
     return (
-        f"{causes} With this in the model its error on recordings that it was not fitted to falls from {before:.3g}° "
-        f"to {after:.3g}°."
+        f"{causes}; with {this} in the model its error on recordings that it was not fitted to falls from {before} "
+        f"to {after}."
     )
+
+
+def plain(effect_id: str) -> str:
+    """Return an effect's name as it is spoken."""
+    return effect_id.replace("_", " ").replace("coulomb", "Coulomb")
 
 
 def describe(effect: Effect, verdict: Verdict) -> str:
     """Return an effect's fitted parameters with their standard uncertainties, as text."""
     model = dict(zip(verdict.after.model.names, _values(verdict), strict=True))
-    return ", ".join(
-        f"{p.name} = {model[p.name]['value']:.4g} ± {model[p.name]['sigma']:.2g}" for p in effect.parameters
+    return ", ".join(f"{p.name} = {with_uncertainty(**model[p.name])}" for p in effect.parameters)
+
+
+def with_uncertainty(value: float, sigma: float) -> str:
+    """Write a value to the second digit of its standard uncertainty, if it has one."""
+    if not np.isfinite(value):
+        return "none"
+    if not 0.0 < sigma < np.inf:
+        return f"{value:.4g} (held by a bound of what is possible)"
+    digits = int(np.clip(1 - np.floor(np.log10(sigma)), 0, 8))
+    return f"{value:.{digits}f} ± {sigma:.{digits}f}"
+
+
+def split_unit(name: str) -> tuple[str, str]:
+    """Part a parameter's name from the unit that it ends in (``dry_friction_deg_per_s2`` → dry friction, deg/s2)."""
+    words = name.split("_")
+    end = next(i for i in range(1, len(words) + 1) if all(word in UNITS for word in words[i:]))
+    units = ["1", *words[end:]] if words[end:][:1] == ["per"] else words[end:]
+    return " ".join(words[:end]), " ".join(units).replace(" per ", "/")
+
+
+def size_of(effect_id: str) -> Parameter:
+    """Return the parameter that says how large an effect is."""
+    return effect(effect_id).parameters[0]
+
+
+def _cause(effect: Effect, others: tuple[str, ...]) -> str:
+    """Say what an effect is, whose doing, and what else it may be."""
+    told = effect.summary.removesuffix(".")
+    if effect.station == "camera":
+        told += ", which is the camera's doing and not the mechanism's"
+    if others:
+        *most, last = (plain(other) for other in others)
+        either = f"{', '.join(most)} or {last}" if most else last
+        told += f" (or it is {either}, which these recordings cannot tell from it)"
+    return told
+
+
+def _what_to_film(effect: Effect, experiment: Experiment | None) -> str:
+    if experiment is None or not experiment.separated:
+        return effect.separating_experiment
+    file = "" if experiment.command is None else f" ({NEXT_COMMAND})"
+    return (
+        f"{effect.separating_experiment}; what tells soonest on this rig: {experiment.description}, "
+        f"{experiment.duration:g} s{file}"
     )
 
 
-def unit(name: str) -> str:
-    """Return the unit that a parameter's name ends in (``friction_deg_per_s2`` → ``deg/s2``)."""
-    words = name.split("_")[1:]
-    if words and words[0] == "per":
-        return "1/" + words[1]
-    return " ".join(words).replace(" per ", "/")
+def _held_out_error(candidate: Candidate, verdict: Verdict) -> float:
+    """Return a candidate's error, rad, on what is held out, also where the loop had no hope of it."""
+    if candidate.told is not None:
+        return candidate.told.rmse
+    if verdict.held_out:
+        return predict_output_error(candidate.fit, verdict.held_out).rmse
+    return predict_unseen(candidate.fit, verdict.fitted, ())[0].rmse
 
 
 def _values(verdict: Verdict) -> list[dict[str, float]]:
     fit = verdict.after
-    scale = fit.model.to_file
-    return [
-        {"value": float(v), "sigma": float(s)} for v, s in zip(fit.parameters * scale, fit.sigma * scale, strict=True)
-    ]
-
-
-def _first(effect_id: str) -> Parameter:
-    return effect(effect_id).parameters[0]
+    own = [p for a in verdict.accepted for p in a.effect.parameters]
+    base = len(fit.parameters) - len(own)
+    pairs = list(zip(fit.parameters.tolist(), fit.sigma.tolist(), strict=True))
+    told = pairs[:base] + [p.told(*pair) for p, pair in zip(own, pairs[base:], strict=True)]
+    return [{"value": value, "sigma": sigma} for value, sigma in told]

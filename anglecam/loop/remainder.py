@@ -1,0 +1,122 @@
+"""What is left over as a torque: the residual angle, put through the plant that it is left over from.
+
+    τ = ë + a·ė + b·e
+
+A torque τ that the plant θ̈ = c·u − a·θ̇ − b·θ lacks moves its angle by the e for which this holds, whatever was
+commanded. The derivatives are those of local quadratics (Savitzky and Golay, Anal. Chem. 36, 1964; Cleveland, J. Am.
+Stat. Assoc. 74, 1979), over the longest stretch whose torque still agrees within the noise with that of every shorter
+one (Lepski, Theory Probab. Appl. 35, 1990). They are linear in the residual, so what noise alone would make of the
+torque is known frame by frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.estimate.noise import Noise
+from anglecam.estimate.output_error import Fit
+from anglecam.estimate.record import Record
+
+Floats = NDArray[np.float64]
+
+REACHES = (3, 4, 6, 8, 11, 15, 20)
+"""Half-lengths, in frames, of the stretches that are tried."""
+PARTS = 8
+"""A stretch is no longer than this part of a recording."""
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """The torque that one recording leaves over, and what it may depend on; arrays of length n."""
+
+    name: str
+    time: Floats
+    """s."""
+    torque: Floats
+    """Per moment of inertia, rad/s²."""
+    sigma: Floats
+    """Its standard deviation from the angle's noise alone, rad/s²."""
+    angle: Floats
+    """Of the model, rad."""
+    velocity: Floats
+    """Of the model, rad/s."""
+    command: Floats | None
+    """rad; ``None`` for a free swing."""
+
+
+def leftover_torque(fit: Fit, records: Sequence[Record], noise: Noise) -> list[Remainder]:
+    """Turn a fitted plant's residual into the torque that would have made it.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of a plant without effects, of which a and b are used.
+    records : sequence of Record
+        Those that were fitted.
+    noise : Noise
+        Of the angle.
+
+    Returns
+    -------
+    list of Remainder
+        One a recording, without the frames at its ends that have no full stretch about them.
+    """
+    operator = np.array([fit.parameters[1], fit.parameters[0], 1.0])
+    shortest = min(len(r.time) for r in records)
+    tried: list[list[tuple[Floats, Floats]]] = []
+    for reach in [r for r in REACHES if r == REACHES[0] or 2 * r + 1 <= shortest / PARTS]:
+        torques = [_torque(r, e, operator, reach, noise) for r, e in zip(records, fit.residuals, strict=True)]
+        if not all(_agree(torques, shorter) for shorter in tried):
+            break
+        tried.append(torques)
+    reach = REACHES[len(tried) - 1]
+    return [
+        _against(record, error, torque, sigma, slice(reach, -reach))
+        for record, error, (torque, sigma) in zip(records, fit.residuals, tried[-1], strict=True)
+    ]
+
+
+def _torque(record: Record, error: Floats, operator: Floats, reach: int, noise: Noise) -> tuple[Floats, Floats]:
+    """Return torque and standard deviation at every frame; at the ends they are one-sided."""
+    torque, sigma = np.empty(len(error)), np.empty(len(error))
+    frames = record.time / record.interval
+    for i in range(len(error)):
+        near, weights = _quadratic(record.time, i, reach)
+        row = operator @ weights
+        correlation = noise.phi ** np.abs(frames[near, None] - frames[near])
+        torque[i], sigma[i] = row @ error[near], noise.sigma * np.sqrt(row @ correlation @ row)
+    return torque, sigma
+
+
+def _agree(longer: Sequence[tuple[Floats, Floats]], shorter: Sequence[tuple[Floats, Floats]]) -> bool:
+    """Say whether two torques differ by no more than the noise of the less certain one."""
+    off = np.concatenate([new - old for (new, _), (old, _) in zip(longer, shorter, strict=True)])
+    sigma = np.concatenate([sigma for _, sigma in shorter])
+    return bool(np.sum(off**2) <= np.sum(sigma**2))
+
+
+def _against(record: Record, error: Floats, torque: Floats, sigma: Floats, kept: slice) -> Remainder:
+    path = record.angle - error
+    return Remainder(
+        record.name,
+        record.time[kept],
+        torque[kept],
+        sigma[kept],
+        path[kept],
+        np.gradient(path, record.time)[kept],
+        None if record.command is None else record.command.at(record.time)[kept],
+    )
+
+
+def _quadratic(time: Floats, at: int, reach: int) -> tuple[NDArray[np.intp], Floats]:
+    """Return the frames about one, and the (3, k) weights with which they make value, slope and curvature there."""
+    near = np.arange(max(0, at - reach), min(len(time), at + reach + 1))
+    off = time[near] - time[at]
+    unit = np.max(np.abs(off))
+    x = off / unit
+    weights = np.linalg.pinv(np.column_stack([np.ones_like(x), x, 0.5 * x**2]))
+    return near, weights / np.array([1.0, unit, unit**2])[:, None]

@@ -1,0 +1,60 @@
+"""Recordings that others made: what anglecam finds in them stands beside what they published."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT.parent / "shared" / "real"
+sys.path.append(str(ROOT / "benchmarks"))
+
+import real_data  # noqa: E402  # the benchmark's own reading of the files, not a second one
+
+emps_here = pytest.mark.skipif(not (FOLDER / "emps").is_dir(), reason="the EMPS records are not here")
+pendulum_here = pytest.mark.skipif(not (FOLDER / "single-pendulum").is_dir(), reason="the pendulum is not here")
+
+
+@pytest.fixture(scope="module")
+def drive():
+    records = real_data.records_of(real_data.write_emps, FOLDER / "emps")
+    return {name: (fit, told) for name, fit, told in real_data.fit_emps(records)}
+
+
+@emps_here
+def test_dry_friction_of_a_drive_without_stiffness_brings_the_force_error_to_the_published(drive):
+    errors = {name: real_data.force_error(real_data.carriage(fit), FOLDER / "emps") for name, (fit, _) in drive.items()}
+    assert errors["viscous"] > 0.17
+    assert errors["+ coulomb_friction"] < 0.042  # published: 4.083 %
+    assert errors["+ damping_asymmetry"] < 0.033  # published: 3.112 %
+    mass = real_data.carriage(drive["+ coulomb_friction"][0])["M, kg"]
+    assert mass == pytest.approx(95.109, rel=0.02)
+
+
+@emps_here
+def test_each_kind_of_friction_predicts_the_record_with_added_pulses_better(drive):
+    viscous, dry, uneven = (told.rmse for _, told in drive.values())
+    assert dry < 0.3 * viscous
+    assert uneven < 0.75 * dry
+
+
+@emps_here
+def test_the_published_parameters_give_the_published_force_error():
+    told = {"M, kg": 95.109, "Fv+, N·s/m": 203.5, "Fv-, N·s/m": 203.5, "Fc+, N": 17.229, "Fc-, N": 23.559}
+    assert real_data.force_error(told, FOLDER / "emps") == pytest.approx(0.04083, abs=1e-4)
+
+
+@pendulum_here
+def test_a_wide_swing_shows_the_sine_of_gravity_and_then_drag():
+    records = real_data.records_of(real_data.write_pendulum, FOLDER / "single-pendulum")
+    fits = real_data.fit_swing(records, ("quadratic_drag", 0.001))
+    linear, sine, drag = (np.degrees(told.rmse) for _, _, told in fits)
+    assert linear > 15.0
+    assert sine < 0.25
+    assert drag < 0.4 * sine
+    b, gravity = fits[-1][1].parameters[1:3]
+    assert b == pytest.approx(64.2, rel=0.005)
+    assert -gravity == pytest.approx(b, rel=0.005)  # all of the stiffness is the weight's
