@@ -10,20 +10,44 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from anglecam import __version__
+from anglecam.effects import effect
 from anglecam.files import write_atomically
 from anglecam.identify import Identified
-from anglecam.loop.close import Verdict
-from anglecam.loop.result import describe, sentence, verdict_as_dict
-from anglecam.report import figures
+from anglecam.loop.close import Verdict, applicable
+from anglecam.loop.experiment import Experiment
+from anglecam.loop.gate import Test
+from anglecam.loop.remainder import leftover_torque
+from anglecam.loop.result import NEXT_COMMAND, plain, sentence, size_of, split_unit, with_uncertainty
+from anglecam.report import loop_figures as figures
+from anglecam.report.path_figure import path_figure
 from anglecam.series import AngleSeries
 
 COLOURS = {"attributed": "#1f6f8b", "nothing_missing": "#3d7a4a", "unexplained": "#b5651d"}
+ESTIMATORS = {"ekf": "extended Kalman filter", "oe2": "output error"}
+WHOSE = {
+    "command": "It acts on what is asked, before anything turns.",
+    "actuator": "It acts between command and head, in servo and linkage.",
+    "load": "It acts on the head itself.",
+    "camera": "It is the camera's, not the mechanism's: the head moves as the model says, the film shows it otherwise.",
+}
+COLUMNS = {"sigma": "median σ, °", "bound": "6 px bound, °", "lever": "lever arm, px"}
+"""Of the table of recordings, shown where there is something in them."""
+RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+TESTS = {
+    "residual against angle": "a curve against the angle",
+    "residual against velocity": "a curve against the velocity",
+    "residual against command": "a curve against the command of late",
+    "residual against time": "a slow course over time",
+    "autocorrelation": "each frame resembling those before it",
+}
 
 
 def write_report(
     path: Path,
     title: str,
     verdict: Verdict,
+    result: dict[str, Any],
+    experiment: Experiment | None,
     series: Sequence[AngleSeries],
     models: Sequence[Identified],
     problems: Sequence[Exception],
@@ -38,6 +62,10 @@ def write_report(
         The session's name.
     verdict : Verdict
         From `anglecam.loop.close.close_records`.
+    result : dict
+        The same as ``loop.json`` holds it, from `anglecam.loop.result.verdict_as_dict`.
+    experiment : Experiment or None
+        What to record next, from `anglecam.loop.result.next_experiment`.
     series : sequence of AngleSeries
         What was measured.
     models : sequence of Identified
@@ -47,63 +75,85 @@ def write_report(
     """
     # autoescape: names of files and recordings are the user's, and SVG is marked safe where it is put in
     environment = Environment(loader=PackageLoader("anglecam.report", "."), autoescape=True, undefined=StrictUndefined)
-    environment.filters["p"] = lambda value: f"{value:.3f}" if value >= 1e-3 else "< 0.001"
-    result = verdict_as_dict(verdict)
-    floor = verdict.noise.sigma
-    held_out = {"before": verdict.before_held_out}
-    if verdict.accepted:
-        held_out["after"] = verdict.after_held_out
-    drawings = {
-        "prediction": figures.prediction_figure(verdict.fitted, verdict.before, "base model"),
-        "residual": figures.residual_figure(verdict.fitted, {"before": verdict.before}, floor),
-        "candidates": figures.candidate_figure(verdict),
-        "held_out": figures.residual_figure(verdict.held_out, held_out, floor),
-        "held_out_after": figures.residual_figure(verdict.held_out, {"after": verdict.after_held_out}, floor),
-        "shape": figures.shape_figure(verdict),
+    decimals = (
+        4
+        if verdict.noise.sigma == 0.0
+        else int(np.clip(1 - np.floor(np.log10(result["rmse_deg"]["noise_floor"])), 4, 6))
+    )
+    environment.filters |= {
+        "p": lambda p: f"{p:.3f}" if p >= 1e-3 else "< 0.001",
+        "in_words": p_in_words,
+        "plain": plain,
+        "deg": lambda value: f"{value:.{decimals}f}",
     }
+    rows = [_series_row(s) for s in series]
     text = environment.get_template("page.html").render(
         title=title,
         version=__version__,
         colour=COLOURS[verdict.verdict],
         verdict=verdict,
         sentence=sentence(verdict),
-        stations=[a.effect.station for a in verdict.accepted],
         errors=result["rmse_deg"],
         gain=verdict.gain,
-        phi=verdict.after.phi,
-        held_out=[r.name for r in verdict.held_out],
-        series=[_series_row(s) for s in series],
+        unseen=unseen_in_words(verdict),
+        series=rows,
+        columns=[{"key": key, "head": head} for key, head in COLUMNS.items() if any(row[key] for row in rows)],
         problems=[str(p) for p in problems],
         models=[_model_row(m) for m in models],
-        candidates=[
-            {
-                "id": c.effect.id,
-                "gain": c.log_likelihood_gain,
-                "held_out_gain": c.held_out_gain,
-                "held_out": np.degrees(c.prediction.rmse),
-                "relaxes": c.effect.relaxes,
-            }
-            for c in verdict.candidates
-        ],
-        found=[a.effect.id for a in verdict.accepted],
-        effects=[
-            {
-                "id": a.effect.id,
-                "summary": a.effect.summary,
-                "equation": a.effect.equation,
-                "fitted": describe(a.effect, verdict),
-                "relaxes": a.effect.relaxes,
-                "aliases": a.alias_set,
-                "mistaken": a.effect.aliases,
-                "experiment": a.effect.separating_experiment,
-            }
-            for a in verdict.accepted
-        ],
-        detectable=result["detectable"],
-        figures={name: environment.filters["safe"](svg) for name, svg in drawings.items()},
+        driven=any(r.command is not None for r in verdict.fitted),
+        tests=_test_rows(verdict.first_gate.tests),
+        candidates=_candidate_rows(verdict, result),
+        drawn=figures.MOST,
+        effects=_effect_rows(verdict, result),
+        experiment=experiment,
+        next_command=NEXT_COMMAND,
+        detectable=_detectable_rows(result),
+        undetectable=_undetectable(verdict),
+        figures={name: environment.filters["safe"](svg) for name, svg in _figures(verdict, experiment, series).items()},
     )
     with write_atomically(path) as stream:
         stream.write(text)
+
+
+def p_in_words(p: float) -> str:
+    """Say in how many sessions noise alone would do so much."""
+    if p <= 1e-3:
+        return "at most 1 of 1000"
+    of = next((n for n in (10, 100) if round(n * p) >= 1), 1000)
+    return "nearly all" if round(of * p) == of else f"{round(of * p)} of {of}"
+
+
+def unseen_in_words(verdict: Verdict) -> str:
+    """Say what the errors on unseen recordings were found on."""
+    if verdict.held_out:
+        held_out = ", ".join(r.name for r in verdict.held_out)
+        return f"Held out by declaration and never fitted to, only predicted: {held_out}."
+    return (
+        "No recording is held out by declaration. So a block of a second in five was predicted at a time, by a model"
+        " that was fitted to all other frames."
+    )
+
+
+def _figures(verdict: Verdict, experiment: Experiment | None, series: Sequence[AngleSeries]) -> dict[str, str]:
+    """Draw what the verdict needs."""
+    floor = verdict.noise.sigma
+    commands = {r.name: r.command for r in [*verdict.fitted, *verdict.held_out] if r.command is not None}
+    after = verdict.after_held_out if verdict.accepted else None
+    drawn = {
+        "measured": figures.measured_figure(series, commands),
+        "prediction": figures.prediction_figure(verdict.fitted, verdict.before.residuals),
+        "residual": figures.residual_figure(verdict.fitted, verdict.before, floor),
+        "path": path_figure(verdict),
+        "unseen": figures.unseen_figure(verdict.before_held_out, after),
+        "errors": figures.error_figure(verdict.before_held_out, after, floor),
+    }
+    if verdict.candidates:
+        drawn["candidates"] = figures.candidate_figure(verdict.candidates, [a.effect.id for a in verdict.accepted])
+    if verdict.verdict == "unexplained":
+        drawn["remainder"] = figures.remainder_figure(leftover_torque(verdict.after, verdict.fitted, verdict.noise))
+    if experiment is not None and experiment.command is not None and experiment.separated:
+        drawn["experiment"] = figures.experiment_figure(experiment, verdict)
+    return drawn
 
 
 def _series_row(series: AngleSeries) -> dict[str, Any]:
@@ -115,9 +165,10 @@ def _series_row(series: AngleSeries) -> dict[str, Any]:
     bound = series.bounds.get(6.0)
     return {
         "name": series.name,
+        "seconds": f"{series.time[-1] - series.time[0]:.1f}",
         "frames": len(ok),
         "measured": int(ok.sum()),
-        "range": f"{degrees.min():.2f} … {degrees.max():.2f}",
+        "range": f"{degrees.min():.2f} … {degrees.max():.2f}".replace("-", "−"),
         "sigma": _text(
             np.degrees(np.nanmedian(series.sigma[ok])) if np.isfinite(series.sigma[ok]).any() else None, ".4f"
         ),
@@ -127,11 +178,98 @@ def _series_row(series: AngleSeries) -> dict[str, Any]:
 
 
 def _model_row(model: Identified) -> dict[str, Any]:
-    cells = [f"{v:.5g} ± {s:.2g}" for v, s in zip(model.values[:3], model.sigmas[:3], strict=True)]
+    cells = [with_uncertainty(v, s) for v, s in zip(model.values[:3], model.sigmas[:3], strict=True)]
     cells += [""] * (3 - len(cells))
     held_out = None if model.held_out is None else np.degrees(model.held_out.rmse)
-    names = {"ekf": "extended Kalman filter", "oe2": "output error"}
-    return {"name": names[model.estimator], "cells": [*cells, _text(held_out, ".4f")]}
+    return {
+        "name": ESTIMATORS[model.estimator],
+        "cells": [*cells, f"{np.degrees(model.fit.rmse):.4f}", _text(held_out, ".4f")],
+    }
+
+
+def _test_rows(tests: Sequence[Test]) -> dict[str, list[dict[str, Any]]]:
+    """Part the tests that look for anything from those that look for one effect, most striking first."""
+    rows: dict[str, list[dict[str, Any]]] = {"any": [], "effect": []}
+    for test in sorted(tests, key=lambda t: t.p_value):
+        own = test.name.startswith("effect ")
+        name = plain(test.name.removeprefix("effect ")) if own else TESTS[test.name]
+        rows["effect" if own else "any"].append({"name": name, "p_value": test.p_value})
+    return rows
+
+
+def _candidate_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any]]:
+    found = [a.effect.id for a in verdict.accepted]
+    return [
+        {
+            "name": plain(c.effect.id),
+            "found": c.effect.id in found,
+            "station": c.effect.station,
+            "gain": c.log_likelihood_gain,
+            "predictive_gain": None if c.unseen is None else c.predictive_gain,
+            "held_out": told["held_out_rmse_deg"],
+            "relaxes": c.effect.relaxes,
+        }
+        for c, told in zip(verdict.candidates, result["candidates"], strict=True)
+    ]
+
+
+def _effect_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any]]:
+    return [
+        {
+            "id": a.effect.id,
+            "name": plain(a.effect.id),
+            "summary": a.effect.summary,
+            "equation": a.effect.equation,
+            "fitted": [
+                {
+                    "name": split_unit(name)[0],
+                    "value": with_uncertainty(told["value"], told["sigma"]),
+                    "unit": _unit(name),
+                }
+                for name, told in shown["parameters"].items()
+            ],
+            "relaxes": a.effect.relaxes,
+            "whose": WHOSE[a.effect.station],
+            "rivals": [
+                {"name": plain(name), "summary": effect(name).summary, "station": effect(name).station}
+                for name in a.rivals
+            ],
+            "mistaken": [plain(name) for name in a.effect.aliases],
+            "experiment": a.effect.separating_experiment,
+        }
+        for a, shown in zip(verdict.accepted, result["effects"], strict=True)
+    ]
+
+
+def _detectable_rows(result: dict[str, Any]) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": plain(d["id"]),
+            "what": split_unit(size_of(d["id"]).name)[0],
+            "least": "at most" if size_of(d["id"]).inverse else "at least",
+            "size": _number(d["smallest"]),
+            "unit": _unit(size_of(d["id"]).name),
+        }
+        for d in sorted(result["detectable"], key=lambda d: d["id"])
+    ]
+
+
+def _undetectable(verdict: Verdict) -> list[str]:
+    """Name the effects that would not have been seen at any size that was looked at."""
+    told = {*verdict.last_gate.detectable, *(a.effect.id for a in verdict.accepted)}
+    return [plain(e.id) for e in applicable([*verdict.fitted, *verdict.held_out]) if e.id not in told]
+
+
+def _unit(name: str) -> str:
+    """Return a parameter's unit as it is written behind a number."""
+    words = split_unit(name)[1].replace("deg", "°").replace("s2", "s²")
+    return words if words == "°" else " " + words
+
+
+def _number(value: float) -> str:
+    """Write a number to three digits, far powers of ten as such."""
+    mantissa, _, power = f"{float(f'{value:.3g}'):g}".partition("e")
+    return mantissa + (f"·10{str(int(power)).translate(RAISED)}" if power else "")
 
 
 def _text(value: float | None, form: str) -> str:

@@ -9,7 +9,8 @@ from rich.table import Table
 
 from anglecam.identify import Identified
 from anglecam.loop.close import Verdict
-from anglecam.loop.result import describe, sentence
+from anglecam.loop.experiment import Experiment
+from anglecam.loop.result import NEXT_COMMAND, describe, sentence
 from anglecam.measure import Measurement
 from anglecam.response import Figure, Response
 
@@ -89,17 +90,20 @@ def model_table(models: Sequence[Identified]) -> Table:
     return table
 
 
-def loop_table(verdict: Verdict) -> Table:
+def loop_table(verdict: Verdict, experiment: Experiment | None = None) -> Table:
     """Tabulate a verdict."""
     table = Table("verdict", verdict.verdict.replace("_", " "), title=sentence(verdict), title_justify="left")
     for accepted in verdict.accepted:
         table.add_row(accepted.effect.id, describe(accepted.effect, verdict))
         if len(accepted.alias_set) > 1:
             table.add_row("not told apart from", ", ".join(accepted.alias_set[1:]))
+    if experiment is not None and experiment.separated:
+        file = "" if experiment.command is None else f": {NEXT_COMMAND}"
+        table.add_row("film this next", f"{experiment.description}, {experiment.duration:g} s{file}")
     before, after = np.degrees(verdict.before_held_out.rmse), np.degrees(verdict.after_held_out.rmse)
-    table.add_row("held-out error, ° RMS", f"{before:.4f} before, {after:.4f} after")
+    table.add_row("error on unseen recordings, ° RMS", f"{before:.4f} before, {after:.4f} after")
     table.add_row("noise floor, ° RMS", f"{np.degrees(verdict.noise.sigma):.4f} ({verdict.noise.source})")
     table.add_row("p of the base model's residual", f"{verdict.first_gate.p_value:.3f}")
     if verdict.verdict != "unexplained" and not verdict.last_gate.passed:
-        table.add_row("what still shows", "less than half of the noise; not traced")
+        table.add_row("what still shows", "no more than the angle's uncertainty; not traced")
     return table

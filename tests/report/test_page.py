@@ -8,38 +8,142 @@ from html import unescape
 import numpy as np
 import pytest
 
+from anglecam.effects import effect
+from anglecam.estimate.output_error import fit_output_error
 from anglecam.identify import identify_records
-from anglecam.loop.close import close_records
-from anglecam.loop.result import sentence
-from anglecam.report.page import write_report
+from anglecam.loop.close import Accepted, close_records
+from anglecam.loop.experiment import Experiment
+from anglecam.loop.result import next_experiment, sentence, split_unit, verdict_as_dict, write_next_command
+from anglecam.report.page import p_in_words, unseen_in_words, write_report
 from anglecam.rig import Rig
 from anglecam.series import AngleSeries
+from anglecam.session import Command, read_command
 from support.motion import Plant
 from support.series import session
 
 
-def _shaken(record):
-    return replace(record, angle=record.angle + np.radians(0.4) * np.sin(8.0 * record.time))
+@pytest.fixture
+def write(tmp_path):
+    """Return what writes the page of a verdict and reads it."""
+
+    def page(found, experiment=None, problems=()):
+        records = [*found.fitted, *found.held_out]
+        series = [AngleSeries(r.name, r.time, r.angle, r.sigma, ("ok",) * len(r.time)) for r in records]
+        model = identify_records(found.fitted, Rig(), "oe2", held_out=found.held_out)
+        path = tmp_path / "report.html"
+        result = verdict_as_dict(found, experiment)
+        write_report(path, "a <b> & c", found, result, experiment, series, [model], problems)
+        return path.read_text()
+
+    return page
 
 
-@pytest.mark.parametrize(
-    ("plant", "change", "verdict", "svgs"),
-    [
-        (Plant(quadratic_drag=2.0), lambda r: r, "attributed", 5),
-        (Plant(), lambda r: r, "nothing_missing", 4),
-        (Plant(), _shaken, "unexplained", 5),
-    ],
-)
-def test_the_page_tells_the_verdict(tmp_path, plant, change, verdict, svgs):
-    records = [change(r) for r in session(plant, 21)]
-    found = close_records(records, held_out=["random"])
-    assert found.verdict == verdict
-    series = [AngleSeries(r.name, r.time, r.angle, r.sigma, ("ok",) * len(r.time)) for r in records]
-    model = identify_records(found.fitted, Rig(), "oe2", held_out=found.held_out)
-    write_report(tmp_path / "report.html", "a <b> & c", found, series, [model], [])
-    page = unescape((tmp_path / "report.html").read_text())
+@pytest.fixture(scope="module")
+def dragged():
+    """Return the verdict on recordings of a head with drag, none of them held out."""
+    return close_records(session(Plant(quadratic_drag=2.0), 21))
+
+
+@pytest.mark.parametrize(("verdict", "svgs"), [("nothing_missing", 7), ("unexplained", 8)])
+def test_the_page_tells_the_verdict(write, dragged, verdict, svgs):
+    found = replace(dragged, verdict=verdict, accepted=(), after=dragged.before, after_held_out=dragged.before_held_out)
+    text = write(found)
+    page = unescape(text)
     assert page.count("<svg") == svgs
     assert f"{np.degrees(found.before_held_out.rmse):.4f}" in page
     assert sentence(found) in page
+    assert ("What would have been seen" in page) == (verdict == "nothing_missing")
     assert "a <b> & c" in page
-    assert "a <b>" not in (tmp_path / "report.html").read_text()  # a session's name is text, not markup
+    assert "a <b>" not in text  # a session's name is text, not markup
+
+
+def test_what_is_held_out_is_named(dragged):
+    told = unseen_in_words(replace(dragged, held_out=dragged.fitted[-1:]))
+    assert told == f"Held out by declaration and never fitted to, only predicted: {dragged.fitted[-1].name}."
+
+
+def test_without_a_declaration_the_page_says_that_blocks_were_predicted_in_turn(write, dragged):
+    page = unescape(write(dragged, problems=[ValueError("swing.avi: no mouth")]))
+    assert sentence(dragged) in page
+    assert "a block of a second in five was predicted at a time" in page
+    assert page.count("<svg") == 7
+    assert "swing.avi: no mouth" in page
+    for record in dragged.fitted:
+        assert f"{record.name}</text>" in page
+
+
+def test_every_candidate_has_its_error_on_what_it_had_not_seen(dragged):
+    result = verdict_as_dict(dragged)
+    assert len(result["candidates"]) == len(dragged.candidates)
+    assert all(np.isfinite(c["held_out_rmse_deg"]) for c in result["candidates"])
+    untried = [c for c, one in zip(result["candidates"], dragged.candidates, strict=True) if one.told is None]
+    assert all(c["held_out_rmse_deg"] > result["rmse_deg"]["after"]["held_out"] for c in untried)
+
+
+def test_rivals_are_named_with_the_command_to_play_next(write, dragged):
+    (found,) = dragged.accepted
+    plant = dragged.before.model.with_effect(effect("dead_time"))
+    start = np.append(dragged.before.parameters, 0.01)
+    rival = fit_output_error(plant, dragged.fitted, [start], phi=dragged.after.phi)
+    doubted = replace(dragged, accepted=(Accepted(found.effect, {"dead_time": rival}),))
+    command = Command(np.array([0.0, 0.5, 2.0]), np.radians([0.0, 10.0, 0.0]))
+    pair = ("quadratic_drag", "dead_time")
+    experiment = Experiment(command, "one step to 10° and back", 4.0, {pair: 5.0})
+    page = unescape(write(doubted, experiment))
+    assert "(or it is dead time, which these recordings cannot tell from it)" in sentence(doubted)
+    assert "Film this next:</b> one step to 10° and back, 4 s in all" in page
+    assert "next.command.csv" in page
+    assert page.count("<svg") == 8
+    (told,) = verdict_as_dict(doubted, experiment)["effects"]
+    assert told["alias_set"] == list(pair)
+    assert told["separating_experiment"].startswith(found.effect.separating_experiment)
+    assert told["separating_experiment"].endswith("one step to 10° and back, 4 s (next.command.csv)")
+    # nothing to play where no command tells them apart
+    helpless = replace(experiment, separations={pair: 1.0})
+    assert verdict_as_dict(doubted, helpless)["effects"][0]["separating_experiment"] == (
+        found.effect.separating_experiment
+    )
+
+
+def test_a_command_that_tells_nothing_apart_is_not_offered_nor_an_old_one_left(tmp_path):
+    command = Command(np.array([0.0, 0.5]), np.radians([0.0, 10.0]))
+    telling = Experiment(command, "one step", 4.0, {("backlash", "dead_zone"): 5.0})
+    write_next_command(telling, tmp_path)
+    read = read_command(tmp_path / "next.command.csv")
+    assert read.angle == pytest.approx(command.angle)
+    for other in (replace(telling, separations={("backlash", "dead_zone"): 1.0}), replace(telling, command=None), None):
+        write_next_command(telling, tmp_path)
+        write_next_command(other, tmp_path)
+        assert not (tmp_path / "next.command.csv").exists()
+
+
+def test_nothing_is_to_be_filmed_where_nothing_is_in_doubt(dragged):
+    assert all(not a.rivals for a in dragged.accepted)
+    assert next_experiment(dragged) is None
+
+
+def test_what_the_camera_does_is_said_to_be_the_cameras(dragged):
+    found = replace(dragged, accepted=(Accepted(effect("angle_drift"), {}),))
+    assert "the camera's doing and not the mechanism's" in sentence(found)
+    assert "camera" not in sentence(dragged)
+
+
+@pytest.mark.parametrize(
+    ("name", "parted"),
+    [
+        ("half_width_deg", ("half width", "deg")),
+        ("friction_deg_per_s2", ("friction", "deg/s2")),
+        ("q_per_rad", ("q", "1/rad")),
+        ("row_time_s", ("row time", "s")),
+        ("shortening", ("shortening", "")),
+    ],
+)
+def test_a_parameters_name_is_parted_from_its_unit(name, parted):
+    assert split_unit(name) == parted
+
+
+@pytest.mark.parametrize(
+    ("p", "words"), [(0.0, "at most 1 of 1000"), (0.004, "4 of 1000"), (0.03, "3 of 100"), (0.3, "3 of 10")]
+)
+def test_how_often_noise_does_so_much_is_said_in_sessions(p, words):
+    assert p_in_words(p) == words

@@ -1,0 +1,286 @@
+"""The figures of the loop's report, each an ``<svg>`` element."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from anglecam.estimate.output_error import Fit
+from anglecam.estimate.record import Record
+from anglecam.loop.attribute import Candidate
+from anglecam.loop.close import Verdict
+from anglecam.loop.experiment import SETTLE, Experiment
+from anglecam.loop.holdout import Prediction
+from anglecam.loop.remainder import Remainder
+from anglecam.loop.result import plain
+from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, STYLE, _svg
+from anglecam.series import AngleSeries
+from anglecam.session import Command
+from anglecam.simulate.plant import Plant
+
+Floats = NDArray[np.float64]
+
+WIDTH = 9.6
+MOST = 8
+"""Recordings that are drawn; those with the largest errors where there are more."""
+BINS, LEAST = 16, 5
+"""Classes of a mean, and frames that one must have."""
+COLOURS = {"base model": BEFORE, "before": BEFORE, "after": AFTER}
+
+
+def measured_figure(series: Sequence[AngleSeries], commands: dict[str, Command]) -> str:
+    """Draw every recording's angle over time and its command, frames without an angle marked."""
+
+    def draw(axes: Axes, i: int) -> None:
+        one = series[i]
+        if one.name in commands:
+            _draw_command(axes, commands[one.name], one.time)
+        axes.plot(one.time, np.degrees(one.angle), color=MEASURED, lw=1.1, label="measured angle")
+        for t in one.time[~one.ok]:
+            axes.axvline(t, color=BEFORE, lw=0.6, alpha=0.5)
+
+    return _panels([s.name for s in series], draw, "angle, °")
+
+
+def prediction_figure(records: Sequence[Record], residuals: Sequence[Floats]) -> str:
+    """Draw the angle that the base model predicts over the one that was measured."""
+    names = labels(records)
+    worst = _worst(residuals)
+
+    def draw(axes: Axes, i: int) -> None:
+        record, error = records[worst[i]], residuals[worst[i]]
+        axes.plot(record.time, np.degrees(record.angle), ".", color=MEASURED, ms=2.5, label="measured")
+        axes.plot(record.time, np.degrees(record.angle - error), color=BEFORE, lw=1.0, label="base model, in free run")
+
+    return _panels([names[i] for i in worst], draw, "angle, °")
+
+
+def residual_figure(records: Sequence[Record], fit: Fit, floor: float) -> str:
+    """Draw what a model leaves over, with the band of the noise (standard deviation ``floor``, rad)."""
+    names, worst = labels(records), _worst(fit.residuals)
+
+    def draw(axes: Axes, i: int) -> None:
+        _draw_band(axes, floor)
+        axes.plot(
+            records[worst[i]].time, np.degrees(fit.residuals[worst[i]]), color=BEFORE, lw=0.9, label="measured − model"
+        )
+
+    return _panels([names[i] for i in worst], draw, "residual, °")
+
+
+def candidate_figure(candidates: Sequence[Candidate], found: Sequence[str]) -> str:
+    """Draw the evidence for every candidate; those that were found stand out."""
+    with plt.rc_context(STYLE):
+        ordered = candidates[::-1]
+        figure, ax = plt.subplots(figsize=(7.6, 0.9 + 0.42 * len(ordered)), layout="constrained")
+        rows = np.arange(len(ordered))
+        fitted = [c.log_likelihood_gain if np.isfinite(c.log_likelihood_gain) else 0.0 for c in ordered]
+        unseen = [c.predictive_gain if np.isfinite(c.predictive_gain) else 0.0 for c in ordered]
+        ax.barh(rows + 0.19, fitted, 0.36, color=COMMAND, label="on the recordings that it was fitted to")
+        ax.barh(rows - 0.19, unseen, 0.36, color=AFTER, label="on recordings that it had not seen")
+        for row, candidate in zip(rows, ordered, strict=True):
+            if candidate.unseen is None:
+                ax.annotate("not tried", (0.0, row - 0.19), (4, 0), textcoords="offset points", va="center", fontsize=7)
+        ax.set_yticks(rows, [plain(c.effect.id) for c in ordered])
+        for tick, candidate in zip(ax.get_yticklabels(), ordered, strict=True):
+            tick.set_fontweight("bold" if candidate.effect.id in found else "normal")
+        if max(np.abs([*fitted, *unseen]), default=0.0) > 100.0:
+            ax.set_xscale("symlog", linthresh=10.0)
+        ax.axvline(0.0, color=MEASURED, lw=0.8)
+        ax.grid(axis="y", visible=False)
+        ax.set_xlabel("log-likelihood gained over the base model")
+        figure.legend(loc="outside upper left", ncols=2, fontsize=8)
+        return _svg(figure)
+
+
+def unseen_figure(before: Prediction, after: Prediction | None) -> str:
+    """Draw the recording that the base model predicts worst, as predicted before and after; it was fitted to neither.
+
+    ``after`` is ``None`` where nothing was added.
+    """
+    i = _worst(before.residuals, 1)[0]
+    record = before.records[i]
+    told = {"base model": before} if after is None else {"before": before, "after": after}
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(
+            1, len(told), figsize=(WIDTH, 2.7), sharex=True, sharey=True, squeeze=False, layout="constrained"
+        )
+        for ax, (label, prediction) in zip(axes[0], told.items(), strict=True):
+            ax.plot(record.time, np.degrees(record.angle), ".", color=MEASURED, ms=3, label="measured")
+            path = record.angle - prediction.residuals[i]
+            ax.plot(record.time, np.degrees(path), color=COLOURS[label], lw=1.2, label="predicted")
+            ax.set_title(f"{labels(before.records)[i]}, {label}", loc="left", fontsize=9)
+            ax.set_xlabel("time, s")
+            ax.legend(fontsize=8)
+        axes[0, 0].set_ylabel("angle, °")
+        return _svg(figure)
+
+
+def error_figure(before: Prediction, after: Prediction | None, floor: float) -> str:
+    """Draw the errors on unseen recordings: before and after on one scale, and after on its own beside it."""
+    worst = _worst(before.residuals)
+    names = labels(before.records)
+    columns = 1 if after is None else 2
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(
+            len(worst),
+            columns,
+            figsize=(WIDTH, 0.6 + 1.25 * len(worst)),
+            squeeze=False,
+            layout="constrained",
+            sharex="row",
+        )
+        for row, i in zip(axes, worst, strict=True):
+            time = before.records[i].time
+            for ax in row:
+                _draw_band(ax, floor)
+            row[0].plot(
+                time,
+                np.degrees(before.residuals[i]),
+                color=BEFORE,
+                lw=0.9,
+                label="error" if after is None else "error before",
+            )
+            if after is not None:
+                for ax in row:
+                    ax.plot(time, np.degrees(after.residuals[i]), color=AFTER, lw=0.9, label="error after")
+                row[1].set_title("after, on its own scale", loc="left", fontsize=8, color="#5c6670")
+            row[0].set_title(names[i], loc="left", fontsize=9)
+            row[0].set_ylabel("error, °")
+        for ax in axes[-1]:
+            ax.set_xlabel("time, s")
+        handles, texts = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, texts, loc="outside upper right", ncols=3, fontsize=8)
+        return _svg(figure)
+
+
+def remainder_figure(remainders: Sequence[Remainder]) -> str:
+    """Draw the torque that is left over against angle, velocity, command and time; points, and their means."""
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(2, 2, figsize=(WIDTH, 5.4), sharey=True, layout="constrained")
+        torque = np.degrees(np.concatenate([r.torque for r in remainders]))
+        noise = 2.0 * np.degrees(float(np.median(np.concatenate([r.sigma for r in remainders]))))
+        against = {
+            "angle of the model, °": np.degrees(np.concatenate([r.angle for r in remainders])),
+            "velocity of the model, °/s": np.degrees(np.concatenate([r.velocity for r in remainders])),
+        }
+        if any(r.command is not None for r in remainders):
+            commands = [np.zeros(len(r.time)) if r.command is None else r.command for r in remainders]
+            against["command, °"] = np.degrees(np.concatenate(commands))
+        else:
+            axes[1, 1].set_axis_off()
+        for ax in axes.flat[: len(against) + 1]:
+            ax.axhspan(-noise, noise, color=FAINT, zorder=0, label="noise alone, ±2σ")
+        for ax, (label, x) in zip(axes.flat, against.items(), strict=False):
+            ax.plot(x, torque, ".", color=AFTER, ms=2.5, alpha=0.35, label="frame")
+            ax.plot(*_means(x, torque), "o-", color=MEASURED, ms=4, lw=1.2, label="mean")
+            ax.set_xlabel(label)
+        last = axes.flat[len(against)]
+        for remainder in remainders:
+            last.plot(remainder.time, np.degrees(remainder.torque), lw=0.8, label=remainder.name)
+        last.set_xlabel("time, s")
+        if len(remainders) <= MOST:
+            handles, names = last.get_legend_handles_labels()
+            last.legend(handles[1:], names[1:], fontsize=7, ncols=2)
+        for ax in axes[:, 0]:
+            ax.set_ylabel("torque left over, °/s²")
+        handles, names = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, names, loc="outside upper right", ncols=3, fontsize=8)
+        return _svg(figure)
+
+
+def experiment_figure(experiment: Experiment, verdict: Verdict) -> str:
+    """Draw the next command, and by how much the rivals' predictions part from the model's own."""
+    command = experiment.command
+    if command is None:
+        raise ValueError("a free swing has no command to draw")
+    time = np.arange(0.0, experiment.duration, verdict.fitted[0].interval)
+    own = _foretell(verdict.after, command, time, verdict.fitted[0])
+    with plt.rc_context(STYLE):
+        figure, (top, bottom) = plt.subplots(
+            2, 1, figsize=(WIDTH, 3.6), sharex=True, height_ratios=(3, 2), layout="constrained"
+        )
+        _draw_command(top, command, time)
+        found = " + ".join(plain(a.effect.id) for a in verdict.accepted)
+        top.plot(time, np.degrees(own), color=AFTER, lw=1.2, label=f"angle expected with {found}")
+        top.set_ylabel("angle, °")
+        _draw_band(bottom, verdict.noise.sigma)
+        for accepted in verdict.accepted:
+            for name, fit in accepted.rivals.items():
+                apart = _foretell(fit, command, time, verdict.fitted[0]) - own
+                bottom.plot(
+                    time, np.degrees(apart), lw=1.0, label=f"{plain(name)} instead of {plain(accepted.effect.id)}"
+                )
+        bottom.set(xlabel="time, s", ylabel="difference, °")
+        handles, names = top.get_legend_handles_labels()
+        more, others = bottom.get_legend_handles_labels()
+        figure.legend([*handles, *more], [*names, *others], loc="outside upper left", ncols=2, fontsize=8)
+        return _svg(figure)
+
+
+def labels(records: Sequence[Record]) -> list[str]:
+    """Name recordings; of parts of one recording also when they are."""
+    names = [r.name for r in records]
+    return [r.name if names.count(r.name) == 1 else f"{r.name}, {r.time[0]:.1f} … {r.time[-1]:.1f} s" for r in records]
+
+
+def _foretell(fit: Fit, command: Command, time: Floats, like: Record) -> Floats:
+    """Predict an angle from rest, seen as ``like`` was."""
+    if not isinstance(fit.model, Plant):
+        raise TypeError("only a Plant has rivals")
+    held = Command(np.zeros(1), command.angle[:1])
+    state = fit.model.run(fit.parameters, np.array([0.0, SETTLE]), held, np.zeros(2))[-1]
+    return fit.model.predict(fit.parameters, time, command, state, like.view)
+
+
+def _means(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Average over classes of equal width that have `LEAST` frames."""
+    edges = np.linspace(x.min(), np.nextafter(x.max(), np.inf), BINS + 1)
+    inside = [(x >= low) & (x < high) for low, high in pairwise(edges)]
+    full = [i for i in inside if i.sum() >= LEAST]
+    return np.array([x[i].mean() for i in full]), np.array([y[i].mean() for i in full])
+
+
+def _worst(residuals: Sequence[Floats], most: int = MOST) -> list[int]:
+    """Return the indices of those with the largest errors, in their own order."""
+    size = [float(np.sqrt(np.mean(r**2))) for r in residuals]
+    return sorted(sorted(range(len(size)), key=lambda i: -size[i])[:most])
+
+
+def _draw_command(axes: Axes, command: Command, time: Floats) -> None:
+    inside = (command.time > time[0]) & (command.time < time[-1])
+    knots = np.concatenate([time[:1], command.time[inside], time[-1:]])
+    axes.step(knots, np.degrees(command.at(knots)), where="post", color=COMMAND, lw=0.9, label="command")
+
+
+def _draw_band(axes: Axes, floor: float) -> None:
+    axes.axhspan(-2.0 * np.degrees(floor), 2.0 * np.degrees(floor), color=FAINT, zorder=0, label="noise, ±2σ")
+
+
+def _panels(names: Sequence[str], draw: Callable[[Axes, int], None], ylabel: str) -> str:
+    """Draw a panel a recording, in two columns where there are several."""
+    n = len(names)
+    columns = 1 if n == 1 else 2
+    rows = -(-n // columns)
+    settings: dict[str, Any] = {"squeeze": False, "layout": "constrained", "sharey": True}
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(rows, columns, figsize=(WIDTH, 0.6 + 1.45 * rows), **settings)
+        for i, ax in enumerate(axes.flat):
+            if i >= n:
+                ax.set_axis_off()
+                continue
+            draw(ax, i)
+            ax.set_title(names[i], loc="left", fontsize=9)
+            if i % columns == 0:
+                ax.set_ylabel(ylabel)
+            if i >= n - columns:
+                ax.set_xlabel("time, s")
+        handles, texts = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, texts, loc="outside upper right", ncols=3, fontsize=8)
+        return _svg(figure)

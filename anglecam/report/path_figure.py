@@ -1,0 +1,219 @@
+"""The signal's path, command → actuator → load → camera, with what was looked for and what was found at each station.
+
+What was found is drawn as it acts: an effect's own function, with its fitted parameters, over what these recordings
+went through.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import FancyBboxPatch
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from anglecam.effects import Effect, Knots
+from anglecam.estimate.output_error import Fit
+from anglecam.estimate.record import Record
+from anglecam.loop.close import Verdict, applicable
+from anglecam.loop.result import plain
+from anglecam.report.figures import AFTER, COMMAND, MEASURED, STYLE, _svg
+from anglecam.session import Command
+
+Floats = NDArray[np.float64]
+
+STATIONS = {
+    "command": "what is asked",
+    "actuator": "what servo and linkage make of it",
+    "load": "how the head moves under it",
+    "camera": "what the film shows of that",
+}
+TICK = 1e-3
+"""s; commands are looked at this finely."""
+STRETCHES = (0.6, 0.2, 0.06)
+"""s of a command that are shown: the first in which the effect shows."""
+SHOWS = 0.1
+"""Mean change, as a share of the command's movement, that shows."""
+LEAST_MOVE = 0.05
+"""Share of the command's range by which it moves at least in what is shown."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """An effect's own function."""
+
+    x: Floats
+    y: Floats
+    xlabel: str
+    ylabel: str
+    asked: Floats | None = None
+    """Without the effect, where it turns one curve into another."""
+
+
+def path_figure(verdict: Verdict) -> str:
+    """Draw the path as SVG: a box a station, under it what was looked for there, and what was found as it acts."""
+    looked = applicable([*verdict.fitted, *verdict.held_out])
+    found = [a.effect for a in verdict.accepted]
+    instead = {name for a in verdict.accepted for name in a.rivals}
+    lists = {station: [e for e in looked if e.station == station] for station in STATIONS}
+    lines = max(len(listed) for listed in lists.values())
+    here = {station: [e for e in found if e.station == station] for station in STATIONS}
+    rows = max(len(effects) for effects in here.values())
+    heights = [0.75 + 0.17 * lines, *(2.0 for _ in range(rows))]
+    with plt.rc_context(STYLE):
+        figure = plt.figure(figsize=(9.6, sum(heights)), layout="constrained")
+        grid = figure.add_gridspec(1 + rows, len(STATIONS), height_ratios=heights)
+        path = figure.add_subplot(grid[0, :])
+        path.set(xlim=(0.0, 4.0), ylim=(-heights[0] + 0.75, 0.75))
+        path.set_axis_off()
+        for i, (station, what) in enumerate(STATIONS.items()):
+            _draw_station(path, i, station, what, bool(here[station]))
+            for line, effect in enumerate(lists[station]):
+                _draw_name(path, i, line, effect, effect in found, effect.id in instead)
+            for row, effect in enumerate(here[station]):
+                _draw_curve(figure.add_subplot(grid[1 + row, i]), effect, verdict)
+        return _svg(figure)
+
+
+def curve_of(effect: Effect, fit: Fit, records: Sequence[Record]) -> Curve:
+    """Evaluate what a fitted effect does over what recordings went through.
+
+    Parameters
+    ----------
+    effect : Effect
+        One of the fitted plant's.
+    fit : Fit
+        Of a plant with it.
+    records : sequence of Record
+        Those that were fitted.
+
+    Returns
+    -------
+    Curve
+        In degrees, seconds and milliseconds.
+    """
+    own = np.array([fit.parameters[fit.model.names.index(p.name)] for p in effect.parameters])
+    if effect.port in ("command", "lag"):
+        return _command_curve(effect, own, records)
+    angles = [r.angle - e for r, e in zip(records, fit.residuals, strict=True)]
+    if effect.port in ("when", "seen"):
+        return _camera_curve(effect, own, records, angles)
+    angle = np.concatenate(angles)
+    rates = [np.gradient(a, r.time) for a, r in zip(angles, records, strict=True)]
+    velocity = np.concatenate(rates)
+    if effect.port == "dry":
+        up, down, breakaway, speed = effect.dry(own)
+        omega = np.linspace(velocity.min(), velocity.max(), 400)
+        level = np.where(omega > 0.0, up, down)
+        if speed > 0.0:
+            level = level + np.maximum(breakaway - level, 0.0) * np.exp(-((omega / speed) ** 2))
+        return Curve(
+            np.degrees(omega), -np.degrees(np.sign(omega) * level), "velocity, °/s", "torque of friction, °/s²"
+        )
+    if effect.port == "load":
+        torque = np.array([effect.load(t, w, own) for t, w in zip(angle, velocity, strict=True)])
+        turns = np.ptp([effect.load(0.0, w, own) for w in velocity]) > 0.0
+        x, name = (velocity, "velocity, °/s") if turns else (angle, "angle, °")
+        return _ordered(np.degrees(x), np.degrees(torque), name, "torque added, °/s²")
+    abc = np.zeros(3)
+    abc[: min(3, len(fit.parameters))] = fit.parameters[:3]
+    levels = [np.zeros(len(r.time)) if r.command is None else r.command.at(r.time) for r in records]
+    asked = abc[2] * np.concatenate(levels) - abc[1] * angle
+    given = np.array([effect.servo(q, t, abc, own) for q, t in zip(asked, angle, strict=True)])
+    return _ordered(np.degrees(asked), np.degrees(given), "torque asked for, °/s²", "torque given, °/s²", True)
+
+
+def _command_curve(effect: Effect, own: Floats, records: Sequence[Record]) -> Curve:
+    """Pick the stretch of command of whose movement the effect takes the largest share."""
+    runs = [(r, r.command, np.arange(r.time[0], r.time[-1], TICK)) for r in records if r.command is not None]
+    pairs = [(r.name, t, c.at(t), _arriving(effect, own, c, t)) for r, c, t in runs]
+    least = LEAST_MOVE * max(float(np.ptp(asked)) for _, _, asked, _ in pairs)
+    best: Curve | None = None
+    most = 0.0
+    for stretch in STRETCHES:
+        size = round(stretch / TICK)
+        for name, time, asked, arriving in pairs:
+            for start in range(0, len(time) - size, max(1, size // 6)):
+                part = slice(start, start + size)
+                move = float(np.ptp(asked[part]))
+                both = np.concatenate([asked[part], arriving[part]])
+                share = float(np.mean(np.abs(arriving - asked)[part]) / max(np.ptp(both), least))
+                if move >= least and share > most:
+                    most = share
+                    told = np.degrees(arriving[part]), f"time in {name}, s", "command, °", np.degrees(asked[part])
+                    best = Curve(time[part], *told)
+        if most >= SHOWS:
+            break
+    if best is None:
+        raise ValueError(f"{effect.id}: no command moves for long enough to draw it")
+    return best
+
+
+def _arriving(effect: Effect, own: Floats, command: Command, time: Floats) -> Floats:
+    """Return the command that arrives, every `TICK`."""
+    asked = command.at(time)
+    if effect.lag is not None:
+        kept = float(np.exp(-TICK / max(effect.lag(own), 1e-9)))
+        return asked[0] + lfilter([0.0, 1.0 - kept], [1.0, -kept], asked - asked[0])  # from rest at the first level
+    if effect.command is None:
+        raise TypeError(f"{effect.id} does not act on the command")
+    knots = effect.command(Knots(command.time, command.angle, np.zeros(len(command.time))), own)
+    at = np.maximum(np.searchsorted(knots.time, time, side="right") - 1, 0)
+    since = np.maximum(time - knots.time[at], 0.0)  # before the first knot its level holds
+    return knots.level[at] + knots.slope[at] * since
+
+
+def _camera_curve(effect: Effect, own: Floats, records: Sequence[Record], angles: Sequence[Floats]) -> Curve:
+    act, factor, name = effect.seen, 180.0 / np.pi, "angle shown − true, °"
+    if act is None:
+        act, factor, name = effect.when, 1e3, "time shown − true, ms"
+
+    def change(record: Record, angle: Floats) -> Floats:
+        assert act is not None  # one of the two ports is filled
+        return factor * (act(record.time, angle, own, record.view) - (angle if effect.seen else record.time))
+
+    creeps = any(np.ptp(change(r, np.zeros(len(r.time)))) > 0.0 for r in records)
+    x = [r.time - r.time[0] if creeps else np.degrees(a) for r, a in zip(records, angles, strict=True)]
+    y = [change(r, a) for r, a in zip(records, angles, strict=True)]
+    sign = 1.0 if effect.seen else -1.0
+    return _ordered(np.concatenate(x), sign * np.concatenate(y), "time, s" if creeps else "angle, °", name)
+
+
+def _ordered(x: Floats, y: Floats, xlabel: str, ylabel: str, beside_itself: bool = False) -> Curve:
+    order = np.argsort(x)
+    return Curve(x[order], y[order], xlabel, ylabel, x[order] if beside_itself else None)
+
+
+def _draw_station(axes: Axes, i: int, station: str, what: str, found: bool) -> None:
+    colour = AFTER if found else "white"
+    box = FancyBboxPatch((i + 0.06, 0.12), 0.82, 0.5, "round,pad=0,rounding_size=0.05", fc=colour, ec=AFTER, lw=1.2)
+    axes.add_patch(box)
+    ink = "white" if found else MEASURED
+    axes.text(i + 0.47, 0.44, station, ha="center", va="center", color=ink, fontsize=11, fontweight="bold")
+    axes.text(i + 0.47, 0.24, what, ha="center", va="center", color=ink, fontsize=6.8)
+    if i + 1 < len(STATIONS):
+        axes.annotate("", (i + 1.06, 0.37), (i + 0.88, 0.37), arrowprops={"arrowstyle": "-|>", "color": AFTER})
+
+
+def _draw_name(axes: Axes, i: int, line: int, effect: Effect, found: bool, instead: bool) -> None:
+    y = -0.06 - 0.17 * line
+    mark = "● " if found else "? " if instead else ""
+    weight, colour = ("bold", AFTER) if found else ("normal", MEASURED if instead else "#5c6670")
+    axes.text(i + 0.1, y, mark + plain(effect.id), va="center", fontsize=8, fontweight=weight, color=colour)
+
+
+def _draw_curve(axes: Axes, effect: Effect, verdict: Verdict) -> None:
+    curve = curve_of(effect, verdict.after, verdict.fitted)
+    if curve.asked is not None:
+        axes.plot(curve.x, curve.asked, color=COMMAND, lw=1.0, ls="--", label="without it")
+    axes.plot(curve.x, curve.y, color=AFTER, lw=1.5, label="with it")
+    if curve.asked is not None:
+        axes.legend(fontsize=7)
+    axes.set_xlabel(curve.xlabel, fontsize=8)
+    axes.set_ylabel(curve.ylabel, fontsize=8)
+    axes.set_title(plain(effect.id), fontsize=9, fontweight="bold", color=AFTER)
+    axes.tick_params(labelsize=7)

@@ -1,0 +1,62 @@
+"""What an effect is drawn as, against what it does."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from anglecam.effects import effect
+from anglecam.report.path_figure import curve_of
+from anglecam.simulate.plant import Plant
+from support.motion import Plant as TruePlant
+from support.series import session
+
+
+@pytest.fixture(scope="module")
+def records():
+    return session(TruePlant(), 8)
+
+
+def _curve(records, effect_id, *own):
+    """Return the curve of an effect in a plant that leaves nothing over."""
+    plant = Plant().with_effect(effect(effect_id))
+    fit = SimpleNamespace(
+        model=plant,
+        parameters=np.array([26.0, 524.0, 508.0, *own]),
+        residuals=[np.zeros(len(r.time)) for r in records],
+    )
+    return curve_of(plant.effects[0], fit, records)
+
+
+def test_play_is_drawn_as_wide_as_it_is(records):
+    curve = _curve(records, "backlash", np.radians(0.8))
+    assert np.max(np.abs(curve.y - curve.asked)) == pytest.approx(0.8, abs=1e-6)
+
+
+@pytest.mark.parametrize("tau", [0.005, 0.06])
+def test_a_dead_time_is_drawn_as_long_as_it_is_and_large_enough_to_see(records, tau):
+    curve = _curve(records, "dead_time", tau)
+    late = round(tau / np.median(np.diff(curve.x)))
+    assert np.max(np.abs(curve.y[late:] - curve.asked[:-late])) < 1e-9
+    assert tau > 0.05 * np.ptp(curve.x)
+
+
+def test_friction_is_drawn_against_motion(records):
+    curve = _curve(records, "coulomb_friction", np.radians(100.0), 0.0, 0.0)
+    assert np.all(curve.y[curve.x > 1.0] == pytest.approx(-100.0))
+    assert np.all(curve.y[curve.x < -1.0] == pytest.approx(100.0))
+
+
+def test_drag_is_drawn_over_velocity_and_a_spring_over_angle(records):
+    drag = _curve(records, "quadratic_drag", 2.0)
+    assert drag.y == pytest.approx(np.degrees(-2.0 * np.radians(drag.x) * np.abs(np.radians(drag.x))))
+    spring = _curve(records, "stiffening_spring", 300.0)
+    assert spring.y == pytest.approx(np.degrees(-300.0 * np.radians(spring.x) ** 3))
+
+
+def test_drift_is_drawn_over_time(records):
+    curve = _curve(records, "angle_drift", np.radians(0.1))
+    assert curve.xlabel == "time, s"
+    assert curve.y == pytest.approx(0.1 * curve.x)
