@@ -1,0 +1,135 @@
+"""How often the loop is right on sessions that it has not seen, effect by effect.
+
+    .venv/bin/python -m benchmarks.blind.attribution --seeds 20 --out build/attribution.jsonl
+    .venv/bin/python -m benchmarks.blind.attribution --summary build/attribution.jsonl
+
+A session is one line of the file. Started again with the same file it goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from anglecam.loop.close import close_records
+from benchmarks.blind.drawn import LEDGER, OUTSIDE, Keys, draw
+from benchmarks.blind.judged import Line, judge, read_lines, show, told
+from benchmarks.blind.sessions import HELD_OUT, residual_deg, scaled, session, spec_of
+
+SIGMA_DEG = 0.05
+COLOURED = 0.6
+"""Correlation of coloured noise from frame to frame, as a codec's block pattern leaves it."""
+PAIRS = (
+    ("dead_time", "coulomb_friction"),
+    ("actuator_lag", "stiffening_spring"),
+    ("rate_limit", "camera_tilt"),
+    ("backlash", "quadratic_drag"),
+    ("dead_zone", "pivot_offset"),
+    ("torque_saturation", "angle_drift"),
+    ("clock_scale", "coulomb_friction"),
+    ("gravity_geometry", "rolling_shutter"),
+)
+"""From different stations of the signal's path; every kind of port is among them."""
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+@dataclass(frozen=True)
+class Case:
+    """What acts in a session, and how much of it shows."""
+
+    name: str
+    group: str
+    effects: tuple[str, ...] = ()
+    ratio: float = 1.0
+    """What the base model leaves without noise, over the noise."""
+    phi: float = 0.0
+
+
+CASES = {
+    case.name: case
+    for case in (
+        *(Case(name, "one effect, as large as the noise", (name,)) for name in LEDGER),
+        *(Case(f"{name}/4", "one effect, a quarter of the noise", (name,), 0.25) for name in LEDGER),
+        *(Case("+".join(pair), "two effects, each as large as the noise", pair) for pair in PAIRS),
+        Case("nothing", "nothing missing, white noise"),
+        Case("nothing-coloured", f"nothing missing, AR(1) noise of {COLOURED:g}", phi=COLOURED),
+        *(Case(name, "outside the ledger, as large as the noise", (name,)) for name in OUTSIDE),
+    )
+}
+
+
+def run(name: str, seed: int) -> Line:
+    """Draw a session, close the loop on it and hold the verdict against the truth; what fails is said in the line."""
+    case = CASES[name]
+    line: Line = {"case": name, "seed": seed}
+    try:
+        drawn: dict[str, Keys] = {}
+        for effect in case.effects:
+            drawn |= draw(effect, seed)
+        effects = scaled(drawn, seed, case.ratio, sigma_deg=SIGMA_DEG)
+        records = session(effects, seed=seed, sigma_deg=SIGMA_DEG, phi=case.phi)
+        values = told(spec_of(effects, seed=seed), effects)
+        start = time.perf_counter()
+        verdict = close_records(records, held_out=HELD_OUT, seed=seed)
+        line["seconds"] = time.perf_counter() - start
+        line |= judge(verdict, case.effects, values, SIGMA_DEG)
+        line |= {"effects": effects, "base_over_sigma": residual_deg(effects, seed) / SIGMA_DEG}
+    except Exception as error:  # noqa: BLE001  # one session's failure must not cost the others
+        line["error"] = f"{type(error).__name__}: {error}"
+    return line
+
+
+def main(
+    seeds: Annotated[int, typer.Option(help="Sessions a case, from seed 0 on.")] = 20,
+    cases: Annotated[str, typer.Option(help="Names of cases with commas between; all without.")] = "",
+    processes: Annotated[int, typer.Option(min=1)] = 2,
+    out: Annotated[Path, typer.Option(help="File of lines; it is added to.")] = Path("build/attribution.jsonl"),
+    summary: Annotated[Path | None, typer.Option(help="Only sum up this file.")] = None,
+) -> None:
+    """Run sessions and sum them up."""
+    console = Console(width=None if Console().is_terminal else 200)
+    if summary is None:
+        names = cases.split(",") if cases else list(CASES)
+        if unknown := [name for name in names if name not in CASES]:
+            raise typer.BadParameter(f"no case {unknown[0]}; there are {', '.join(CASES)}")
+        _run_all([(name, seed) for seed in range(seeds) for name in names], processes, out, console)
+    order = list(CASES)
+    lines = sorted(read_lines(summary or out), key=lambda line: (order.index(line["case"]), line["seed"]))
+    show(lines, lambda line: CASES[line["case"]].group, console)
+
+
+def _run_all(jobs: list[tuple[str, int]], processes: int, out: Path, console: Console) -> None:
+    out.parent.mkdir(parents=True, exist_ok=True)
+    kept = [line for line in read_lines(out) if "error" not in line]
+    out.write_text("".join(json.dumps(line) + "\n" for line in kept), encoding="utf-8")
+    done = {(line["case"], line["seed"]) for line in kept}
+    left = [job for job in jobs if job not in done]
+    for name in THREADS:  # read when a worker loads the libraries: each has a core to itself
+        os.environ[name] = "1"
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with (
+        ProcessPoolExecutor(processes, mp_context=multiprocessing.get_context("spawn")) as pool,
+        Progress(*columns, console=console) as progress,
+        out.open("a", encoding="utf-8") as stream,
+    ):
+        task = progress.add_task("sessions", total=len(left))
+        for future in as_completed([pool.submit(run, *job) for job in left]):
+            line = future.result()
+            stream.write(json.dumps(line) + "\n")
+            stream.flush()
+            said = line.get("error") or " + ".join(line["found"]) or line["verdict"]
+            progress.update(task, advance=1, description=f"{line['case']} {line['seed']}: {said}"[:70])
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,151 @@
+"""How often the loop is right on films: the cases of ``tests/blind``, rendered, measured, closed and judged.
+
+    .venv/bin/python -m benchmarks.blind.films --keep build/blind
+    .venv/bin/python -m benchmarks.blind.films 0005 0013 --keep build/blind
+
+What was measured is kept; a case that is there already is closed again without being filmed.
+Judged right is a case whose verdict and effects are those of its ``expected.yaml`` and whose parameters lie within so
+many standard uncertainties as that file allows.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import pickle
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+import yaml
+from rich.console import Console
+from rich.table import Table
+
+from anglecam.loop.close import close_records
+from anglecam.recordings import measure_session, shown_to_loop
+from anglecam.session import read_session
+from benchmarks.blind.judged import Line, judge, show, told
+from synth.session import render
+from synth.spec import Spec, read_spec
+
+CASES = Path(__file__).parents[2] / "tests" / "blind"
+SPEC, EXPECTED, MEASURED = "spec.yaml", "expected.yaml", "measured.pickle"
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is filmed, and what the loop should say of it."""
+
+    name: str
+    path: Path
+    spec: Spec
+    verdict: str
+    effects: tuple[str, ...]
+    parameters: tuple[dict[str, Any], ...]
+    """``name``, ``value`` and ``within_sigma`` of the first parameter of each effect, in files' units."""
+
+    @property
+    def true(self) -> dict[str, dict[str, float]]:
+        """What acts, as the spec has it."""
+        return self.spec.effects.model_dump(exclude_none=True)
+
+
+def read_case(path: Path) -> Case:
+    """Read the folder of one case."""
+    expected = yaml.safe_load((path / EXPECTED).read_text(encoding="utf-8"))
+    parameters = tuple(expected.get("parameters", ()))
+    return Case(path.name, path, read_spec(path / SPEC), expected["verdict"], tuple(expected["effects"]), parameters)
+
+
+def film(case: Case, kept: Path) -> None:
+    """Render a case and measure it; keep what the loop is shown, and nothing of the truth.
+
+    Parameters
+    ----------
+    case : Case
+        What is filmed.
+    kept : Path
+        Folder for the measured session, in one file.
+
+    Raises
+    ------
+    InputError
+        Where a recording cannot be measured.
+    """
+    with tempfile.TemporaryDirectory() as workplace:
+        clips = Path(workplace) / "session"
+        render(case.path / SPEC, clips, Path(workplace) / "truth")
+        session = read_session(clips)
+        measured = measure_session(session)
+        if measured.problems:
+            raise measured.problems[0]
+    kept.mkdir(parents=True, exist_ok=True)
+    (kept / MEASURED).write_bytes(pickle.dumps((session, measured)))
+
+
+def close(case: Case, kept: Path) -> Line:
+    """Close the loop on a kept session and judge it.
+
+    Returns
+    -------
+    dict
+        As from `benchmarks.blind.judged.judge`, with ``right`` and ``wrong``, which says what is not.
+    """
+    session, measured = pickle.loads((kept / MEASURED).read_bytes())
+    records = shown_to_loop(session, measured).records
+    start = time.perf_counter()
+    verdict = close_records(records, held_out=case.spec.declare["held_out"])
+    seconds = time.perf_counter() - start
+    sigma_deg = math.degrees(verdict.noise.sigma)
+    line = judge(verdict, case.true, told(case.spec, case.true), sigma_deg)
+    wrong = _wrong(case, line)
+    return {"case": case.name, "seed": case.spec.seed, "seconds": seconds, "right": not wrong, "wrong": wrong} | line
+
+
+def _wrong(case: Case, line: Line) -> list[str]:
+    """List what an expectation misses."""
+    if line["verdict"] != case.verdict or set(line["found"]) != set(case.effects):
+        return [f"{' + '.join(case.effects) or case.verdict} expected"]
+    off = {estimate["name"]: estimate for estimate in line["estimates"].values()}
+    return [
+        f"{p['name']} {off[p['name']]['value']:.4g} for {p['value']:.4g}, {off[p['name']]['off_sigmas']:+.1f} σ"
+        for p in case.parameters
+        if not abs(off[p["name"]]["off_sigmas"] or 0.0) <= p["within_sigma"]
+    ]
+
+
+def main(
+    names: Annotated[list[str] | None, typer.Argument(help="Folders of tests/blind; all without.")] = None,
+    keep: Annotated[Path, typer.Option(help="Where measured sessions are kept, and looked for.")] = Path("build/blind"),
+) -> None:
+    """Film, measure, close and judge."""
+    console = Console(width=None if Console().is_terminal else 200)
+    paths = [CASES / name for name in names] if names else sorted(path.parent for path in CASES.glob(f"*/{SPEC}"))
+    lines = []
+    for path in paths:
+        case, kept = read_case(path), keep / path.name
+        console.print(f"{case.name}: {' + '.join(case.true) or 'nothing'}")
+        if not (kept / MEASURED).exists():
+            film(case, kept)
+        lines.append(close(case, kept))
+        (kept / "judged.json").write_text(json.dumps(lines[-1], indent=1) + "\n", encoding="utf-8")
+    show(lines, lambda line: "films", console)
+    console.print(_judgements(lines))
+
+
+def _judgements(lines: list[Line]) -> Table:
+    table = Table("case", "what acts", "found", "right", "", title="How each was judged", title_justify="left")
+    for line in lines:
+        found = " + ".join(line["found"]) or line["verdict"]
+        table.add_row(
+            line["case"], " + ".join(line["true"]) or "nothing", found, "yes" if line["right"] else "no",
+            "; ".join(line["wrong"]),
+        )  # fmt: skip
+    return table
+
+
+if __name__ == "__main__":
+    typer.run(main)

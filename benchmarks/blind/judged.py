@@ -1,0 +1,174 @@
+"""A verdict held against the truth, and many of them summed up.
+
+A judgement is one line of JSON, so that a run of hours can be stopped, resumed and summed up from a file.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import statistics
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from anglecam.loop.close import Verdict
+from benchmarks.blind.drawn import LEDGER, Keys
+from benchmarks.blind.sessions import look
+from synth.spec import Spec
+
+Line = dict[str, Any]
+
+CONFIDENT = 1.959964
+"""Standard deviations to either side that hold 95 %."""
+
+
+def told(spec: Spec, effects: Mapping[str, Keys]) -> dict[str, float]:
+    """Return the true first parameter of each effect that the ledger has, as the loop's files would state it."""
+    seen = look(spec)
+    lever = math.hypot(*seen.mouth)
+    return {
+        name: LEDGER[name].told(dict(keys), seen.pinhole, lever) for name, keys in effects.items() if name in LEDGER
+    }
+
+
+def judge(verdict: Verdict, true: Collection[str], values: Mapping[str, float], sigma_deg: float) -> Line:
+    """Hold a verdict against the truth.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        The loop's.
+    true : collection of str
+        Ids of the effects that act.
+    values : mapping
+        From `told`.
+    sigma_deg : float
+        Standard deviation of the noise.
+
+    Returns
+    -------
+    dict
+        What is counted, ready for JSON.
+    """
+    found = [accepted.effect.id for accepted in verdict.accepted]
+    alias = set(found).union(*(accepted.alias_set for accepted in verdict.accepted))
+    estimates = {}
+    for accepted in verdict.accepted:
+        name = accepted.effect.id
+        if name not in values:
+            continue
+        first = accepted.effect.parameters[0]
+        at = list(verdict.after.model.names).index(first.name)
+        value, sigma = float(verdict.after.parameters[at]), float(verdict.after.sigma[at])
+        # in the fit's own unit: the interval of a limit is one of its reciprocal
+        truth = first.to_file / values[name] if first.inverse else values[name] / first.to_file
+        estimates[name] = {
+            "name": first.name,
+            "true": values[name],
+            "value": first.told(value)[0],
+            "off_sigmas": (value - truth) / sigma if sigma > 0.0 else None,
+        }
+    return {
+        "true": sorted(true),
+        "verdict": verdict.verdict,
+        "found": found,
+        "strongest": verdict.candidates[0].effect.id if verdict.candidates else None,
+        "alias_set": sorted(alias),
+        "held_out_over_sigma": math.degrees(verdict.after_held_out.rmse) / sigma_deg,
+        "estimates": estimates,
+    }
+
+
+def read_lines(path: Path) -> list[Line]:
+    """Read judgements; one that a stop cut short is left out."""
+    lines = []
+    for text in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+        try:
+            lines.append(json.loads(text))
+        except json.JSONDecodeError:
+            continue
+    return lines
+
+
+def show(lines: Sequence[Line], group: Callable[[Line], str], console: Console) -> None:
+    """Print the confusion matrix and the table of figures, group by group in the order in which they come."""
+    failed = [line for line in lines if "error" in line]
+    lines = [line for line in lines if "error" not in line]
+    groups, cases = _gather(lines, group), _gather(lines, lambda line: line["case"])
+    for title, members in groups.items():
+        console.print(_confusion(title, members))
+    console.print(_figures("Figures", groups))
+    console.print(_figures("Case by case", cases))
+    for line in failed:
+        console.print(f"{line['case']}, seed {line['seed']}: {line['error']}", soft_wrap=True, markup=False)
+
+
+def _gather(lines: Sequence[Line], group: Callable[[Line], str]) -> dict[str, list[Line]]:
+    gathered: dict[str, list[Line]] = defaultdict(list)
+    for line in lines:
+        gathered[group(line)].append(line)
+    return gathered
+
+
+def _confusion(title: str, lines: Sequence[Line]) -> Table:
+    """Count what was named, by what acts: ids by number, 0 nothing missing, ? unexplained."""
+    ids = list(LEDGER)
+    table = Table(
+        "what acts", *map(str, range(1, len(ids) + 1)), "0", "?", title=title, title_justify="left", padding=0
+    )
+    rows: dict[str, Counter[str]] = defaultdict(Counter)
+    for line in lines:
+        row = " + ".join(line["true"]) or "nothing"
+        rows[row].update(line["found"] or [line["verdict"]])
+    for row in sorted(rows, key=lambda row: ids.index(row) if row in ids else len(ids)):
+        label = f"{ids.index(row) + 1} {row}" if row in ids else row
+        columns = [*ids, "nothing_missing", "unexplained"]
+        table.add_row(label, *(f"{rows[row][column] or '·'} " for column in columns))
+    return table
+
+
+def _figures(title: str, groups: Mapping[str, Sequence[Line]]) -> Table:
+    table = Table(
+        "", "sessions", "right first", "exactly right", "in alias set", "its size", "wrong name", "nothing missing",
+        "unexplained", "held-out RMS/σ", "within 95 %", "s each", title=title, title_justify="left",
+    )  # fmt: skip
+    for name, lines in groups.items():
+        table.add_row(name, *_figures_of(lines))
+    return table
+
+
+def _figures_of(lines: Sequence[Line]) -> list[str]:
+    named = [line for line in lines if line["found"]]
+    something = [line for line in lines if line["true"]]
+    off = [e["off_sigmas"] for line in lines for e in line["estimates"].values() if e["off_sigmas"] is not None]
+    return [
+        str(len(lines)),
+        _share([bool(line["found"]) and line["found"][0] in line["true"] for line in something]),
+        _share([_exactly(line) for line in lines]),
+        _share([set(line["true"]) <= set(line["alias_set"]) for line in named if line["true"]]),
+        f"{statistics.mean(len(line['alias_set']) for line in named):.1f}" if named else "–",
+        _share([bool(set(line["found"]) - set(line["true"])) for line in lines]),
+        _share([line["verdict"] == "nothing_missing" for line in lines]),
+        _share([line["verdict"] == "unexplained" for line in lines]),
+        f"{statistics.median(line['held_out_over_sigma'] for line in lines):.2f}",
+        _share([abs(value) < CONFIDENT for value in off]),
+        f"{statistics.median(line['seconds'] for line in lines):.0f}",
+    ]
+
+
+def _exactly(line: Line) -> bool:
+    """Whether the verdict is the one that should be: the right names, or none where none would be right."""
+    if not line["true"]:
+        return line["verdict"] == "nothing_missing"
+    if not set(line["true"]) <= set(LEDGER):
+        return line["verdict"] == "unexplained"
+    return line["verdict"] == "attributed" and set(line["found"]) == set(line["true"])
+
+
+def _share(hits: Sequence[bool]) -> str:
+    return f"{sum(hits)}/{len(hits)}" if hits else "–"

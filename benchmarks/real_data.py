@@ -1,0 +1,243 @@
+"""What anglecam finds in three recordings that others made, beside what they published.
+
+EMPS: a motor drive that pushes a carriage, its position in m taken as an angle in rad and its force in N as the
+command, so that c = 1/M; the record with added pulses is held out. A single pendulum released from 93°. A film of a red
+ball on a thread. The data stay where they are; sessions are written to a temporary folder.
+
+    .venv/bin/python benchmarks/real_data.py FOLDER
+
+FOLDER holds ``emps``, ``single-pendulum`` and ``pendulum-red-ball``.
+Janot, Gautier, Brunot, Data set and reference models of EMPS, Workshop on Nonlinear System Identification Benchmarks,
+2019. Kaheman et al., The experimental multi-arm pendulum on a cart, arXiv 2205.06231. FiloSottile/Pendolo-OpenCV, 2010.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import loadmat
+from scipy.signal import butter, decimate, filtfilt
+
+from anglecam.effects import Effect, effect
+from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error
+from anglecam.estimate.record import Record
+from anglecam.estimate.shooting import windows
+from anglecam.estimate.start import start_parameters
+from anglecam.files import write_atomically
+from anglecam.loop.close import close_records
+from anglecam.loop.holdout import split_records
+from anglecam.recordings import measure_session
+from anglecam.session import read_session
+from anglecam.simulate.plant import Plant
+
+Floats = NDArray[np.float64]
+
+TICK_S = 1e-3
+"""Of both encoders."""
+EVERY = 20
+"""Ticks from one kept angle to the next: 50 Hz."""
+HELD = 5
+"""Ticks that a row of the force is the mean of."""
+FROM_UPRIGHT = (-0.3, 0.0)
+"""G (rad/s²) and θ0 (rad) to start gravity's sine from: small, so that it grows out of the linear one, and hanging."""
+PENDULUM_S = 15.0
+"""Over the first 15 s drag can be told from the bearing's dry friction, which rules the rest of the 55 s."""
+
+
+def write_emps(folder: Path, session: Path) -> None:
+    """Write both EMPS records as a session; a force that is sampled counts for half a tick before and after."""
+    for name in ("DATA_EMPS", "DATA_EMPS_PULSES"):
+        _, position, force = read_emps(folder, name)
+        kept = np.arange(0, len(position), EVERY)
+        rows = len(force) // HELD
+        _write(session / f"{name}.angles.csv", "time_s,angle_deg", kept * TICK_S, np.degrees(position[kept]))
+        means = force[: rows * HELD].reshape(rows, HELD).mean(axis=1)
+        begins = (np.arange(rows) * HELD - 0.5) * TICK_S
+        _write(session / f"{name}.command.csv", "time_s,command_deg", begins, np.degrees(means))
+    (session / "rig.yaml").write_text("neutral: 0.0\nheld_out: [DATA_EMPS_PULSES]\n")
+
+
+def write_pendulum(folder: Path, session: Path) -> None:
+    """Write the first `PENDULUM_S` of the pendulum's record as a session of one free swing, 0 hanging down."""
+    data = loadmat(folder / "SinglePendulumDataForParameterEstimation.mat")
+    angle = np.concatenate([part[0] for name in ("Y_id", "Y_vad") for part in data[name][:, 0]]) - np.pi
+    kept = np.arange(0, round(PENDULUM_S / TICK_S), EVERY)
+    _write(session / "swing.angles.csv", "time_s,angle_deg", kept * TICK_S, np.degrees(angle[kept]))
+
+
+def link_film(folder: Path, session: Path) -> None:
+    """Make a session of the film, whose pivot is above the picture."""
+    (session / "ball.avi").symlink_to(folder / "esempio.avi")
+    (session / "rig.yaml").write_text("mouth: {rgb: [215, 50, 25]}\npivot: {marker: none}\n")
+
+
+def read_emps(folder: Path, name: str) -> tuple[Floats, Floats, Floats]:
+    """Return time (s), position (m) and the motor's force (N) of an EMPS record at 1 kHz."""
+    data = loadmat(folder / f"{name}.mat")
+    return data["t"].ravel(), data["qm"].ravel(), data["gtau"].item() * data["vir"].ravel()
+
+
+def records_of(write, folder: Path) -> list[Record]:  # type: ignore[no-untyped-def]
+    """Write a session to a temporary folder and read it as any other."""
+    with tempfile.TemporaryDirectory() as place:
+        write(folder, Path(place))
+        return list(measure_session(read_session(Path(place))).records)
+
+
+def grow(base: Fit, records: Sequence[Record], added: Effect, size: float) -> Fit:
+    """Add an effect, its parameters one after another: released at once, those that shape it may stand in for its size.
+
+    Parameters
+    ----------
+    base : Fit
+        Of the plant without it.
+    records : sequence of Record
+        Those that were fitted.
+    added : Effect
+        With zero as every parameter's null.
+    size : float
+        Of its first parameter, to start from.
+
+    Returns
+    -------
+    Fit
+        With the effect.
+    """
+    fit, value = base, size
+    for count in range(1, len(added.parameters) + 1):
+        model = base.model.with_effect(replace(added, parameters=added.parameters[:count]))  # type: ignore[attr-defined]
+        fit = fit_output_error(model, records, [np.append(fit.parameters, value)], own=fit.own)
+        value = 0.0
+    return fit
+
+
+def carriage(fit: Fit) -> dict[str, float]:
+    """Return mass (kg) and friction (N, N·s/m) of a fitted drive, those of either direction, and its stiffness."""
+    p = dict(zip(fit.model.names, fit.parameters.tolist(), strict=True))
+    mass, uneven = 1.0 / p["c_per_s2"], p.get("difference_per_s", 0.0)
+    dry, offset = p.get("friction_deg_per_s2", 0.0), p.get("asymmetry_deg_per_s2", 0.0)
+    return {
+        "M, kg": mass,
+        "Fv, N·s/m": mass * p["a_per_s"],
+        "Fc, N": mass * dry,
+        "offset, N": mass * offset,
+        "Fv+, N·s/m": mass * (p["a_per_s"] + uneven),
+        "Fc+, N": mass * (dry + offset),
+        "Fv-, N·s/m": mass * (p["a_per_s"] - uneven),
+        "Fc-, N": mass * (dry - offset),
+        "b·M, N/m": mass * p["b_per_s2"],
+    }
+
+
+def force_error(found: dict[str, float], folder: Path, name: str = "DATA_EMPS") -> float:
+    """Return ‖τ − τ̂‖/‖τ‖ as published: filtered without phase at 100 Hz, then every tenth sample."""
+    _, position, force = read_emps(folder, name)
+    numerator, denominator = butter(4, 100.0, fs=1.0 / TICK_S)
+    position = filtfilt(numerator, denominator, position)
+    rate = np.gradient(position, TICK_S)
+    up, down = rate > 0.0, rate < 0.0
+    told = found["M, kg"] * np.gradient(rate, TICK_S) + found.get("b·M, N/m", 0.0) * position
+    told += up * (found["Fv+, N·s/m"] * rate + found["Fc+, N"]) + down * (found["Fv-, N·s/m"] * rate - found["Fc-, N"])
+    ends = slice(50, -50)  # where the filter has only one side
+    thinned = [
+        decimate(x[ends], 10, ftype="fir", zero_phase=True) for x in (filtfilt(numerator, denominator, force), told)
+    ]
+    return float(np.linalg.norm(thinned[0] - thinned[1]) / np.linalg.norm(thinned[0]))
+
+
+def fit_emps(records: Sequence[Record]) -> list[tuple[str, Fit, Fit]]:
+    """Fit viscous friction, then Coulomb friction beside it, then one that differs in the two directions.
+
+    Returns
+    -------
+    list of (str, Fit, Fit)
+        What the model holds, its fit in windows and its prediction of the held-out windows.
+    """
+    fitted, held_out = split_records(records, ["DATA_EMPS_PULSES"])
+    base = fit_output_error(Plant(), fitted, start_parameters(fitted))
+    fitted, held_out = (windows(part, base.parameters) for part in (fitted, held_out))
+    viscous = fit_output_error(Plant(), fitted, [base.parameters])
+    dry = grow(viscous, fitted, effect("coulomb_friction"), 0.3)
+    uneven = grow(dry, fitted, effect("damping_asymmetry"), 0.0)
+    named = [("viscous", viscous), ("+ coulomb_friction", dry), ("+ damping_asymmetry", uneven)]
+    return [(name, fit, _predict(fit, held_out)) for name, fit in named]
+
+
+def fit_swing(records: Sequence[Record], *more: tuple[str, float]) -> list[tuple[str, Fit, Fit]]:
+    """Fit the linear plant to a free swing, then gravity's sine beside it, then more effects, each from its size.
+
+    Returns
+    -------
+    list of (str, Fit, Fit)
+        What the model holds, its fit and its prediction of what was held out.
+    """
+    fitted, held_out = split_records(records, [])
+    plant = Plant(driven=False)
+    base = fit_output_error(plant, fitted, start_parameters(fitted))
+    sine = plant.with_effect(effect("gravity_geometry"))
+    near = fit_output_error(sine, windows(fitted, base.parameters), [np.append(base.parameters, FROM_UPRIGHT)])
+    found = fit_output_error(sine, fitted, [near.parameters])
+    named = [("linear", base), ("+ gravity_geometry", found)]
+    for name, size in more:
+        named.append((f"+ {name}", grow(named[-1][1], fitted, effect(name), size)))
+    return [(name, fit, predict_output_error(fit, held_out)) for name, fit in named]
+
+
+def main() -> None:
+    """Print one table for the fits of known models and one for what the loop names by itself."""
+    folder = Path(sys.argv[1])
+    emps, swing = records_of(write_emps, folder / "emps"), records_of(write_pendulum, folder / "single-pendulum")
+    film = records_of(link_film, folder / "pendulum-red-ball")
+    print("| data | model | quantity | published | ours | difference |\n| --- | --- | --- | --- | --- | --- |")
+    published: dict[str, dict[str, float]] = {
+        "viscous": {},
+        "+ coulomb_friction": {"M, kg": 95.109, "Fv, N·s/m": 203.50, "Fc, N": 20.394, "offset, N": -3.165},
+        "+ damping_asymmetry": {"Fv+, N·s/m": 166.7, "Fc+, N": 20.14, "Fv-, N·s/m": 240.4, "Fc-, N": 20.63},
+    }
+    told = {"+ coulomb_friction": 0.04083, "+ damping_asymmetry": 0.03112}
+    for name, fit, prediction in fit_emps(emps):
+        found = carriage(fit)
+        for quantity, value in published[name].items():
+            print(
+                f"| EMPS | {name} | {quantity} | {value} | {found[quantity]:.2f} | {found[quantity] / value - 1:+.1%} |"
+            )
+        for record in ("DATA_EMPS", "DATA_EMPS_PULSES"):
+            said = f"{told[name]:.2%}" if name in told and record == "DATA_EMPS" else ""
+            print(f"| {record} | {name} | force error | {said} | {force_error(found, folder / 'emps', record):.2%} | |")
+        print(f"| PULSES | {name} | position in windows, µm RMS | | {1e6 * prediction.rmse:.0f} | |")
+    for data, fits in (
+        ("single pendulum", fit_swing(swing, ("quadratic_drag", 0.001))),
+        ("red ball", fit_swing(film)),
+    ):
+        for name, fit, prediction in fits:
+            print(f"| {data} | {name} | b, 1/s² | {64.2 if data != 'red ball' else ''} | {fit.parameters[1]:.2f} | |")
+            print(f"| {data} | {name} | fit / held out, ° RMS | | {_deg(fit)} / {_deg(prediction)} | |")
+    print("\n| data | the loop names | held out before → after |\n| --- | --- | --- |")
+    for data, records, held_out in (("EMPS", emps, ["DATA_EMPS_PULSES"]), ("pendulum", swing, []), ("ball", film, [])):
+        verdict = close_records(records, held_out=held_out)
+        names = ", ".join(a.effect.id for a in verdict.accepted) or verdict.verdict
+        print(f"| {data} | {names} | {_deg(verdict.before_held_out)}° → {_deg(verdict.after_held_out)}° |", flush=True)
+
+
+def _predict(fit: Fit, records: Sequence[Record]) -> Fit:
+    return fit_output_error(fit.model, records, [fit.parameters], phi=fit.phi, fixed=True)
+
+
+def _deg(fit: Fit) -> str:
+    return f"{np.degrees(fit.rmse):.3g}"
+
+
+def _write(path: Path, header: str, time: Floats, value: Floats) -> None:
+    with write_atomically(path) as stream:
+        stream.write(header + "\n")
+        stream.writelines(f"{t:.7f},{v:.9g}\n" for t, v in zip(time, value, strict=True))
+
+
+if __name__ == "__main__":
+    main()

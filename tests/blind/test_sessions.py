@@ -1,0 +1,60 @@
+"""Sessions without pictures: what the seed decides, how large an effect is, and what number the loop should find."""
+
+import numpy as np
+import pytest
+
+from anglecam.effects import effect
+from anglecam.estimate.output_error import fit_output_error
+from anglecam.simulate.plant import Plant
+from benchmarks.blind.drawn import ALL, draw, magnified
+from benchmarks.blind.judged import told
+from benchmarks.blind.sessions import RECORDINGS, residual_deg, scaled, session, spec_of
+
+SEED = 4
+
+
+def test_a_seed_decides_everything_and_an_effect_changes_no_command():
+    plain, again, late = (session(e, seed=SEED) for e in ({}, {}, {"dead_time": {"tau_s": 0.02}}))
+    assert sorted(r.name for r in plain) == sorted(RECORDINGS)
+    for one, two, other in zip(plain, again, late, strict=True):
+        np.testing.assert_array_equal(one.angle, two.angle)
+        np.testing.assert_array_equal(one.command.angle, other.command.angle)
+    assert spec_of({}, seed=SEED).plant != spec_of({}, seed=SEED + 1).plant
+
+
+def test_noise_has_the_standard_deviation_and_the_colour_that_were_asked_for():
+    exact, noisy = (session({}, seed=SEED, sigma_deg=s, phi=0.6) for s in (0.0, 0.05))
+    rest = [n.angle - e.angle for n, e in zip(noisy, exact, strict=True)]
+    rest = [r - r.mean() for r in rest]
+    assert np.degrees(np.concatenate(rest).std()) == pytest.approx(0.05, rel=0.1)
+    assert np.mean([np.corrcoef(r[1:], r[:-1])[0, 1] for r in rest]) == pytest.approx(0.6, abs=0.1)
+
+
+def test_the_base_model_alone_leaves_nothing_of_a_plain_session():
+    assert residual_deg({}, SEED) < 1e-4
+
+
+def test_an_effect_is_magnified_until_it_shows_as_much_as_was_asked_for():
+    found = scaled(draw("clock_scale", SEED), SEED, 0.5)
+    assert residual_deg(found, SEED) == pytest.approx(0.025, rel=0.02)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_more_of_an_effect_is_more(name):
+    keys = draw(name, SEED)[name]
+    larger, back = magnified(name, keys, 2.0), magnified(name, magnified(name, keys, 2.0), 0.5)
+    assert larger != keys
+    assert back == pytest.approx(keys)
+
+
+@pytest.mark.parametrize("name", ["torque_saturation", "lens_distortion", "rolling_shutter", "clock_scale"])
+def test_the_number_told_is_the_one_that_leaves_nothing_when_the_effect_is_fitted(name):
+    effects = draw(name, SEED)
+    records = session(effects, seed=SEED, sigma_deg=0.0)
+    spec, entry = spec_of(effects, seed=SEED), effect(name)
+    first, value = entry.parameters[0], told(spec, effects)[name]
+    start = [spec.plant.a, spec.plant.b, spec.plant.c, *entry.null]
+    start[3] = first.to_file / value if first.inverse else value / first.to_file
+    fit = fit_output_error(Plant((entry,)), records, [np.array(start)])
+    assert np.degrees(fit.rmse) < 5e-4
+    assert first.told(fit.parameters[3])[0] == pytest.approx(value, rel=0.01)
