@@ -88,6 +88,8 @@ def windows(records: Sequence[Record], plant_parameters: Floats) -> list[Record]
         drifts the zero that the angle came with counts as known: where no stiffness tells which angle is neutral, a
         zero of its own beside an initial state of its own would leave a prediction as it is.
     """
+    if not records:
+        return []
     poles = _poles(plant_parameters)
     if drifts(plant_parameters, records):
         fastest = float(np.max(np.abs(poles.real)))
