@@ -67,8 +67,8 @@ class AngleSeries:
     """Width and height of the picture; ``None`` where it is not known."""
     marker_px: tuple[float, float] | None = None
     """Where a picture that nothing was undone in shows the mark on the shaft; ``None`` where it does not."""
-    only_pivot_differs: bool = False
-    """Whether the angle is that of the line from this mark, and differs from the measured one by nothing else."""
+    only_pivot_differs: bool | None = None
+    """Of an angle of the line from this mark: whether that is all by which it differs from the measured one."""
 
     @property
     def ok(self) -> NDArray[np.bool_]:

@@ -48,7 +48,7 @@ def test_a_mark_beside_the_axis_is_shown_to_the_loop_as_that_alone(facing):
 def test_a_bent_view_is_not_taken_for_a_mark_beside_the_axis():
     series, differs = uncorrected([filmed((0.0, 0.0), shown=lambda line: line + 0.2 * line**2)])
     assert differs
-    assert not series[0].only_pivot_differs
+    assert series[0].only_pivot_differs is False
 
 
 def test_noise_however_large_is_no_difference():

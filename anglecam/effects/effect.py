@@ -52,8 +52,8 @@ class View:
     """From the middle of the picture, to the right and down."""
     mirrored: bool = False
     """Whether the face looks to the left."""
-    only_pivot_differs: bool = False
-    """Whether all that the picture shows otherwise than the mechanism moves is known to come from where the mark is."""
+    only_pivot_differs: bool | None = None
+    """Whether all that the picture shows otherwise than the mechanism moves comes from where the mark is, if known."""
 
 
 UNSEEN = View()

@@ -27,6 +27,10 @@ def _seen(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats
     return angle + off(view.neutral + angle) - off(np.asarray(view.neutral))
 
 
+def _needs(view: View) -> bool:
+    return view.only_pivot_differs is not False
+
+
 EFFECT = Effect(
     id="pivot_offset",
     station="camera",
@@ -41,4 +45,5 @@ EFFECT = Effect(
     separating_experiment="slow motion over the whole range, marker: none: the path of the mouth has its own centre",
     source="the paper, Fig. 7",
     seen=_seen,
+    needs=_needs,
 )

@@ -83,7 +83,8 @@ class Fit:
     @cached_property
     def sigma(self) -> Floats:
         """(p,) standard uncertainties of ``parameters``, SI, of noise that the whitening made white."""
-        return np.sqrt(np.diag(self.covariance))
+        variance = np.diag(self.covariance)
+        return np.sqrt(np.where(variance >= 0.0, variance, np.nan))
 
     @cached_property
     def covariance(self) -> Floats:
