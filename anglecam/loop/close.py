@@ -39,6 +39,8 @@ SURE = 0.01
 verdict back."""
 CONTRADICTED = 3.0
 """A model that errs this many times more on what was held out than on what was fitted lacks something there."""
+FAITHFUL = 0.01
+"""No structure smaller than this share of what the base model leaves is traced: no model of an effect is truer."""
 REMAINDER, REMAINDER_UNDRIVEN = 0.1, 0.75
 """After an effect has proven itself, what remains must also be this share of what the base model left, or it does not
 take the verdict back. Where nothing is commanded, or nothing tells the noise, most of it may be what no model of a
@@ -147,7 +149,6 @@ def _close(
         base = fit_output_error(plant, fitted, [base.parameters, *own_starts])
     ledger = applicable([*fitted, *predicted])
     camera = floor.sigma if floor and floor.filmed else 0.0
-    negligible = max(FINEST, NEGLIGIBLE * camera)
 
     def look(fit: Fit, accepted: Sequence[Accepted]) -> _Round:
         left = [e for e in ledger if e not in [a.effect for a in accepted]]
@@ -159,6 +160,7 @@ def _close(
 
     progress("residual")
     first = now = look(base, ())
+    negligible = max(FINEST, NEGLIGIBLE * camera, FAITHFUL * first.unseen.rmse)
     progress("candidates")
     first_candidates = candidates = fit_candidates(now.fit, now.unseen, fitted, predicted, now.forecasts)
     accepted: list[Accepted] = []
