@@ -41,7 +41,11 @@ def test_effects_at_their_null_change_nothing():
     base = Plant().predict(np.array([26.0, 524.0, 508.0]), TIME, command, np.array([0.1, 0.5]))
     nulls = np.concatenate([e.null for e in LEDGER])
     full = Plant(LEDGER).predict(np.array([26.0, 524.0, 508.0, *nulls]), TIME, command, np.array([0.1, 0.5]))
-    # effects at the three ports of the integrator go by steps, and nothing else
+    # an effect at one of the integrator's three ports goes by steps, and the others then change nothing
+    stepped = Plant((effect("dead_zone"),)).predict(
+        np.array([26.0, 524.0, 508.0, 0.0]), TIME, command, np.array([0.1, 0.5])
+    )
+    assert full == pytest.approx(stepped, abs=1e-14)
     assert np.degrees(np.abs(base - full)).max() < 1e-4
     outside = tuple(e for e in LEDGER if e.port not in ("servo", "load", "dry"))
     nulls = np.concatenate([e.null for e in outside])
