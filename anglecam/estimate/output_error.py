@@ -210,11 +210,10 @@ def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:
     return min(fits, key=lambda one: one.cost)
 
 
-def predicted_angle(fit: Fit, record: Record, own: Floats) -> Floats:
-    """Return the (n,) angle, rad, that a fitted model gives a recording from its own unknowns ``own``."""
-    model = fit.model
+def predicted_angle(model: Model, parameters: Floats, record: Record, own: Floats) -> Floats:
+    """Return the (n,) angle, rad, that a model gives a recording from its own unknowns ``own``."""
     zero = 0.0 if record.zero_known else own[model.states]
-    return zero + model.predict(fit.parameters, record.time, record.command, own[: model.states], record.view)
+    return zero + model.predict(parameters, record.time, record.command, own[: model.states], record.view)
 
 
 def _fit_once(
@@ -228,10 +227,6 @@ def _fit_once(
     def split(x: Floats) -> tuple[Floats, list[Floats]]:
         return x[:p], [x[edges[i] : edges[i + 1]] for i in range(len(records))]
 
-    def predict(record: Record, parameters: Floats, unknowns: Floats) -> Floats:
-        zero = 0.0 if record.zero_known else unknowns[model.states]
-        return zero + model.predict(parameters, record.time, record.command, unknowns[: model.states], record.view)
-
     latest: dict[bytes, list[Floats]] = {}
 
     def predicted(x: Floats) -> list[Floats]:
@@ -239,7 +234,9 @@ def _fit_once(
         if x.tobytes() not in latest:
             parameters, unknowns = split(x)
             latest.clear()
-            latest[x.tobytes()] = [predict(r, parameters, o) for r, o in zip(records, unknowns, strict=True)]
+            latest[x.tobytes()] = [
+                predicted_angle(model, parameters, r, o) for r, o in zip(records, unknowns, strict=True)
+            ]
         return latest[x.tobytes()]
 
     def errors(x: Floats) -> Floats:
@@ -263,7 +260,7 @@ def _fit_once(
                 step = -steps[j] if j < p and both[j] + steps[j] > model.upper[j] else steps[j]
                 beside = both.copy()
                 beside[j] += step
-                block[:, k] = (predict(record, beside[:p], beside[p:]) - here) / step
+                block[:, k] = (predicted_angle(model, beside[:p], record, beside[p:]) - here) / step
             result[rows[i] : rows[i + 1], place] = -whiten(record, phi, block)
         return result
 

@@ -80,7 +80,7 @@ class Verdict:
     first_gate: Gate
     last_gate: Gate
     candidates: tuple[Candidate, ...]
-    """Those of the first round, strongest evidence first."""
+    """Those of the first round, strongest evidence first; none where the gate found nothing missing."""
     noise: Noise
     fitted: tuple[Record, ...]
     held_out: tuple[Record, ...]
@@ -161,9 +161,11 @@ def _close(
     progress("residual")
     first = now = look(base, ())
     negligible = max(FINEST, NEGLIGIBLE * camera, FAITHFUL * first.unseen.rmse)
-    progress("candidates")
-    first_candidates = candidates = fit_candidates(now.fit, now.unseen, fitted, predicted, now.forecasts)
-    accepted: list[Accepted] = []
+    candidates: list[Candidate] = []
+    if not first.gate.passed:
+        progress("candidates")
+        candidates = fit_candidates(now.fit, now.unseen, fitted, predicted, now.forecasts)
+    first_candidates, accepted = tuple(candidates), list[Accepted]()
 
     def convincing(before: Prediction, best: Candidate) -> bool:
         if best.unseen is None or before.rmse**2 - best.unseen.rmse**2 <= negligible**2:
@@ -181,8 +183,6 @@ def _close(
             return then, accepted, []
         return then, accepted, fit_candidates(then.fit, then.unseen, fitted, predicted, then.forecasts)
 
-    if first.gate.passed:
-        candidates = []
     while candidates:
         proven = now.unseen
         if convincing(proven, candidates[0]):
@@ -218,7 +218,7 @@ def _close(
         compare(before_told, after_told, rng),
         first.gate,
         now.gate,
-        tuple(first_candidates),
+        first_candidates,
         noise,
         tuple(fitted),
         tuple(predicted),

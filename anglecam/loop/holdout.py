@@ -118,7 +118,8 @@ def _in_turns(fit: Fit, records: Sequence[Record]) -> Prediction:
         train = [record.only(frames != turn) for record, frames in zip(records, left_out, strict=True)]
         left = fit_output_error(fit.model, train, [fit.parameters], own=fit.own, phi=fit.phi)
         for record, frames, own, error in zip(records, left_out, left.own, errors, strict=True):
-            error[frames == turn] = (record.angle - predicted_angle(left, record, own))[frames == turn]
+            told = predicted_angle(left.model, left.parameters, record, own)
+            error[frames == turn] = (record.angle - told)[frames == turn]
     tested = tuple(record.only(frames != KEPT) for record, frames in zip(records, left_out, strict=True))
     residuals = tuple(error[frames != KEPT] for error, frames in zip(errors, left_out, strict=True))
     white = [whiten(record, fit.phi, error) for record, error in zip(tested, residuals, strict=True)]

@@ -60,7 +60,7 @@ class Plant:
     @property
     def scales(self) -> Floats:
         """Magnitudes, SI, that difference quotients are taken against."""
-        return np.array([1.0, 10.0, 10.0][: self.base_count] + [0.1 for e in self.effects for _ in e.parameters])
+        return np.array([1.0, 10.0, 0.01][: self.base_count] + [0.1 for e in self.effects for _ in e.parameters])
 
     @property
     def to_file(self) -> Floats:
