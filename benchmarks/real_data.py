@@ -44,8 +44,8 @@ EVERY = 10
 """Ticks from one kept angle to the next: 100 Hz, as published; at 50 Hz the fits end in rougher valleys."""
 HELD = 5
 """Ticks that a row of the force is the mean of."""
-FROM_UPRIGHT = (-0.3, 0.0)
-"""G (rad/s²) and θ0 (rad) to start gravity's sine from: small, so that it grows out of the linear one, and hanging."""
+FROM_HANGING = (0.3, np.pi)
+"""G (rad/s²) and θ0 (rad) to start gravity's sine from: small, so that it grows out of the linear one."""
 PENDULUM_S = 15.0
 """Over the first 15 s drag can be told from the bearing's dry friction, which rules the rest of the 55 s."""
 
@@ -181,7 +181,7 @@ def fit_swing(records: Sequence[Record], *more: tuple[str, float]) -> list[tuple
     plant = Plant(driven=False)
     base = fit_output_error(plant, fitted, start_parameters(fitted))
     sine = plant.with_effect(effect("gravity_geometry"))
-    near = fit_output_error(sine, windows(fitted, base.parameters), [np.append(base.parameters, FROM_UPRIGHT)])
+    near = fit_output_error(sine, windows(fitted, base.parameters), [np.append(base.parameters, FROM_HANGING)])
     found = fit_output_error(sine, fitted, [near.parameters])
     named = [("linear", base), ("+ gravity_geometry", found)]
     for name, size in more:

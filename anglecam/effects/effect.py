@@ -76,9 +76,13 @@ class Parameter:
     """Factor from SI to the unit in ``name``."""
     inverse: bool = False
     """Whether files state its reciprocal: of a limit, which is absent at 0."""
+    circular: bool = False
+    """Whether it is a direction, which files state between −180° and 180°."""
 
     def told(self, value: float, sigma: float = 0.0) -> tuple[float, float]:
         """Return value and standard uncertainty in the unit in ``name``; infinite for a limit that is absent."""
+        if self.circular:
+            value = math.remainder(value, math.tau)
         if not self.inverse:
             return value * self.to_file, sigma * abs(self.to_file)
         if value == 0.0:

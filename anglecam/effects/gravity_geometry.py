@@ -32,8 +32,11 @@ EFFECT = Effect(
     equation="θ̈ = c·u − a·θ̇ − b·θ + G·(sin(θ0 + θ) − sin θ0 − θ·cos θ0)",
     relaxes="Eq. (25): small angles about neutral",
     parameters=(
-        Parameter("gravity_deg_per_s2", 0.0, -2000.0, 2000.0, (30.0, -30.0, 150.0), math.degrees(1.0)),
-        Parameter("gravity_deg", 0.25 * math.pi, -math.pi, math.pi, (-0.8, 2.4), math.degrees(1.0)),
+        # a weight pulls down: G below zero at θ0 would be G above zero at θ0 + 180°
+        Parameter("gravity_deg_per_s2", 0.0, 0.0, 2000.0, (30.0, 150.0), math.degrees(1.0)),
+        Parameter(
+            "gravity_deg", 0.25 * math.pi, -math.tau, math.tau, (-0.8, 2.4, -2.4), math.degrees(1.0), circular=True
+        ),
     ),
     aliases=("stiffening_spring", "linkage_geometry"),
     separating_experiment="the same steps with the mount turned by 90°: gravity turns with it, the spring does not",

@@ -29,7 +29,8 @@ HOPEFUL = 0.2
 """Share of the best forecast below which an effect is not fitted, and of the best fit below which it is not tried on
 what was not fitted."""
 FULFILLED = 0.7
-"""Share of its forecast that a fit must reach, or else it begins again from the effect's own start."""
+"""Share of its forecast that a fit must reach, or else it begins again from the effect's own start; and if it then
+reaches less than `HOPEFUL`, from half and twice the forecast's."""
 HELD = 1e-9
 """How far a parameter that is held may go, SI."""
 ALIAS_LEVEL = 0.05
@@ -93,14 +94,14 @@ def fit_candidates(
         Strongest evidence first, then those that were not tried, best fit first.
     """
     fits = side_by_side(lambda one: fit_with(base, fitted, one), tried)
-    gains = [_gain(base.cost, fit.cost, len(base.white)) for fit in fits]
+    gains = [log_likelihood_gain(base.cost, fit.cost, len(base.white)) for fit in fits]
     serious = sorted(gains, reverse=True)[: LEAST_PROMISING - 1]
 
     def predict(i: int) -> Candidate:
         if gains[i] < HOPEFUL * max(gains) and gains[i] not in serious:
             return Candidate(tried[i], fits[i], gains[i], None, None, -math.inf)
         told, whole = predict_unseen(fits[i], fitted, held_out)
-        predictive = _gain(unseen.cost, whole.cost, sum(len(r.time) for r in whole.records))
+        predictive = log_likelihood_gain(unseen.cost, whole.cost, sum(len(r.time) for r in whole.records))
         return Candidate(tried[i], fits[i], gains[i], told, whole, predictive)
 
     candidates = side_by_side(predict, range(len(tried)))
@@ -123,13 +124,18 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
             values = fit_output_error(first, records, [values], own=base.own, phi=base.phi).parameters
         return fit_output_error(plant.with_effect(effect), records, [values], own=base.own, phi=base.phi)
 
-    fit = fit_from(forecast.start)
-    # several parameters may have several valleys
-    if len(effect.parameters) == 1 and _gain(base.cost, fit.cost, len(base.white)) >= FULFILLED * forecast.gain:
-        return fit
     first = effect.null
     first[0] = effect.parameters[0].starts[0]
-    return min(fit, fit_from(first), key=lambda one: one.cost)
+    near = [effect.null + share * (forecast.start - effect.null) for share in (0.5, 2.0)]
+    enough = [FULFILLED if len(effect.parameters) == 1 else math.inf, HOPEFUL, HOPEFUL, HOPEFUL]
+    best = base
+    # several parameters may have several valleys, and dry friction has them beside whatever has a kink
+    for start, share in zip([forecast.start, first, *near], enough, strict=True):
+        fit = fit_from(start)
+        best = fit if best is base or fit.cost < best.cost else best
+        if log_likelihood_gain(base.cost, best.cost, len(base.white)) >= share * forecast.gain:
+            break
+    return best
 
 
 def rivals(
@@ -161,7 +167,7 @@ def rivals(
     """
     fits = side_by_side(lambda other: fit_with(base, records, other), others)
     widest = 0.5 * norm.isf(ALIAS_LEVEL) ** 2
-    gaps = [_gain(fit.cost, best.cost, len(best.white)) for fit in fits]
+    gaps = [log_likelihood_gain(fit.cost, best.cost, len(best.white)) for fit in fits]
     return {
         other.effect.id: fit
         for other, fit, gap in zip(others, fits, gaps, strict=True)
@@ -175,7 +181,8 @@ def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
         return list(pool.map(work, items))
 
 
-def _gain(before: float, after: float, n: int) -> float:
+def log_likelihood_gain(before: float, after: float, n: int) -> float:
+    """Return what the log-likelihood of n whitened residuals gains where their sum of squares, rad², falls."""
     if not math.isfinite(after):
         return -math.inf
     finest = n * 1e-9**2  # rad², so that data without any noise do not divide by nothing

@@ -22,7 +22,15 @@ from anglecam.estimate.output_error import Fit, fit_output_error
 from anglecam.estimate.record import Record
 from anglecam.estimate.shooting import drifts, goes_astray, windows
 from anglecam.estimate.start import start_parameters
-from anglecam.loop.attribute import Candidate, fit_candidates, fit_with, promising, rivals, side_by_side
+from anglecam.loop.attribute import (
+    Candidate,
+    fit_candidates,
+    fit_with,
+    log_likelihood_gain,
+    promising,
+    rivals,
+    side_by_side,
+)
 from anglecam.loop.gate import LEVEL, Gate, test_residual
 from anglecam.loop.holdout import Gain, Prediction, compare, predict_unseen, split_records
 from anglecam.loop.screen import Change, Forecast, changes, directions, forecasts
@@ -167,10 +175,15 @@ def _close(
         candidates = fit_candidates(now.fit, now.unseen, fitted, predicted, now.forecasts)
     first_candidates, accepted = tuple(candidates), list[Accepted]()
 
-    def convincing(before: Prediction, best: Candidate) -> bool:
-        if best.unseen is None or before.rmse**2 - best.unseen.rmse**2 <= negligible**2:
-            return False
-        return compare(before, best.unseen, rng).interval_95[0] > 0.0
+    def convincing(before: _Round, best: Candidate) -> bool:
+        # a second left out may hold all that tells of a limit, which what was declared then does
+        pairs = ((before.told, best.told), (before.unseen, best.unseen))
+        return any(
+            then is not None
+            and now.rmse**2 - then.rmse**2 > negligible**2
+            and compare(now, then, rng).interval_95[0] > 0.0
+            for now, then in pairs[0 if predicted else 1 :]
+        )
 
     def add(best: Candidate, accepted: list[Accepted]) -> tuple[_Round, list[Accepted], list[Candidate]]:
         progress(f"adding {best.effect.id}")
@@ -184,7 +197,7 @@ def _close(
         return then, accepted, fit_candidates(then.fit, then.unseen, fitted, predicted, then.forecasts)
 
     while candidates:
-        proven = now.unseen
+        proven = now
         if convincing(proven, candidates[0]):
             now, accepted, candidates = add(candidates[0], accepted)
             continue
@@ -203,7 +216,12 @@ def _close(
     level = SURE if accepted else LEVEL
     structured = now.gate.p_value < level and now.fit.rmse**2 > camera**2 + negligible**2
     share = REMAINDER if plant.driven and floor is not None else REMAINDER_UNDRIVEN
-    structured &= not accepted or _beyond(now.unseen, noise) > share * _beyond(first.unseen, noise)
+    # told by the noise floor, whatever shape it has, and by what explains most of it, which is finer
+    structured &= (
+        not accepted
+        or _beyond(now.unseen, noise) > share * _beyond(first.unseen, noise)
+        or _could_still_gain(now, before) > share**2
+    )
     remains = structured or now.told.rmse > CONTRADICTED * max(now.fit.rmse, negligible)
     if remains:  # nothing is named, so nothing is added
         accepted = []
@@ -228,6 +246,14 @@ def _close(
 def _beyond(prediction: Prediction, noise: Noise) -> float:
     """Return what a prediction errs by beyond the noise, rad."""
     return math.sqrt(max(prediction.rmse**2 - noise.sigma**2, 0.0))
+
+
+def _could_still_gain(now: _Round, before: Fit) -> float:
+    """Return what one more effect is forecast to explain, as a share of it and all that was explained since before."""
+    if not now.forecasts or now.forecasts[0].gain <= 0.0:
+        return 0.0
+    more = now.forecasts[0].gain
+    return more / (more + max(log_likelihood_gain(before.cost, now.fit.cost, len(before.white)), 0.0))
 
 
 def applicable(records: Sequence[Record]) -> list[Effect]:

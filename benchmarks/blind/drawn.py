@@ -69,7 +69,6 @@ LEDGER: Mapping[str, Drawn] = {
     "stiffening_spring": Drawn({"k3": 60.0}, signed=True, told=_same("k3")),
     "gravity_geometry": Drawn(
         {"strength": 40.0},
-        signed=True,
         shape=lambda rng: {"gravity_deg": rng.uniform(-180, 180)},
         told=_degrees("strength"),
     ),

@@ -14,7 +14,7 @@ from anglecam.simulate.plant import Plant
 
 TIME = np.arange(0.0, 20.0, 0.02)
 SWING = Plant((effect("gravity_geometry"),), driven=False)
-HANGING = np.array([0.06, 64.0, -64.0, 0.0])
+HANGING = np.array([0.06, 64.0, 64.0, np.pi])
 """a, b, G and θ0 of a pendulum whose stiffness is its weight's alone."""
 
 
@@ -52,7 +52,7 @@ def test_a_wide_swing_that_a_linear_model_lost_count_of_is_found_through_windows
     whole = record(SWING, HANGING, [-1.6, 0.0])
     linear = fit_output_error(Plant(driven=False), [whole], [np.array([0.1, 52.0])])
     assert goes_astray(linear, [whole])
-    start = np.append(linear.parameters, [-0.3, 0.0])
+    start = np.append(linear.parameters, [0.3, np.pi])
     near = fit_output_error(SWING, windows([whole], linear.parameters), [start])
     found = fit_output_error(SWING, [whole], [near.parameters])
     np.testing.assert_allclose(found.parameters, HANGING, atol=1e-3)
