@@ -13,11 +13,12 @@ from anglecam import __version__
 from anglecam.effects import effect
 from anglecam.files import write_atomically
 from anglecam.identify import Identified
-from anglecam.loop.close import Verdict, applicable
+from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.gate import Test
 from anglecam.loop.remainder import leftover_torque
 from anglecam.loop.result import NEXT_COMMAND, plain, sentence, size_of, split_unit, with_uncertainty
+from anglecam.loop.rounds import applicable
 from anglecam.report import loop_figures as figures
 from anglecam.report.path_figure import path_figure
 from anglecam.series import AngleSeries

@@ -19,8 +19,9 @@ from scipy.signal import lfilter
 from anglecam.effects import Effect, Knots
 from anglecam.estimate.output_error import Fit
 from anglecam.estimate.record import Record
-from anglecam.loop.close import Verdict, applicable
+from anglecam.loop.close import Verdict
 from anglecam.loop.result import plain
+from anglecam.loop.rounds import applicable
 from anglecam.report.figures import AFTER, COMMAND, MEASURED, STYLE, _svg
 from anglecam.session import Command
 

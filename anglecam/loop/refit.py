@@ -1,0 +1,43 @@
+"""The same plant fitted again: under another colour of the noise, without one of its effects, or in another order."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from anglecam.effects import Effect
+from anglecam.estimate.output_error import Fit, fit_output_error
+from anglecam.estimate.record import Record
+from anglecam.simulate.plant import Plant
+
+
+def effects_of(fit: Fit) -> tuple[Effect, ...]:
+    """Return the effects that a fitted plant has, in the order in which they were added."""
+    return _plant(fit).effects
+
+
+def recoloured(fit: Fit, records: Sequence[Record], phi: float) -> Fit:
+    """Fit again with the noise's autocorrelation ``phi`` from frame to frame."""
+    return fit_output_error(fit.model, records, [fit.parameters], own=fit.own, phi=phi)
+
+
+def without(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
+    """Fit again without one of the plant's effects."""
+    own = [p.name for p in effect.parameters]
+    keep = [i for i, name in enumerate(fit.model.names) if name not in own]
+    smaller = replace(_plant(fit), effects=tuple(e for e in effects_of(fit) if e is not effect))
+    return fit_output_error(smaller, records, [fit.parameters[keep]], own=fit.own, phi=fit.phi)
+
+
+def with_last(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
+    """Return the same fit with one of its effects after all others, where a candidate's parameters are."""
+    own = [p.name for p in effect.parameters]
+    order = sorted(range(len(fit.model.names)), key=lambda i: fit.model.names[i] in own)
+    moved = replace(_plant(fit), effects=tuple(sorted(effects_of(fit), key=lambda e: e is effect)))
+    return fit_output_error(moved, records, [fit.parameters[order]], own=fit.own, phi=fit.phi)
+
+
+def _plant(fit: Fit) -> Plant:
+    if not isinstance(fit.model, Plant):
+        raise TypeError("only a Plant has effects")
+    return fit.model

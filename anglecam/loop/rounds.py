@@ -1,0 +1,184 @@
+"""The rounds of the loop: what a model leaves over, what could be added to it, and whether that proves itself.
+
+    residual → gate → candidates → prediction of what was not fitted → accept → residual → …
+
+An effect is added only where the gate says that something is missing *and* the error on what the model was not fitted
+to falls with a 95 % interval above zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anglecam.effects import LEDGER, Effect
+from anglecam.estimate.noise import Noise, autoregression
+from anglecam.estimate.output_error import Fit
+from anglecam.estimate.record import Record
+from anglecam.loop.attribute import Candidate, fit_candidates, fit_with, promising, side_by_side
+from anglecam.loop.gate import Gate, test_residual
+from anglecam.loop.holdout import Prediction, compare, predict_unseen
+from anglecam.loop.refit import effects_of, recoloured, without
+from anglecam.loop.screen import Change, Forecast, changes, directions, forecasts
+
+MOST_EFFECTS = 3
+LIKELIEST = 2
+"""Effects that are fitted to see what colour the noise has."""
+NEGLIGIBLE = 2.0
+"""In a film, structure smaller than this many times the angle's stated uncertainty is neither traced nor called
+unexplained: it may be the measurement's own."""
+SURE = 0.01
+"""After an effect has proven itself, what remains must be this improbable as noise to be traced further, or to take the
+verdict back."""
+FAITHFUL = 0.01
+"""No structure smaller than this share of what the base model leaves is traced: no model of an effect is truer."""
+FINEST = math.radians(1e-3)
+"""No structure smaller than this is traced: forward models and files are not much finer."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What the loop works on."""
+
+    fitted: tuple[Record, ...]
+    predicted: tuple[Record, ...]
+    """Held out by declaration; may be none."""
+    ledger: tuple[Effect, ...]
+    """What these recordings can show."""
+    floor: Noise | None
+    rng: np.random.Generator
+    progress: Callable[[str], None]
+
+    @property
+    def camera(self) -> float:
+        """Noise of a film's angle, rad; 0 for a series from elsewhere."""
+        return self.floor.sigma if self.floor and self.floor.filmed else 0.0
+
+
+@dataclass(frozen=True)
+class Round:
+    """A model and what its residual says."""
+
+    fit: Fit
+    told: Prediction
+    """Of what is held out by declaration, or of all block by block where nothing is."""
+    unseen: Prediction
+    """Of every frame by a model that was not fitted to it."""
+    gate: Gate
+    forecasts: tuple[Forecast, ...]
+    """What is worth a fit, most promising first."""
+
+
+def look(task: Task, fit: Fit) -> Round:
+    """Test what a fitted plant leaves over, whitened with the noise's colour as far as that can be told by now."""
+    left = [e for e in task.ledger if e not in effects_of(fit)]
+    moved = changes(fit, task.fitted, left)
+    fit = recoloured(fit, task.fitted, _colour(task, fit, moved))
+    ways = directions(fit, task.fitted, moved)
+    told, unseen = predict_unseen(fit, task.fitted, task.predicted)
+    gate = test_residual(fit, task.fitted, ways, task.rng)
+    return Round(fit, told, unseen, gate, tuple(promising(forecasts(fit, ways))))
+
+
+def smallest(task: Task, first: Round) -> float:
+    """Return the smallest structure that is traced, rad RMS."""
+    return max(FINEST, NEGLIGIBLE * task.camera, FAITHFUL * first.unseen.rmse)
+
+
+def candidates_of(task: Task, now: Round) -> list[Candidate]:
+    """Fit what is promising beside what the model has, strongest evidence first."""
+    return fit_candidates(now.fit, now.unseen, task.fitted, task.predicted, now.forecasts)
+
+
+def trace(task: Task, first: Round, candidates: Sequence[Candidate]) -> Round:
+    """Add effects for as long as one proves itself.
+
+    Parameters
+    ----------
+    task : Task
+        What there is to explain.
+    first : Round
+        The base model's.
+    candidates : sequence of Candidate
+        Its candidates; none where nothing is missing.
+
+    Returns
+    -------
+    Round
+        The best model's.
+    """
+    now, negligible = first, smallest(task, first)
+    while candidates:
+        if _convincing(task, now, candidates[0], negligible):
+            now = _added(task, candidates[0])
+            candidates = _next(task, now)
+            continue
+        # one effect may mask another: neither helps alone, and both do together
+        if len(effects_of(now.fit)) + 2 > MOST_EFFECTS:
+            break
+        more = _next(task, _added(task, candidates[0]))
+        if not more or not _convincing(task, now, more[0], negligible):
+            break
+        now = _added(task, more[0])
+        candidates = _next(task, now)
+    return now
+
+
+def _convincing(task: Task, now: Round, best: Candidate, negligible: float) -> bool:
+    # a second left out may hold all that tells of a limit, which what was declared then does
+    pairs = ((now.told, best.told), (now.unseen, best.unseen))
+    return any(
+        after is not None
+        and before.rmse**2 - after.rmse**2 > negligible**2
+        and compare(before, after, task.rng).interval_95[0] > 0.0
+        for before, after in pairs[0 if task.predicted else 1 :]
+    )
+
+
+def _added(task: Task, best: Candidate) -> Round:
+    """Take the candidate's model, less each earlier effect without which the unseen is predicted as well."""
+    task.progress(f"adding {best.effect.id}")
+    fit, unseen = best.fit, best.unseen
+    for effect in effects_of(fit)[:-1]:
+        if unseen is None:
+            break
+        reduced = without(fit, effect, task.fitted)
+        _, less = predict_unseen(reduced, task.fitted, task.predicted)
+        if compare(less, unseen, task.rng).interval_95[0] <= 0.0:
+            fit, unseen = reduced, less
+    return look(task, fit)
+
+
+def _next(task: Task, now: Round) -> list[Candidate]:
+    if now.gate.p_value >= SURE or len(effects_of(now.fit)) == MOST_EFFECTS:
+        return []
+    return candidates_of(task, now)
+
+
+def _colour(task: Task, fit: Fit, moved: Sequence[Change]) -> float:
+    """Return the noise's φ: of the best model's residual, but no more than the noise floor's.
+
+    What a model lacks makes its residual look coloured; the best candidate's residual looks least so, and a rest or
+    the distance from the pivot, which no model enters, says where colour ends and structure begins.
+    """
+    likely = forecasts(fit, directions(fit, task.fitted, moved))[:LIKELIEST]
+    fits = [fit, *side_by_side(lambda one: fit_with(fit, task.fitted, one), likely)]
+    best = min(fits, key=lambda one: one.cost)
+    phi = autoregression(best.residuals, "residual").phi
+    return phi if task.floor is None else min(phi, max(0.0, task.floor.phi + 1.645 * task.floor.phi_error))
+
+
+def applicable(records: Sequence[Record]) -> list[Effect]:
+    """List the effects that recordings can show: a free swing has no command, a series without marks no rows."""
+    driven = any(r.command is not None for r in records)
+    known = all(r.zero_known for r in records)
+    return [
+        e
+        for e in LEDGER
+        if (driven or e.port not in ("command", "lag", "servo"))
+        and (known or e.id != "constant_torque")
+        and all(e.needs(r.view) for r in records)
+    ]
