@@ -24,6 +24,7 @@ from anglecam.export import fitted_model, transfer_as_dict, write_mat
 from anglecam.files import write_json
 from anglecam.identify import ESTIMATORS, Estimator, Identified, declared_start, identify_records
 from anglecam.loop.close import Verdict, close_records
+from anglecam.loop.correct import FOLDER as CORRECTED
 from anglecam.loop.correct import corrected
 from anglecam.loop.holdout import split_records
 from anglecam.loop.result import next_experiment, verdict_as_dict, write_next_command
@@ -227,7 +228,7 @@ def close(
         write_next_command(experiment, out)
         result = verdict_as_dict(verdict, experiment)
         write_json(out / "loop.json", result)
-        _write_corrected(shown, verdict, out / "corrected")
+        _write_corrected(shown, verdict, out / CORRECTED)
         title = session.resolve().name
         write_report(
             out / "report.html", title, verdict, result, experiment, measured.series, models, measured.problems

@@ -14,6 +14,7 @@ from anglecam.effects import effect
 from anglecam.files import write_atomically
 from anglecam.identify import Identified
 from anglecam.loop.close import Verdict
+from anglecam.loop.correct import FOLDER as CORRECTED
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.gate import Test
 from anglecam.loop.remainder import leftover_torque
@@ -106,6 +107,7 @@ def write_report(
         candidates=_candidate_rows(verdict, result),
         drawn=figures.MOST,
         effects=_effect_rows(verdict, result),
+        corrected=CORRECTED if any(a.effect.station == "camera" for a in verdict.accepted) else "",
         experiment=experiment,
         next_command=NEXT_COMMAND,
         detectable=_detectable_rows(result),
