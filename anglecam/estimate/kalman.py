@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from anglecam.estimate.record import Record
 from anglecam.session import Command
-from anglecam.simulate.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, WIDTH, integrate
+from anglecam.simulate.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, SOURCES, WIDTH, integrate
 from anglecam.simulate.plant import MAX_STEP
 
 Floats = NDArray[np.float64]
@@ -161,14 +161,21 @@ def _advance(state: Floats, span: Floats, command: Command) -> tuple[Floats, Flo
     return reached, F
 
 
-@njit
-def _flow(state, span, knots, steps, servos, loads, dries, max_step):  # type: ignore[no-untyped-def]  # compiled
-    slopes = np.empty((2, 5))
-    for j in range(5):
-        low, high = state.copy(), state.copy()
-        low[j] -= steps[j]
-        high[j] += steps[j]
-        under = integrate(span, low[0], low[1], knots, 0.0, low[2:], servos, loads, dries, max_step)[1]
-        over = integrate(span, high[0], high[1], knots, 0.0, high[2:], servos, loads, dries, max_step)[1]
-        slopes[:, j] = (over - under) / (high[j] - low[j])
-    return integrate(span, state[0], state[1], knots, 0.0, state[2:], servos, loads, dries, max_step)[1], slopes
+def _compile_once(code):  # type: ignore[no-untyped-def]  # compiled
+    @njit(cache=True)
+    def _flow(state, span, knots, steps, servos, loads, dries, max_step):  # type: ignore[no-untyped-def]
+        assert len(code) > 0
+        slopes = np.empty((2, 5))
+        for j in range(5):
+            low, high = state.copy(), state.copy()
+            low[j] -= steps[j]
+            high[j] += steps[j]
+            under = integrate(span, low[0], low[1], knots, 0.0, low[2:], servos, loads, dries, max_step)[1]
+            over = integrate(span, high[0], high[1], knots, 0.0, high[2:], servos, loads, dries, max_step)[1]
+            slopes[:, j] = (over - under) / (high[j] - low[j])
+        return integrate(span, state[0], state[1], knots, 0.0, state[2:], servos, loads, dries, max_step)[1], slopes
+
+    return _flow
+
+
+_flow = _compile_once(SOURCES)

@@ -12,10 +12,14 @@ Meas. Control 107, 1985).
 
 from __future__ import annotations
 
+import hashlib
+from pathlib import Path
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from anglecam import effects
 from anglecam.effects import LEDGER
 
 Floats = NDArray[np.float64]
@@ -212,32 +216,8 @@ def _series(theta, omega, h, level, slope, off, lag, abc):  # type: ignore[no-un
     return angle, rate / h
 
 
-@njit(nogil=True)
-def integrate(time, theta, omega, knots, lag, abc, servos, loads, dries, max_step):  # type: ignore[no-untyped-def]
-    """Return angle and rate at ``time``; compiled, so all arguments are taken as they come.
-
-    Parameters
-    ----------
-    time : (n,) ndarray
-        Increasing instants, s; the state is given at the first of them, where a lag has settled.
-    theta, omega : float
-        Angle from equilibrium at zero command (rad) and its rate (rad/s) at ``time[0]``.
-    knots : (3, m) ndarray
-        Of the command: instants (s), levels (rad) and slopes (rad/s); before the first its level holds.
-    lag : float
-        τ, s.
-    abc : (3,) ndarray
-        a (1/s), b (1/s²), c (1/s²) of Eq. (30).
-    servos, loads, dries : (k, WIDTH) ndarray
-        Parameters of the effects at the three ports, a row each in the order of `SERVO_IDS`, `LOAD_IDS`, `DRY_IDS`.
-    max_step : float
-        Longest step, s; 0 where no effect acts at the three ports.
-
-    Returns
-    -------
-    (n, 2) ndarray
-        Angle, rad, and rate, rad/s.
-    """
+@njit
+def _run(time, theta, omega, knots, lag, abc, servos, loads, dries, max_step):  # type: ignore[no-untyped-def]
     n, m = len(time), knots.shape[1]
     states = np.empty((n, 2))
     states[0] = theta, omega
@@ -276,3 +256,51 @@ def _line(knots, k, now):  # type: ignore[no-untyped-def]  # compiled
     if k < 0:
         return knots[1, 0], 0.0
     return knots[1, k] + knots[2, k] * (now - knots[0, k]), knots[2, k]
+
+
+def _sources() -> str:
+    """Hash the code that a run is compiled from: the ledger's files and this one."""
+    files = [Path(__file__), *sorted(Path(effects.__path__[0]).glob("*.py"))]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+SOURCES = _sources()
+"""To be enclosed by what is compiled once for all processes: numba's cache looks at one file and what is enclosed."""
+
+
+def _compile_once(code):  # type: ignore[no-untyped-def]  # compiled
+    """Return the integrator, compiled by the first process that runs it."""
+
+    @njit(nogil=True, cache=True)
+    def integrate(time, theta, omega, knots, lag, abc, servos, loads, dries, max_step):  # type: ignore[no-untyped-def]
+        """Return angle and rate at ``time``; compiled, so all arguments are taken as they come.
+
+        Parameters
+        ----------
+        time : (n,) ndarray
+            Increasing instants, s; the state is given at the first of them, where a lag has settled.
+        theta, omega : float
+            Angle from equilibrium at zero command (rad) and its rate (rad/s) at ``time[0]``.
+        knots : (3, m) ndarray
+            Of the command: instants (s), levels (rad) and slopes (rad/s); before the first its level holds.
+        lag : float
+            τ, s.
+        abc : (3,) ndarray
+            a (1/s), b (1/s²), c (1/s²) of Eq. (30).
+        servos, loads, dries : (k, WIDTH) ndarray
+            Parameters of the effects at the three ports, a row each in the order of `SERVO_IDS`, `LOAD_IDS`, `DRY_IDS`.
+        max_step : float
+            Longest step, s; 0 where no effect acts at the three ports.
+
+        Returns
+        -------
+        (n, 2) ndarray
+            Angle, rad, and rate, rad/s.
+        """
+        assert len(code) > 0
+        return _run(time, theta, omega, knots, lag, abc, servos, loads, dries, max_step)
+
+    return integrate
+
+
+integrate = _compile_once(SOURCES)

@@ -23,7 +23,7 @@ NODES = 512
 1° of a linkage's toggle by less than 2e-5 N·m."""
 
 
-@njit
+@njit(cache=True)
 def _accelerate(theta, omega, drive, low, step, torque, tangent, gamma, constants):  # type: ignore[no-untyped-def]
     """Solve Eq. (31) for θ̈, all that depends on the angle alone from tables."""
     place = (theta - low) / step
@@ -41,7 +41,7 @@ def _accelerate(theta, omega, drive, low, step, torque, tangent, gamma, constant
     return (drive - back - moving) / (inertia + rotor * ratio)
 
 
-@njit
+@njit(cache=True)
 def _integrate(time, theta, omega, switches, drives, low, step, torque, tangent, gamma, constants, max_step):  # type: ignore[no-untyped-def]
     """Run by fourth-order Runge-Kutta between stops, which are the instants asked for and the command's switches."""
     states = np.empty((len(time), 2))

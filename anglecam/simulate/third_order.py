@@ -21,7 +21,7 @@ Floats = NDArray[np.float64]
 MAX_STEP = 0.004
 
 
-@njit
+@njit(cache=True)
 def _integrate(time, state, switches, values, n, d, max_step):  # type: ignore[no-untyped-def]  # compiled
     x, y, z = state[0], state[1], state[2]
     angle = np.empty(len(time))
