@@ -28,6 +28,8 @@ Floats = NDArray[np.float64]
 
 STEP = 1e-6
 """Of the difference quotients, as a share of a parameter."""
+CLUSTER = 15
+"""Frames; errors further apart than this count as independent."""
 _BLAS = ThreadpoolController()
 """The matrices here have some twenty columns: threads that wait for each other made a fit ten times slower."""
 
@@ -82,8 +84,13 @@ class Fit:
 
     @cached_property
     def sigma(self) -> Floats:
-        """(p,) standard uncertainties of ``parameters``, SI, of noise that the whitening made white."""
-        variance = np.diag(self.covariance)
+        """(p,) standard uncertainties of ``parameters``, SI, NaN for a parameter that its bound holds.
+
+        The larger of what noise that the whitening made white would give, and of what is left over itself gives if it
+        may hang together within `CLUSTER` frames: a measurement's errors follow the motion, and so does what a model's
+        equations round off (Liang and Zeger, Biometrika 73, 1986).
+        """
+        variance = np.maximum(np.diag(self.covariance), np.diag(self._covariance(self._clustered)))
         return np.sqrt(np.where(variance >= 0.0, variance, np.nan))
 
     @cached_property
@@ -103,6 +110,16 @@ class Fit:
             return np.concatenate([_correlate(r, phi, jacobian[i:j]) for r, (i, j) in parts])
 
         return self._covariance(correlate)
+
+    def _clustered(self, jacobian: Floats) -> Floats:
+        """Multiply (N, k) values by the errors' covariance as clusters of the residuals tell it, in variances."""
+        edges = np.cumsum([0, *(len(e) for e in self.residuals)])
+        parts = [
+            slice(i, min(i + CLUSTER, stop)) for start, stop in pairwise(edges) for i in range(start, stop, CLUSTER)
+        ]
+        variance = self.cost / max(1, len(self.white) - jacobian.shape[1])
+        product = [np.outer(self.white[part], self.white[part] @ jacobian[part]) for part in parts]
+        return np.concatenate(product) / variance * len(parts) / max(1, len(parts) - 1)
 
     def _covariance(self, correlate: Callable[[Floats], Floats]) -> Floats:
         p = len(self.parameters)

@@ -146,7 +146,7 @@ def with_uncertainty(value: float, sigma: float) -> str:
     if not np.isfinite(value):
         return "none"
     if not 0.0 < sigma < np.inf:
-        return f"{value:.4g} (held by a bound of what is possible)"
+        return f"{value:.4g} (not told by these recordings, or held by a bound of what is possible)"
     digits = int(np.clip(1 - np.floor(np.log10(sigma)), 0, 8))
     return f"{value:.{digits}f} ± {sigma:.{digits}f}"
 
@@ -200,5 +200,7 @@ def _values(verdict: Verdict) -> list[dict[str, float]]:
     own = [p for a in verdict.accepted for p in a.effect.parameters]
     base = len(fit.parameters) - len(own)
     pairs = list(zip(fit.parameters.tolist(), fit.sigma.tolist(), strict=True))
-    told = pairs[:base] + [p.told(*pair) for p, pair in zip(own, pairs[base:], strict=True)]
+    # with less than this the recordings do not tell it, as with an asymmetry of friction that hardly acts
+    certain = [(value, s if s < p.upper - p.lower else np.nan) for p, (value, s) in zip(own, pairs[base:], strict=True)]
+    told = pairs[:base] + [p.told(*pair) for p, pair in zip(own, certain, strict=True)]
     return [{"value": value, "sigma": sigma} for value, sigma in told]

@@ -46,6 +46,19 @@ def test_coloured_noise_is_counted_as_fewer_observations():
     assert np.all((spread > 0.6) & (spread < 1.45)), spread
 
 
+def test_errors_that_hang_together_unknown_to_the_fit_are_in_sigma():
+    found, stated = [], []
+    for seed in range(20):
+        records = session(TruePlant(), 40 + seed, sigma_deg=0.2, phi=0.6)
+        fit = fit_output_error(Plant(), records, [TRUE])
+        found.append(fit.parameters)
+        stated.append((fit.sigma, np.sqrt(np.diag(fit.covariance))))
+    sigma, white = np.mean(stated, axis=0)
+    spread = np.std(found, axis=0)
+    assert np.all((spread / sigma > 0.6) & (spread / sigma < 1.45)), spread / sigma
+    assert np.all(spread / white > 1.45), spread / white
+
+
 def test_a_free_swing_is_fitted_from_an_unknown_state():
     swing = Recording("release", "release", amplitude_deg=15.0, rest_s=0.0)
     true = TruePlant(a=0.4, b=30.0)
