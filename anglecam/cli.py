@@ -297,6 +297,8 @@ def _open(session: Path, out: Path) -> tuple[Session, Measured]:
         measured = measure_session(
             opened, out=out, progress=lambda name, n, total: bars.update(tasks[name], completed=n, total=total or None)
         )
+    for note in measured.notes:
+        screen.print(note, soft_wrap=True, highlight=False, markup=False)
     if not measured.records:
         for problem in measured.problems:
             errors.print(str(problem))

@@ -26,6 +26,8 @@ class Measured:
     """One for each of ``series`` that has enough measured frames."""
     problems: tuple[InputError, ...]
     """What could not be used, one line each."""
+    notes: tuple[str, ...] = ()
+    """What the user should know of tracks, such as which animal was followed, a line each."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,7 @@ def measure_session(
     Measured
         In the order of the recordings' names.
     """
-    series, records, problems = [], [], list(session.problems)
+    series, records, problems, notes = [], [], list(session.problems), []
     zero_known = session.rig.neutral != "auto"
     for recording in session.recordings:
         name = recording.name
@@ -128,10 +130,12 @@ def measure_session(
                 one = measurement.series
                 if out is not None:
                     write_series(one, out / f"{name}{SERIES_ENDING}")
+                if isinstance(measurement, MeasuredTracks):
+                    notes += [f"{recording.source}: {note}" for note in measurement.notes]
                 if measurement.truncated:
                     problems.append(InputError(f"{recording.source}: {measurement.truncated}"))
             series.append(one)
             records.append(record_from_series(one, recording.command, zero_known=zero_known))
         except InputError as problem:
             problems.append(problem)
-    return Measured(tuple(series), tuple(records), tuple(problems))
+    return Measured(tuple(series), tuple(records), tuple(problems), tuple(notes))

@@ -275,6 +275,16 @@ def test_what_is_wrong_with_one_file_of_tracks_costs_that_recording(tmp_path, ru
     assert (tmp_path / "out" / "model.json").exists()
 
 
+def test_a_session_says_which_of_several_animals_was_followed(tmp_path, run):
+    _write_session(tmp_path, Plant())
+    points = np.full((300, 2, 2, 2), np.nan)
+    points[:, 1], points[40:90, 0] = nod(np.zeros(300), np.random.default_rng(0)), 100.0
+    path = write_sleap(tmp_path / "two.analysis.h5", points, tracks=("mia", "max"))
+    status, said, told = run("identify", tmp_path, "--estimator", "ekf", "--out", tmp_path / "out")
+    assert f"{path}: max is followed: it shows nose and neck most often (mia 50, max 300 frames)" in said
+    assert (status, told) == (1, "two: no command, and nothing moves; there is no swing to fit\n")
+
+
 def test_tracks_stand_in_the_clips_place_only_where_marks_are_declared(tmp_path, clip):
     (tmp_path / "swing.avi").write_bytes(clip.read_bytes())
     path = write_sleap(tmp_path / "swing.analysis.h5", nod(np.zeros(40), np.random.default_rng(0)))
