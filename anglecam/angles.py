@@ -2,20 +2,23 @@
 
 Coarse angles come from the mouth's centroid frame by frame; fine ones from the turn of the whole head, which knows
 nothing of the mouth: the line to the mouth's median place on the head is turned along. The mouth's own place in a frame
-stays the centroid that was measured there.
+stays the centroid that was measured there. What an angle is, which way is up and where its zero lies, is said here
+once, for marks of our own and of others.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.budget import PlaceErrors, angle_sigma, place_errors
+from anglecam.budget import PlaceErrors, angle_sigma, place_errors, worst_case
 from anglecam.lens import Lens
 from anglecam.registration import Registered
 from anglecam.rig import Rig
+from anglecam.series import CONTRACT_RADII_PX, OK, AngleSeries
 from anglecam.session import Command
 from anglecam.shutter import mean_off_middle
 from anglecam.sighting import Sighting
@@ -101,13 +104,9 @@ def coarse_angles(seen: Sighting, ok: NDArray[np.bool_], time: Floats, rig: Rig,
     if seen.head is not None:
         return _angles_of_head(seen, seen.head, ok, time, rig, command)
     regions = [r for r, counts in zip(seen.regions, ok, strict=True) if counts and r is not None]
-    mouth, pivot, circle = np.array([r.centre_px for r in regions]), seen.pivot, seen.circle
-    arm = mouth - pivot.centre_px
-    # y goes down in the image; a face that looks to the left is mirrored, so that an upward nod is positive.
-    line = np.unwrap(np.arctan2(-arm[:, 1], _ahead(arm[:, 0], rig)))
-    line -= 2.0 * np.pi * np.round(np.median(line) / (2.0 * np.pi))
+    mouth, circle = np.array([r.centre_px for r in regions]), seen.circle
+    arm = mouth - seen.pivot.centre_px
     lever = np.hypot(*arm.T)
-    neutral, resting = _neutral(rig, command, time[ok], line, lever)
     off = lever - np.median(lever) if circle is None else np.hypot(*(mouth - circle.centre_px).T) - circle.radius_px
     out = arm / lever[:, None]
     noise = seen.noise**2 * np.array([r.noise_px2 for r in regions])
@@ -115,14 +114,130 @@ def coarse_angles(seen: Sighting, ok: NDArray[np.bool_], time: Floats, rig: Rig,
         np.sqrt(np.einsum("ni,nij,nj->n", v, noise, v)) for v in (out, np.column_stack([-out[:, 1], out[:, 0]]))
     )
     errors = place_errors(mouth, off, across, along)
-    view = _view_errors(seen.lens, mouth, pivot.centre_px, line, neutral, resting, rig)
     # of a mouth that is seen at a slant, other parts come into sight as it turns: they stand at other heights
     thick = _THICK * float(np.median(np.sqrt([r.area_px2 for r in regions])))
-    aside = thick * np.hypot(*seen.lens.parallax) * (line - neutral) / lever
-    known = angle_sigma(mouth, pivot.centre_px, pivot.covariance_px2, errors, resting)
-    unsteady = mean_off_middle(time[ok], line, rig.camera.exposure_s)
+    return angles_of_places(mouth, seen.pivot, errors, seen.lens, time[ok], rig, command, thick_px=thick)
+
+
+def angles_of_places(
+    mouth_px: Floats,
+    pivot: Pivot,
+    errors: PlaceErrors,
+    lens: Lens,
+    time: Floats,
+    rig: Rig,
+    command: Command | None,
+    *,
+    thick_px: float = 0.0,
+) -> Angles:
+    """Read the angle off the line from the pivot to the mouth.
+
+    Parameters
+    ----------
+    mouth_px : ndarray
+        (n, 2) places in the plane of motion, px.
+    pivot : Pivot
+        In the plane of motion.
+    errors : PlaceErrors
+        Of those places.
+    lens : Lens
+        Through which they were seen.
+    time : ndarray
+        (n,) s.
+    rig : Rig
+        Facing, neutral and exposure.
+    command : Command, optional
+        Its first change ends the rest that defines neutral.
+    thick_px : float
+        Standard deviation of the height of what is seen of the mouth, px.
+
+    Returns
+    -------
+    Angles
+        Without registration.
+    """
+    arm = mouth_px - pivot.centre_px
+    # y goes down in the image; a face that looks to the left is mirrored, so that an upward nod is positive.
+    line = np.unwrap(np.arctan2(-arm[:, 1], _ahead(arm[:, 0], rig)))
+    line -= 2.0 * np.pi * np.round(np.median(line) / (2.0 * np.pi))
+    lever = np.hypot(*arm.T)
+    neutral, resting = _neutral(rig, command, time, line, lever)
+    view = _view_errors(lens, mouth_px, pivot.centre_px, line, neutral, resting, rig)
+    aside = thick_px * np.hypot(*lens.parallax) * (line - neutral) / lever
+    known = angle_sigma(mouth_px, pivot.centre_px, pivot.covariance_px2, errors, resting)
+    unsteady = mean_off_middle(time, line, rig.camera.exposure_s)
     sigma = np.sqrt(known**2 + view.sigma**2 + aside**2 + unsteady**2)
-    return Angles(line, sigma, mouth, pivot, neutral, resting, errors, view, unsteady)
+    return Angles(line, sigma, mouth_px, pivot, neutral, resting, errors, view, unsteady)
+
+
+def series_of_angles(
+    name: str,
+    time: Floats,
+    status: Sequence[str],
+    ok: Flags,
+    angles: Angles,
+    mouth_px: Floats,
+    pivot_px: Floats,
+    rig: Rig,
+    *,
+    picture_px: tuple[int, int] | None = None,
+    marker_px: tuple[float, float] | None = None,
+) -> AngleSeries:
+    """Lay the measured frames among all the recording's frames.
+
+    Parameters
+    ----------
+    name : str
+        The recording's.
+    time : ndarray
+        (frames,) s.
+    status : sequence of str
+        Of every frame; one that is not ``ok`` stays empty, measured or not.
+    ok : ndarray
+        (frames,) to which of them ``angles`` belong.
+    angles : Angles
+        Of those n frames.
+    mouth_px, pivot_px : ndarray
+        (frames, 2) where the picture shows them, px.
+    rig : Rig
+        Whose ``pixel_error_px`` the bounds are worked out for, besides the contract's.
+    picture_px, marker_px : tuple, optional
+        As of `AngleSeries`.
+
+    Returns
+    -------
+    AngleSeries
+        A row a frame.
+    """
+    told = np.array([s == OK for s in status])
+
+    def among(values: Floats) -> Floats:
+        laid = np.full(len(told), np.nan)
+        laid[ok] = values
+        return np.where(told, laid, np.nan)
+
+    lines, levers = among(angles.line), among(angles.lever_px)
+    return AngleSeries(
+        name=name,
+        time=time,
+        angle=lines - angles.neutral,
+        sigma=among(angles.sigma),
+        status=tuple(status),
+        line=lines,
+        mouth_px=np.where(told[:, None], mouth_px, np.nan),
+        pivot_px=np.where(told[:, None], pivot_px, np.nan),
+        picture_px=picture_px,
+        marker_px=marker_px,
+        bounds={r: worst_case(r, levers) for r in {*CONTRACT_RADII_PX, *rig.pixel_error_px}},
+    )
+
+
+def why_zero_is_elsewhere(rig: Rig, command: Command | None, time: Floats) -> str | None:
+    """Say in a line that zero is not where it should be, ``None`` where it is; ``time`` (n,) of measured frames, s."""
+    change = None if command is None or rig.neutral != "auto" else command.first_change()
+    if change is None or (time < change).any():
+        return None
+    return f"zero is the clip's median: no frame before the first command change at {change:.3f} s could be measured"
 
 
 def _angles_of_head(

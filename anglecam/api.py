@@ -8,20 +8,19 @@ from pathlib import Path
 from anglecam.errors import InputError
 from anglecam.identify import Estimator, Identified, declared_start, identify_records
 from anglecam.loop.close import Verdict, close_records
-from anglecam.measure import measure_clip
-from anglecam.recordings import Measured, measure_session, shown_to_loop
+from anglecam.recordings import Measured, measure_recording, measure_session, shown_to_loop
 from anglecam.rig import Rig
 from anglecam.series import AngleSeries
 from anglecam.session import Session, command_beside, read_session, rig_beside
 
 
 def measure(clip: str | Path, rig: Rig | None = None) -> AngleSeries:
-    """Measure the angle in every frame of a clip.
+    """Measure the angle in every frame of a clip, or of tracks of points in its place.
 
     Parameters
     ----------
     clip : path
-        A film; ``rig.yaml`` and ``NAME.command.csv`` beside it are read.
+        A film, or DeepLabCut's or SLEAP's tracks; ``rig.yaml`` and ``NAME.command.csv`` beside it are read.
     rig : Rig, optional
         In place of the ``rig.yaml`` beside the clip.
 
@@ -38,7 +37,7 @@ def measure(clip: str | Path, rig: Rig | None = None) -> AngleSeries:
         Where the rig file is wrong.
     """
     path = Path(clip)
-    return measure_clip(path, rig or rig_beside(path), command_beside(path)).series
+    return measure_recording(path, rig or rig_beside(path), command_beside(path)).series
 
 
 def identify(session: str | Path, estimator: Estimator = "oe2") -> Identified:

@@ -20,6 +20,7 @@ from anglecam import __version__
 from anglecam.calibrate import calibrate_clip
 from anglecam.calibration import write_calibration
 from anglecam.errors import AnglecamError, InputError, RigError, blame
+from anglecam.exchange import Also, write_also
 from anglecam.export import fitted_model, transfer_as_dict, write_mat
 from anglecam.files import write_json
 from anglecam.identify import ESTIMATORS, Estimator, Identified, declared_start, identify_records
@@ -28,10 +29,11 @@ from anglecam.loop.correct import FOLDER as CORRECTED
 from anglecam.loop.correct import corrected
 from anglecam.loop.holdout import split_records
 from anglecam.loop.result import next_experiment, verdict_as_dict, write_next_command
-from anglecam.measure import Measurement, measure_clip
+from anglecam.marks.angle import MeasuredTracks
+from anglecam.measure import Measurement
 from anglecam.neck.file import read_neck
 from anglecam.neck_cli import app as neck
-from anglecam.recordings import Measured, Shown, measure_session, shown_to_loop
+from anglecam.recordings import Measured, Shown, measure_recording, measure_session, shown_to_loop
 from anglecam.report.budget_page import budget_table, write_budget
 from anglecam.report.calibration_figure import plot_calibration
 from anglecam.report.figures import plot_series
@@ -40,7 +42,16 @@ from anglecam.report.summary import loop_table, model_table, response_table, ser
 from anglecam.response import Response, responses, responses_as_dicts
 from anglecam.rig import Rig, read_rig
 from anglecam.series import write_series
-from anglecam.session import SERIES_ENDING, Command, Session, command_beside, find_clips, read_session, rig_beside
+from anglecam.session import (
+    SERIES_ENDING,
+    Command,
+    Session,
+    command_beside,
+    find_clips,
+    read_session,
+    recording_name,
+    rig_beside,
+)
 from anglecam.terminal import errors, make_folder, screen
 from anglecam.video.overlay import write_overlay
 
@@ -78,10 +89,16 @@ def _anglecam(
 
 @app.command()
 def measure(
-    clips: Annotated[list[Path], typer.Argument(metavar="CLIP", help="Clips, or folders of clips.")],
+    clips: Annotated[
+        list[Path],
+        typer.Argument(metavar="CLIP", help="Clips, folders of clips, or tracks from DeepLabCut or SLEAP."),
+    ],
     out: Out,
     rig: RigFile = None,
     overlay: Annotated[bool, typer.Option("--overlay", help="Also write NAME.overlay.mp4.")] = False,
+    also: Annotated[
+        list[Also] | None, typer.Option("--also", help="Also write NAME.angles.nc or .parquet; repeatable.")
+    ] = None,
 ) -> None:
     """Measure the angle in every frame: NAME.angles.csv and a plot for each clip, and how it answers every change."""
     declared = read_rig(rig) if rig else None
@@ -92,21 +109,23 @@ def measure(
     with _progress() as bars:
         for clip in _expand(clips, problems):
             try:
-                if clip.stem in done:
-                    raise InputError(f"{clip}: {done[clip.stem]} has the same name; measure them to separate folders")
-                done[clip.stem] = clip
+                name = recording_name(clip)
+                if name in done:
+                    raise InputError(f"{clip}: {done[name]} has the same name; measure them to separate folders")
+                done[name] = clip
                 measurement = _measure(clip, declared if declared is not None else rig_beside(clip), bars)
-                write_series(measurement.series, out / f"{clip.stem}{SERIES_ENDING}")
+                write_series(measurement.series, out / f"{name}{SERIES_ENDING}")
+                write_also(measurement.series, also or (), out / name)
                 answers = _responses(measurement, command_beside(clip))
                 if answers:
-                    write_json(out / f"{clip.stem}.responses.json", responses_as_dicts(answers))
+                    write_json(out / f"{name}.responses.json", responses_as_dicts(answers))
                     tables.append(response_table(clip.name, answers))
-                plot_series(measurement.series, out / f"{clip.stem}.png")
+                plot_series(measurement.series, out / f"{name}.png")
                 if overlay:
-                    write_overlay(clip, measurement, out / f"{clip.stem}.overlay.mp4")
+                    write_overlay(_film(clip, measurement), measurement, out / f"{name}.overlay.mp4")
                 rows.append(measurement)
-                if measurement.sighting.truncated:
-                    raise InputError(f"{clip}: {measurement.sighting.truncated}")
+                if measurement.truncated:
+                    raise InputError(f"{clip}: {measurement.truncated}")
             except AnglecamError as problem:
                 problems.append(problem)
     if rows:
@@ -131,9 +150,11 @@ def budget(
             try:
                 used = declared if declared is not None else rig_beside(clip)
                 measurement = _measure(clip, used, bars)
+                if isinstance(measurement, MeasuredTracks):
+                    raise InputError(f"{clip}: a budget needs the pictures; give the clip")
                 screen.print(budget_table(write_budget(clip, measurement, used, out)))
-                if measurement.sighting.truncated:
-                    raise InputError(f"{clip}: {measurement.sighting.truncated}")
+                if measurement.truncated:
+                    raise InputError(f"{clip}: {measurement.truncated}")
             except AnglecamError as problem:
                 problems.append(problem)
     _end(problems)
@@ -277,6 +298,8 @@ def _open(session: Path, out: Path) -> tuple[Session, Measured]:
         measured = measure_session(
             opened, out=out, progress=lambda name, n, total: bars.update(tasks[name], completed=n, total=total or None)
         )
+    for note in measured.notes:
+        screen.print(note, soft_wrap=True, highlight=False, markup=False)
     if not measured.records:
         for problem in measured.problems:
             errors.print(str(problem))
@@ -302,11 +325,20 @@ def _write_model(model: Identified, out: Path, name: str) -> None:
     write_mat(exported, out / f"{name}.mat")
 
 
-def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement:
+def _film(source: Path, measurement: Measurement | MeasuredTracks) -> Path:
+    """Return the film to draw an overlay on."""
+    if not isinstance(measurement, MeasuredTracks):
+        return source
+    if measurement.film is None:
+        raise InputError(f"{source}: no overlay: the clip is not beside the tracks")
+    return measurement.film
+
+
+def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement | MeasuredTracks:
     bar = bars.add_task(clip.name, total=None)
     _say_what_is_not_applied(rig, clip)
     with blame(clip):
-        measurement = measure_clip(
+        measurement = measure_recording(
             clip,
             rig,
             command_beside(clip),
@@ -317,7 +349,7 @@ def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement:
     return measurement
 
 
-def _responses(measurement: Measurement, command: Command | None) -> tuple[Response, ...]:
+def _responses(measurement: Measurement | MeasuredTracks, command: Command | None) -> tuple[Response, ...]:
     series = measurement.series
     changes = [] if command is None else command.time[1:][np.diff(command.angle) != 0.0].tolist()
     return responses(series.time, series.angle, series.sigma, changes)

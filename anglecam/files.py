@@ -41,6 +41,27 @@ def write_atomically(path: Path) -> Iterator[IO[str]]:
         raise
 
 
+@contextlib.contextmanager
+def write_whole(path: Path) -> Iterator[Path]:
+    """Give a place for a file that a library writes by itself; it takes the place of ``path`` when the block ends.
+
+    Parameters
+    ----------
+    path : Path
+        The file to be; its folder is made if missing.
+
+    Yields
+    ------
+    Path
+        In a folder of its own beside it, removed whatever happens.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name}.") as folder:
+        unfinished = Path(folder) / path.name
+        yield unfinished
+        unfinished.replace(path)
+
+
 def write_json(path: Path, content: Any) -> None:
     """Write JSON with every float at full precision; a number that is not finite becomes ``null``."""
     with write_atomically(path) as stream:

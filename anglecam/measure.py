@@ -13,11 +13,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.angles import Angles, coarse_angles, fine_angles, turns
-from anglecam.budget import worst_case
+from anglecam.angles import Angles, coarse_angles, fine_angles, series_of_angles, turns, why_zero_is_elsewhere
 from anglecam.registration import Registered, Start, register_clip
 from anglecam.rig import Rig
-from anglecam.series import CONTRACT_RADII_PX, OK, AngleSeries
+from anglecam.series import OK, AngleSeries
 from anglecam.session import Command, recording_name
 from anglecam.shutter import measurement_time
 from anglecam.sighting import Sighting, sight_clip, sight_head
@@ -45,10 +44,26 @@ class Measurement:
     """Where zero is not where it should be, and why."""
 
     @property
+    def pivot(self) -> str:
+        """Where the pivot's place comes from."""
+        return self.angles.pivot.source
+
+    @property
+    def by(self) -> str:
+        """What the angles were read off."""
+        if self.why_coarse is None:
+            return "whole head"
+        return "mouth" if self.sighting.head is None else "head's key frames"
+
+    @property
+    def truncated(self) -> str | None:
+        """What could not be read of a file that ends too early."""
+        return self.sighting.truncated
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What the user should know, a line each."""
-        by = "mouth" if self.sighting.head is None else "head's key frames"
-        coarse = () if self.why_coarse is None else (f"measured by the {by} alone: {self.why_coarse}",)
+        coarse = () if self.why_coarse is None else (f"measured by the {self.by} alone: {self.why_coarse}",)
         return (*self.sighting.notes, *coarse, *(() if self.zero is None else (self.zero,)))
 
     @property
@@ -112,14 +127,7 @@ def measure_clip(
                 if (other.sigma**2).mean() < (angles.sigma**2).mean():
                     seen, ok, time, angles = head, rigid, head.time, other
     series = _series(path, rig, time, seen, ok, angles)
-    return Measurement(series, seen, angles, why_coarse, _zero(rig, command, time[ok]))
-
-
-def _zero(rig: Rig, command: Command | None, time: Floats) -> str | None:
-    change = None if command is None or rig.neutral != "auto" else command.first_change()
-    if change is None or (time < change).any():
-        return None
-    return f"zero is the clip's median: no frame before the first command change at {change:.3f} s could be measured"
+    return Measurement(series, seen, angles, why_coarse, why_zero_is_elsewhere(rig, command, time[ok]))
 
 
 def _only_the_path_tells(seen: Sighting, rig: Rig) -> bool:
@@ -202,29 +210,15 @@ def _series(
     angles: Angles,
 ) -> AngleSeries:
     """Lay the measured frames among all the clip's frames, less the duplicates."""
-    empty, status = np.full(len(time), np.nan), [OK if k else s for k, s in zip(ok, seen.status, strict=True)]
-    lines, sigmas, levers = empty.copy(), empty.copy(), empty.copy()
-    lines[ok], sigmas[ok], levers[ok] = angles.line, angles.sigma, angles.lever_px
-    mouths = _among(ok, angles.mouth_px)
-    pivots = np.broadcast_to(angles.pivot.centre_px, (len(time), 2))
-    mouths, pivots = seen.in_picture(mouths), seen.in_picture(pivots)
+    status = [OK if k else s for k, s in zip(ok, seen.status, strict=True)]
+    lines, sigmas = np.full((2, len(time)), np.nan)
+    lines[ok], sigmas[ok] = angles.line, angles.sigma
     for i in _duplicates(lines, sigmas, seen.repeated):
         status[i] = "duplicate"
-        lines[i] = sigmas[i] = levers[i] = np.nan
-        mouths[i] = np.nan
-    return AngleSeries(
-        name=recording_name(path),
-        time=time,
-        angle=lines - angles.neutral,
-        sigma=sigmas,
-        status=tuple(status),
-        line=lines,
-        mouth_px=mouths,
-        pivot_px=np.where(np.isfinite(lines)[:, None], pivots, np.nan),
-        picture_px=seen.size,
-        marker_px=_marker(seen),
-        bounds={r: worst_case(r, levers) for r in {*CONTRACT_RADII_PX, *rig.pixel_error_px}},
-    )
+    mouths = seen.in_picture(_among(ok, angles.mouth_px))
+    pivots = seen.in_picture(np.broadcast_to(angles.pivot.centre_px, (len(time), 2)))
+    name, marker = recording_name(path), _marker(seen)
+    return series_of_angles(name, time, status, ok, angles, mouths, pivots, rig, picture_px=seen.size, marker_px=marker)
 
 
 def _marker(seen: Sighting) -> tuple[float, float] | None:

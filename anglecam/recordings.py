@@ -1,4 +1,4 @@
-"""A session's recordings as angle series: clips measured, series read; what fails costs itself alone."""
+"""Recordings as angle series: clips and tracks measured, series read; what fails costs itself alone."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from pathlib import Path
 
 from anglecam.errors import InputError, blame
 from anglecam.estimate.record import Record, record_from_series
-from anglecam.measure import measure_clip
+from anglecam.marks.angle import MeasuredTracks, measure_tracks
+from anglecam.marks.files import TRACKS_ENDINGS
+from anglecam.measure import Measurement, measure_clip
+from anglecam.rig import Rig
 from anglecam.series import AngleSeries, read_series, write_series
-from anglecam.session import SERIES_ENDING, Session
+from anglecam.session import SERIES_ENDING, Command, Session
 from anglecam.uncorrected import uncorrected
 
 
@@ -23,6 +26,8 @@ class Measured:
     """One for each of ``series`` that has enough measured frames."""
     problems: tuple[InputError, ...]
     """What could not be used, one line each."""
+    notes: tuple[str, ...] = ()
+    """What the user should know of tracks, such as which animal was followed, a line each."""
 
 
 @dataclass(frozen=True)
@@ -60,20 +65,45 @@ def shown_to_loop(session: Session, measured: Measured) -> Shown:
     return Shown(kept, tuple(record_from_series(one, commands[one.name], zero_known=known) for one in kept), differs)
 
 
+def measure_recording(
+    source: Path, rig: Rig, command: Command | None = None, *, progress: Callable[[int, int], None] | None = None
+) -> Measurement | MeasuredTracks:
+    """Measure a clip, or the tracks of points that another program has made from one.
+
+    Parameters
+    ----------
+    source, rig, command, progress
+        As of `measure_clip` and `measure_tracks`; tracks are read at once, without progress.
+
+    Returns
+    -------
+    Measurement or MeasuredTracks
+        Both have ``series``, ``angles``, ``pivot``, ``by``, ``notes``, ``truncated`` and ``contours_px``.
+
+    Raises
+    ------
+    InputError, RigError
+        As of both.
+    """
+    if source.suffix.lower() in TRACKS_ENDINGS:
+        return measure_tracks(source, rig, command)
+    return measure_clip(source, rig, command, progress=progress)
+
+
 def measure_session(
     session: Session,
     *,
     out: Path | None = None,
     progress: Callable[[str, int, int], None] = lambda name, done, total: None,
 ) -> Measured:
-    """Measure every clip of a session and read every series.
+    """Measure every clip and all tracks of a session and read every series.
 
     Parameters
     ----------
     session : Session
         From `anglecam.session.read_session`.
     out : Path, optional
-        Folder to write ``NAME.angles.csv`` of every measured clip to.
+        Folder to write ``NAME.angles.csv`` of every measured recording to.
     progress : callable
         Told a clip's name, its frames done and (if known, else 0) in total.
 
@@ -82,14 +112,16 @@ def measure_session(
     Measured
         In the order of the recordings' names.
     """
-    series, records, problems = [], [], list(session.problems)
+    series, records, problems, notes = [], [], list(session.problems), []
     zero_known = session.rig.neutral != "auto"
     for recording in session.recordings:
         name = recording.name
         try:
-            if recording.is_clip:
+            if recording.is_series:
+                one = read_series(recording.source)
+            else:
                 with blame(recording.source):
-                    measurement = measure_clip(
+                    measurement = measure_recording(
                         recording.source,
                         session.rig,
                         recording.command,
@@ -98,12 +130,12 @@ def measure_session(
                 one = measurement.series
                 if out is not None:
                     write_series(one, out / f"{name}{SERIES_ENDING}")
-                if measurement.sighting.truncated:
-                    problems.append(InputError(f"{recording.source}: {measurement.sighting.truncated}"))
-            else:
-                one = read_series(recording.source)
+                if isinstance(measurement, MeasuredTracks):
+                    notes += [f"{recording.source}: {note}" for note in measurement.notes]
+                if measurement.truncated:
+                    problems.append(InputError(f"{recording.source}: {measurement.truncated}"))
             series.append(one)
             records.append(record_from_series(one, recording.command, zero_known=zero_known))
         except InputError as problem:
             problems.append(problem)
-    return Measured(tuple(series), tuple(records), tuple(problems))
+    return Measured(tuple(series), tuple(records), tuple(problems), tuple(notes))

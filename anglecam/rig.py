@@ -72,6 +72,23 @@ class Model(Declared):
     """The centre of mass from upright at neutral, degrees."""
 
 
+class Marks(Declared):
+    """Which points that another program has tracked are mouth and pivot."""
+
+    mouth: str
+    pivot: str
+    rate_hz: Positive | None = None
+    """Frames per second, where no clip stands beside the tracks to say when each frame was taken."""
+    least_likelihood: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = None
+    """Points less likely than this are missing; ``None``: the tracking program's own default."""
+
+    @model_validator(mode="after")
+    def _two_points(self) -> Marks:
+        if self.mouth == self.pivot:
+            raise ValueError("mouth and pivot are the same point; an angle needs two")
+        return self
+
+
 class Rig(Declared):
     """One rig, as ``rig.yaml`` declares it."""
 
@@ -83,6 +100,8 @@ class Rig(Declared):
     pixel_error_px: tuple[Positive, ...] = (6.0, 10.0)
     held_out: tuple[str, ...] = ()
     camera: Camera = Camera()
+    marks: Marks | None = None
+    """Of sessions whose recordings are tracks of points."""
     sync: Sync = Sync()
     model: Model = Model()
 

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +87,27 @@ def write_series(series: AngleSeries, path: Path) -> None:
     path : Path
         The file; it appears whole or not at all.
     """
+    columns = series_columns(series)
+    with write_atomically(path) as stream:
+        rows = csv.writer(stream, lineterminator="\n")
+        rows.writerow(columns)
+        for cells in zip(*columns.values(), strict=True):
+            rows.writerow([_written(name, cell) for name, cell in zip(columns, cells, strict=True)])
+
+
+def series_columns(series: AngleSeries) -> dict[str, NDArray]:
+    """Return a series as the columns of its file, by name and in order: degrees, pixels, NaN for an empty cell.
+
+    Parameters
+    ----------
+    series : AngleSeries
+        The recording; radii in ``series.bounds`` beyond 6 px and 10 px become columns after ``status``.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Each of length n.
+    """
     n = len(series.time)
     empty = np.full((n, 2), np.nan)
     mouth = empty if series.mouth_px is None else series.mouth_px
@@ -93,23 +115,11 @@ def write_series(series: AngleSeries, path: Path) -> None:
     line = empty[:, 0] if series.line is None else series.line
     more = sorted(set(series.bounds) - set(CONTRACT_RADII_PX))
     bounds = {r: np.degrees(series.bounds.get(r, empty[:, 0])) for r in (*CONTRACT_RADII_PX, *more)}
-    with write_atomically(path) as stream:
-        rows = csv.writer(stream, lineterminator="\n")
-        rows.writerow([*COLUMNS, *(f"bound_{r:g}px_deg" for r in more)])
-        for i in range(n):
-            rows.writerow(
-                [
-                    i,
-                    f"{series.time[i]:.9g}",
-                    _cell(math.degrees(series.angle[i]), 6),
-                    _cell(math.degrees(series.sigma[i]), 6),
-                    *(_cell(bounds[r][i], 4) for r in CONTRACT_RADII_PX),
-                    _cell(math.degrees(line[i]), 6),
-                    *(_cell(v, 4) for v in (*mouth[i], *pivot[i])),
-                    series.status[i],
-                    *(_cell(bounds[r][i], 4) for r in more),
-                ]
-            )
+    angle, sigma = np.degrees(series.angle), np.degrees(series.sigma)
+    known = [bounds[r] for r in CONTRACT_RADII_PX]
+    cells = [np.arange(n), series.time, angle, sigma, *known, np.degrees(line), *mouth.T, *pivot.T]
+    columns = dict(zip(COLUMNS, [*cells, np.array(series.status, dtype=str)], strict=True))
+    return columns | {f"bound_{r:g}px_deg": bounds[r] for r in more}
 
 
 def read_series(path: Path) -> AngleSeries:
@@ -223,7 +233,13 @@ def _number(path: Path, line: int, name: str, cell: str, may_be_empty: bool) -> 
     return value
 
 
-def _cell(value: float, digits: int) -> str:
+def _written(column: str, value: Any) -> str:
+    """Write a cell: time to nine digits, angles to a millionth of a degree, else four digits."""
+    if column in ("frame", "status"):
+        return str(value)
+    if column == "time_s":
+        return f"{value:.9g}"
+    digits = 6 if column in ("angle_deg", "sigma_deg", "line_deg") else 4
     return f"{value:.{digits}f}" if math.isfinite(value) else ""
 
 

@@ -11,12 +11,13 @@ from anglecam.identify import Identified
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.result import NEXT_COMMAND, describe, sentence
+from anglecam.marks.angle import MeasuredTracks
 from anglecam.measure import Measurement
 from anglecam.response import Figure, Response
 
 
-def series_table(measurements: Sequence[Measurement]) -> Table:
-    """Tabulate measured clips: frames, range, uncertainty, pivot."""
+def series_table(measurements: Sequence[Measurement | MeasuredTracks]) -> Table:
+    """Tabulate measured recordings: frames, range, uncertainty, pivot."""
     table = Table("clip", "measured", "angle, °", "median sigma, °", "6 px bound, °", "pivot", "by")
     for column in table.columns[1:5]:
         column.justify = "right"
@@ -32,14 +33,10 @@ def series_table(measurements: Sequence[Measurement]) -> Table:
             f"{_plain(degrees.min())} … {_plain(degrees.max())}",
             f"{np.degrees(np.median(series.sigma[ok])):.4f}",
             f"{np.degrees(np.median(series.bounds[6.0][ok])):.2f}",
-            measurement.angles.pivot.source,
-            "whole head" if measurement.why_coarse is None else _coarse(measurement),
+            measurement.pivot,
+            measurement.by,
         )
     return table
-
-
-def _coarse(measurement: Measurement) -> str:
-    return "mouth" if measurement.sighting.head is None else "head's key frames"
 
 
 def response_table(name: str, answers: Sequence[Response]) -> Table:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
@@ -13,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.files import write_whole
 from anglecam.series import OK, AngleSeries
 from anglecam.video.frames import Frame, Image, read_frames
 
@@ -56,12 +56,8 @@ def write_overlay(clip: Path, measured: Measured, path: Path) -> None:
     InputError
         As `read_frames`.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}.") as folder:
-        unfinished = Path(folder) / path.name
-        with av.open(str(unfinished), mode="w") as container:
-            _encode(container, read_frames(clip), measured)
-        unfinished.replace(path)
+    with write_whole(path) as unfinished, av.open(str(unfinished), mode="w") as container:
+        _encode(container, read_frames(clip), measured)
 
 
 def draw_frame(image: Image, measured: Measured, index: int) -> Image:

@@ -1,0 +1,134 @@
+"""Angle series for other programs: netCDF as `movement` reads it, Parquet for tables; both beside the CSV.
+
+`movement` (neuroinformatics.dev) keeps poses as an xarray dataset: ``position`` over time, space, keypoints and
+individuals, ``confidence`` without space, attributes that say where they come from. Mouth and pivot are its two
+keypoints here, and the angle stands beside them as further variables over time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam import __version__
+from anglecam.files import write_whole
+from anglecam.series import AngleSeries, series_columns
+
+UNITS = {"s": "s", "deg": "degree", "px": "pixel"}
+"""By the last part of a column's name."""
+
+
+class Also(StrEnum):
+    """What `write_also` can write besides the CSV."""
+
+    netcdf = "netcdf"
+    parquet = "parquet"
+
+
+def write_also(series: AngleSeries, formats: Iterable[Also], stem: Path) -> None:
+    """Write a series as ``NAME.angles.nc`` or ``NAME.angles.parquet``.
+
+    Parameters
+    ----------
+    series : AngleSeries
+        Measured.
+    formats : iterable of Also
+        Which of them.
+    stem : Path
+        Folder and NAME.
+    """
+    for wanted in dict.fromkeys(formats):
+        if wanted is Also.netcdf:
+            write_netcdf(series, stem.with_name(f"{stem.name}.angles.nc"))
+        else:
+            write_parquet(series, stem.with_name(f"{stem.name}.angles.parquet"))
+
+
+def write_netcdf(series: AngleSeries, path: Path) -> None:
+    """Write a series as netCDF-4 in the layout of `movement`'s poses.
+
+    Dimensions time, space, keypoints, individuals; ``position`` in px, ``confidence`` NaN, because anglecam states an
+    uncertainty and no likelihood; ``angle_deg``, ``sigma_deg``, ``line_deg``, the bounds and ``status`` over time.
+
+    Parameters
+    ----------
+    series : AngleSeries
+        Measured; without marks the positions are NaN.
+    path : Path
+        The file; it appears whole or not at all.
+    """
+    import h5netcdf
+
+    columns = series_columns(series)
+    n = len(series.time)
+    with write_whole(path) as unfinished, h5netcdf.File(unfinished, "w") as file:
+        file.dimensions = {"time": n, "space": 2, "keypoints": 2, "individuals": 1}
+        file.attrs.update(
+            {
+                "source_software": "anglecam",
+                "source_software_version": __version__,
+                "source_file": series.name,
+                "ds_type": "poses",
+                "time_unit": "seconds",
+                "fps": _rate_hz(series.time),
+            }
+        )
+        time = file.create_variable("time", ("time",), "f8", data=series.time)
+        time.attrs["long_name"] = "time stamps of the frames on the clip's own clock, in seconds"
+        for name, labels in (("space", ["x", "y"]), ("keypoints", ["mouth", "pivot"]), ("individuals", ["head"])):
+            _texts(file, name, name, labels)
+        marks = np.stack([_marks(series.mouth_px, n), _marks(series.pivot_px, n)], axis=-1)
+        position = file.create_variable("position", tuple(file.dimensions), "f8", data=marks[..., None])
+        position.attrs["units"] = "pixel"
+        unstated = np.full((n, 2, 1), np.nan)
+        file.create_variable("confidence", ("time", "keypoints", "individuals"), "f8", data=unstated)
+        for name, values in columns.items():
+            if name.endswith("_deg"):
+                variable = file.create_variable(name, ("time",), "f8", data=values)
+                variable.attrs["units"] = UNITS["deg"]
+        _texts(file, "status", "time", series.status)
+
+
+def write_parquet(series: AngleSeries, path: Path) -> None:
+    """Write a series as Parquet with the columns of the CSV, and their units in the schema.
+
+    Parameters
+    ----------
+    series : AngleSeries
+        Measured; what the CSV leaves empty is null.
+    path : Path
+        The file; it appears whole or not at all.
+    """
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    fields, arrays = [], []
+    for name, values in series_columns(series).items():
+        unit = UNITS.get(name.rpartition("_")[2])
+        array = pa.array(values, from_pandas=True)  # NaN becomes null
+        fields.append(pa.field(name, array.type, metadata=None if unit is None else {"unit": unit}))
+        arrays.append(array)
+    about = {"source_software": f"anglecam {__version__}", "name": series.name}
+    with write_whole(path) as unfinished:
+        parquet.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=about)), unfinished)
+
+
+def _marks(places_px: NDArray[np.float64] | None, n: int) -> NDArray[np.float64]:
+    return np.full((n, 2), np.nan) if places_px is None else places_px
+
+
+def _rate_hz(time: NDArray[np.float64]) -> float:
+    """Return frames per second by the median interval; ``fps`` is a nominal figure, ``time`` holds the truth."""
+    return 1.0 / float(np.median(np.diff(time))) if len(time) > 1 else float("nan")
+
+
+def _texts(file: Any, name: str, dimension: str, texts: Iterable[str]) -> None:
+    import h5py
+
+    values = np.array(list(texts), dtype=object)
+    file.create_variable(name, (dimension,), h5py.string_dtype(), data=values)

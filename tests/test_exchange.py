@@ -1,0 +1,113 @@
+"""Angle series for other programs: what they open is what the CSV says."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+import xarray as xr
+from pyarrow import parquet
+
+from anglecam import cli
+from anglecam.exchange import Also, write_also, write_netcdf, write_parquet
+from anglecam.series import COLUMNS, AngleSeries, read_series, write_series
+from support.tracked import nod, write_sleap
+
+
+@pytest.fixture
+def series() -> AngleSeries:
+    """Fifty frames at uneven times, two of them without an angle, and a bound of its own."""
+    rng, n = np.random.default_rng(0), 50
+    status = ["ok"] * n
+    status[7], status[8] = "no_mouth", "occluded"
+    ok = np.array([s == "ok" for s in status])
+
+    def there(values):
+        return np.where(ok if values.ndim == 1 else ok[:, None], values, np.nan)
+
+    return AngleSeries(
+        name="nod",
+        time=np.cumsum(rng.uniform(0.03, 0.04, n)),
+        angle=there(rng.normal(size=n)),
+        sigma=there(rng.uniform(0.001, 0.002, n)),
+        status=tuple(status),
+        line=there(rng.normal(size=n)),
+        mouth_px=there(rng.uniform(0, 600, (n, 2))),
+        pivot_px=there(rng.uniform(0, 600, (n, 2))),
+        bounds={r: there(np.full(n, r / 180.0)) for r in (4.0, 6.0, 10.0)},
+    )
+
+
+def test_netcdf_has_the_dimensions_variables_and_attributes_of_movement(series, tmp_path):
+    """As `movement.validators.datasets.ValidPosesInputs` asks for (movement 0.15)."""
+    write_netcdf(series, tmp_path / "nod.angles.nc")
+    with xr.open_dataset(tmp_path / "nod.angles.nc", engine="h5netcdf") as data:
+        assert data.position.dims == ("time", "space", "keypoints", "individuals")
+        assert data.confidence.dims == ("time", "keypoints", "individuals")
+        assert data.space.values.tolist() == ["x", "y"]
+        assert data.keypoints.values.tolist() == ["mouth", "pivot"]
+        assert data.sizes == {"time": 50, "space": 2, "keypoints": 2, "individuals": 1}
+        assert data.attrs["ds_type"] == "poses"
+        assert data.attrs["source_software"] == "anglecam"
+        assert data.attrs["time_unit"] == "seconds"
+        assert data.attrs["fps"] == pytest.approx(1.0 / np.median(np.diff(series.time)))
+        assert data.time.dtype == np.float64  # seconds as they are, not taken for a date
+        np.testing.assert_array_equal(data.time, series.time)
+        mouth = data.position.sel(keypoints="mouth", individuals="head").transpose("time", "space")
+        np.testing.assert_array_equal(mouth, series.mouth_px)
+        pivot = data.position.sel(keypoints="pivot", individuals="head", space="y")
+        np.testing.assert_array_equal(pivot, series.pivot_px[:, 1])
+        np.testing.assert_array_equal(data.angle_deg, np.degrees(series.angle))
+        np.testing.assert_array_equal(data.sigma_deg, np.degrees(series.sigma))
+        np.testing.assert_array_equal(data.bound_4px_deg, np.degrees(series.bounds[4.0]))
+        assert data.angle_deg.attrs["units"] == "degree"
+        assert tuple(data.status.values) == series.status
+
+
+def test_parquet_has_the_columns_of_the_contract_with_units_and_nulls(series, tmp_path):
+    write_parquet(series, tmp_path / "nod.angles.parquet")
+    table = parquet.read_table(tmp_path / "nod.angles.parquet")
+    assert tuple(table.column_names) == (*COLUMNS, "bound_4px_deg")
+    units = {field.name: (field.metadata or {}).get(b"unit") for field in table.schema}
+    assert (units["time_s"], units["angle_deg"], units["mouth_x_px"]) == (b"s", b"degree", b"pixel")
+    assert units["frame"] is None
+    assert table.column("frame").to_pylist() == list(range(50))
+    assert table.column("angle_deg").null_count == 2
+    assert table.column("angle_deg")[7].as_py() is None
+    assert tuple(table.column("status").to_pylist()) == series.status
+    write_series(series, tmp_path / "nod.angles.csv")
+    back = read_series(tmp_path / "nod.angles.csv")
+    np.testing.assert_allclose(table.column("angle_deg").to_numpy(), np.degrees(back.angle), atol=5.1e-7)
+
+
+def test_a_series_without_marks_or_with_one_frame_is_written_too(tmp_path):
+    bare = AngleSeries("bare", np.array([0.5]), np.array([0.1]), np.array([np.nan]), ("ok",))
+    write_also(bare, [Also.netcdf, Also.parquet], tmp_path / "bare")
+    with xr.open_dataset(tmp_path / "bare.angles.nc", engine="h5netcdf") as data:
+        assert np.isnan(data.position).all()
+        assert np.isnan(data.attrs["fps"])
+    assert parquet.read_table(tmp_path / "bare.angles.parquet").column("sigma_deg").null_count == 1
+
+
+@pytest.mark.parametrize("wanted", Also)
+def test_the_same_series_gives_the_same_bytes_and_nothing_is_left_behind(series, tmp_path, wanted):
+    for folder in ("once", "again"):
+        write_also(series, [wanted, wanted], tmp_path / folder / "nod")
+    (once,), (again,) = ((tmp_path / folder).iterdir() for folder in ("once", "again"))
+    assert once.name == again.name == f"nod.angles.{'nc' if wanted is Also.netcdf else 'parquet'}"
+    assert once.read_bytes() == again.read_bytes()
+
+
+def test_measure_writes_them_beside_the_csv(tmp_path, monkeypatch, capsys):
+    write_sleap(tmp_path / "nod.h5", nod(np.linspace(0.0, 20.0, 60), np.random.default_rng(0)))
+    (tmp_path / "rig.yaml").write_text("marks: {mouth: nose, pivot: neck, rate_hz: 30}\n")
+    call = ["anglecam", "measure", str(tmp_path / "nod.h5"), "--out", str(tmp_path / "out"), "--also"]
+    for formats, status in ((["netcdf", "--also", "parquet"], 0), (["excel"], 2)):
+        monkeypatch.setattr(sys, "argv", [*call, *formats])
+        with pytest.raises(SystemExit) as left:
+            cli.main()
+        assert (left.value.code or 0) == status
+    assert "excel" in capsys.readouterr().err
+    found = {path.name for path in (tmp_path / "out").iterdir()}
+    assert found == {"nod.angles.csv", "nod.angles.nc", "nod.angles.parquet", "nod.png"}
