@@ -10,7 +10,7 @@ from anglecam.errors import InputError, blame
 from anglecam.estimate.record import Record, record_from_series
 from anglecam.measure import measure_clip
 from anglecam.series import AngleSeries, read_series, write_series
-from anglecam.session import SERIES_ENDING, Session
+from anglecam.session import SERIES_ENDING, Recording, Session
 from anglecam.uncorrected import uncorrected
 
 
@@ -82,24 +82,46 @@ def measure_session(
     Measured
         In the order of the recordings' names.
     """
+
+    def measured(recording: Recording) -> tuple[AngleSeries, str | None]:
+        name = recording.name
+        with blame(recording.source):
+            measurement = measure_clip(
+                recording.source,
+                session.rig,
+                recording.command,
+                progress=lambda done, total: progress(name, done, total),
+            )
+        if out is not None:
+            write_series(measurement.series, out / f"{name}{SERIES_ENDING}")
+        return measurement.series, measurement.sighting.truncated
+
+    return gather_session(session, measured)
+
+
+def gather_session(session: Session, series_of: Callable[[Recording], tuple[AngleSeries, str | None]]) -> Measured:
+    """Read every series of a session and take those of its clips from ``series_of``.
+
+    Parameters
+    ----------
+    session : Session
+        From `anglecam.session.read_session`.
+    series_of : callable
+        From a clip's recording to its series and, where its file ends too early, how much of it could be read.
+
+    Returns
+    -------
+    Measured
+        In the order of the recordings' names.
+    """
     series, records, problems = [], [], list(session.problems)
     zero_known = session.rig.neutral != "auto"
     for recording in session.recordings:
-        name = recording.name
         try:
             if recording.is_clip:
-                with blame(recording.source):
-                    measurement = measure_clip(
-                        recording.source,
-                        session.rig,
-                        recording.command,
-                        progress=lambda done, total, name=name: progress(name, done, total),  # type: ignore[misc]
-                    )
-                one = measurement.series
-                if out is not None:
-                    write_series(one, out / f"{name}{SERIES_ENDING}")
-                if measurement.sighting.truncated:
-                    problems.append(InputError(f"{recording.source}: {measurement.sighting.truncated}"))
+                one, truncated = series_of(recording)
+                if truncated:
+                    problems.append(InputError(f"{recording.source}: {truncated}"))
             else:
                 one = read_series(recording.source)
             series.append(one)
