@@ -10,7 +10,6 @@ import os
 import posixpath
 from pathlib import Path
 from typing import Any
-from unicodedata import category
 
 import fsspec
 
@@ -129,8 +128,3 @@ def fetch(address: str, to: Path) -> None:
     except Exception as fault:  # every store has exceptions of its own
         said = (str(fault).strip() or type(fault).__name__).splitlines()[0]
         raise InputError(f"{address}: cannot be fetched ({getattr(fault, 'strerror', None) or said})") from fault
-
-
-def printable(text: str) -> str:
-    """Return text that every file and terminal takes on one line, whatever bytes a file's name is made of."""
-    return "".join(c.encode("unicode_escape").decode() if category(c) in ("Cc", "Cs", "Zl", "Zp") else c for c in text)

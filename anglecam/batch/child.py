@@ -45,7 +45,8 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict
-        What the index says of the clip, or its ``cause`` and whether the ``call_is_wrong``.
+        What the index says of the clip, or the ``cause`` why there are no results, whether the ``call_is_wrong``, and
+        whether it is ``passing``: another time may be different.
     """
     clip, into = Path(request["clip"]), Path(request["into"])
     found: dict[str, Any] = {}
@@ -63,9 +64,9 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
                 if request["keep"]:
                     keep_series(measurement.series, Path(request["keep"]))
             except OSError as problem:
-                raise InputError(f"{clip}: {cannot_write(problem)}") from problem
+                return found | {"cause": cannot_write(problem), "call_is_wrong": False, "passing": True}
     except AnglecamError as problem:
-        found |= {"cause": str(problem), "call_is_wrong": isinstance(problem, RigError)}
+        found |= {"cause": str(problem), "call_is_wrong": isinstance(problem, RigError), "passing": False}
     return found
 
 

@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from anglecam.batch.address import parent, printable
+from anglecam.batch.address import parent
 from anglecam.batch.index import write_index
 from anglecam.batch.notes import Note, SessionNote, Store
 from anglecam.batch.row import FAILED, Row, cannot_write
 from anglecam.batch.sessions import SessionJob
 from anglecam.batch.work import Settings
 from anglecam.errors import AnglecamError, InputError, RigError
+from anglecam.terminal import printable
 
 _INDEX_EVERY_S = 10.0
 _INDEX_SHARE = 0.02

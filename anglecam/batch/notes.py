@@ -39,6 +39,8 @@ class Note:
     """Results, relative to the output folder, with their sizes in bytes."""
     call_is_wrong: bool = False
     """Whether a rig file, not the clip, is to blame."""
+    passing: bool = False
+    """Whether it may go otherwise another time with nothing changed: the disk was full, the clip still being written."""
     unchanged: bool = False
     """Whether this is what an earlier call found."""
 

@@ -27,7 +27,7 @@ class LocalTeam(Generic[Job, Done]):
 
     def __init__(self, work: Callable[[Job, MeasuringProcess], Done], size: int) -> None:
         self._work = work
-        self._jobs: queue.SimpleQueue[Job] = queue.SimpleQueue()
+        self._jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
         self._done: queue.SimpleQueue[Done | Exception] = queue.SimpleQueue()
         self._processes = [MeasuringProcess() for _ in range(size)]
 
@@ -39,6 +39,7 @@ class LocalTeam(Generic[Job, Done]):
     def __exit__(self, *_: object) -> None:
         for process in self._processes:
             process.close()
+            self._jobs.put(None)
 
     @property
     def room(self) -> int:
@@ -58,8 +59,7 @@ class LocalTeam(Generic[Job, Done]):
 
     def _serve(self, process: MeasuringProcess) -> None:
         with contextlib.suppress(Abandoned):
-            while True:
-                job = self._jobs.get()
+            while (job := self._jobs.get()) is not None:
                 try:
                     self._done.put(self._work(job, process))
                 except Exception as fault:  # noqa: BLE001  (raised again where the batch waits)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from anglecam import __version__
-from anglecam.batch.address import is_remote, join, name, names_in, parent, printable, read_small, stem
+from anglecam.batch.address import is_remote, join, name, names_in, parent, read_small, stem
 from anglecam.batch.identity import combined
 from anglecam.batch.lock import is_current
 from anglecam.batch.notes import Note, SessionNote, Store
@@ -19,6 +19,7 @@ from anglecam.batch.sources import Source
 from anglecam.batch.work import Settings, fetch_beside, require_version, time_allowed, told, unfinished
 from anglecam.errors import AnglecamError, InputError, RigError, blame
 from anglecam.session import CLIP_ENDINGS, COMMAND_ENDING, SERIES_ENDING
+from anglecam.terminal import printable
 
 _LEAST_TIME_S = 3600.0
 """For fitting, and for the bootstraps of the loop."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from anglecam import __version__
-from anglecam.batch.address import fetch, is_remote, join, name, names_in, parent, printable, stem
+from anglecam.batch.address import fetch, is_remote, join, name, names_in, parent, stem
 from anglecam.batch.identity import calibration_named, clip_configuration, content_hash, is_settled, stamp
 from anglecam.batch.lock import is_current
 from anglecam.batch.notes import Note, Store
@@ -23,6 +23,7 @@ from anglecam.batch.process import Lost, MeasuringProcess
 from anglecam.batch.row import FAILED, OK, TRUNCATED, Row, cannot_write
 from anglecam.errors import AnglecamError, InputError, RigError, blame
 from anglecam.session import COMMAND_ENDING
+from anglecam.terminal import printable
 
 _LEAST_TIME_S = 600.0
 _TIME_PER_BYTE_S = 1e-5
@@ -92,7 +93,7 @@ def do_clip(job: ClipJob, settings: Settings, process: MeasuringProcess) -> Note
                     return _renewed(before, note, settings, store)
                 note, made = _measured(note, job, settings, process, clip, work)
         except AnglecamError as problem:
-            note = _failed(note, told(problem, job.address, work), isinstance(problem, RigError))
+            note = _failed(note, told(problem, job.address, work), call_is_wrong=isinstance(problem, RigError))
         note = replace(note, row=replace(note.row, wall_time_s=round(time.monotonic() - began, 3)))
         return _published(note, made, before, settings, store)
 
@@ -169,6 +170,7 @@ def _is_done(before: Note, note: Note, job: ClipJob, settings: Settings, store: 
         and before.row.sha256 is not None
         and (before.row.configuration, before.row.version) == (note.row.configuration, note.row.version)
         and before.place == job.place
+        and not before.passing
         and not (before.row.status == FAILED and settings.retry_failed)
         and not (job.keep and before.row.status != FAILED and store.kept(job.address) not in before.files)
         and store.has(before.files)
@@ -198,7 +200,7 @@ def _measured(
     try:
         into.mkdir(parents=True)
     except OSError as problem:
-        raise InputError(f"{job.address}: {cannot_write(problem)}") from problem
+        return _failed(note, cannot_write(problem), passing=True), {}
     request = {
         "clip": str(clip),
         "rig": settings.rig,
@@ -212,8 +214,10 @@ def _measured(
     figures = {key: value for key, value in answer.items() if key in Row.__dataclass_fields__ and key != "cause"}
     note = replace(note, row=replace(note.row, **figures))
     if "cause" in answer:
-        return _failed(note, told(answer["cause"], job.address, work), answer["call_is_wrong"]), {}
-    _require_unchanged(note)
+        cause = told(answer["cause"], job.address, work)
+        return _failed(note, cause, call_is_wrong=answer["call_is_wrong"], passing=answer["passing"]), {}
+    if stamp(note.address) != note.stamp:
+        return _failed(note, "it changed while it was being measured", passing=True), {}
     made = {job.place + file.name[len(clip.stem) :]: file for file in sorted(into.iterdir())}
     if job.keep:
         made[Store(Path(settings.out)).kept(job.address)] = kept
@@ -221,7 +225,7 @@ def _measured(
         note.row,
         status=TRUNCATED if answer["truncated"] else OK,
         cause=answer["truncated"],
-        series=f"{job.place}.angles.csv",
+        series=printable(f"{job.place}.angles.csv"),
     )
     return replace(note, row=row), made
 
@@ -231,14 +235,9 @@ def time_allowed(size_bytes: int) -> float:
     return _LEAST_TIME_S + _TIME_PER_BYTE_S * size_bytes
 
 
-def _require_unchanged(note: Note) -> None:
-    """Refuse what was measured while its file was being written."""
-    if stamp(note.address) != note.stamp:
-        raise InputError(f"{note.address}: it changed while it was being measured")
-
-
-def _failed(note: Note, cause: str, call_is_wrong: bool) -> Note:
-    return replace(note, row=replace(note.row, status=FAILED, cause=cause, series=None), call_is_wrong=call_is_wrong)
+def _failed(note: Note, cause: str, *, call_is_wrong: bool = False, passing: bool = False) -> Note:
+    row = replace(note.row, status=FAILED, cause=cause, series=None)
+    return replace(note, row=row, call_is_wrong=call_is_wrong, passing=passing)
 
 
 def _published(note: Note, made: dict[str, Path], before: Note | None, settings: Settings, store: Store) -> Note:
@@ -249,5 +248,5 @@ def _published(note: Note, made: dict[str, Path], before: Note | None, settings:
     try:
         published: Note = store.publish(note, made, stale, settings.run)
     except OSError as problem:
-        return _failed(note, cannot_write(problem), call_is_wrong=False)
+        return _failed(note, cannot_write(problem), passing=True)
     return published

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from anglecam.batch.run import Options, run_batch
+from anglecam.errors import RigError
 from anglecam.measure import measure_clip
 from anglecam.results import write_measurement
 from anglecam.rig import Rig
@@ -23,7 +24,7 @@ QUIET = Options(jobs=1, quiet=True)
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
-    """A lab's folder with two bad clips in it, and what one batch made of it."""
+    """Return a lab's folder with two bad clips in it, and what one batch made of it."""
     top = tmp_path_factory.mktemp("lab")
     lab = tiny_lab(top / "clips", ["b.avi", "mon/a.avi", "mon/a.mkv.avi", "tue/a.avi"])
     (lab / "mon" / "empty.mp4").touch()
@@ -88,7 +89,7 @@ def test_a_clip_that_fails_costs_itself_one_line_and_exit_status_1(done):
 
 
 def test_the_log_is_a_line_of_json_for_every_clip(done):
-    lab, out, _ = done
+    _, out, _ = done
     lines = [json.loads(line) for line in (out.parent / "log.jsonl").read_text().splitlines()]
     assert sorted(line["clip"] for line in lines) == list(rows(out))
     assert all(line.keys() >= {"time", "status", "cause", "wall_time_s"} for line in lines)
@@ -185,14 +186,13 @@ def test_wrong_calls_are_exit_status_2_and_do_nothing(tmp_path):
     lab = tiny_lab(tmp_path / "clips", ["a.avi"])
     (tmp_path / "rig.yaml").write_text("facing: up\n")
     (tmp_path / "file").touch()
-    for wrong in (
-        ["--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out"],
-        ["--out", tmp_path / "file"],
-        ["--jobs", 0, "--out", tmp_path / "out"],
-        ["--jobs", 2, "--dask", "tcp://nowhere:1", "--out", tmp_path / "out"],
-        ["--log", tmp_path, "--out", tmp_path / "out"],
+    told = run(lab, "--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out")
+    assert told.returncode == 2
+    assert told.stderr.splitlines() == [f"{tmp_path}/rig.yaml: facing: input should be 'right' or 'left' (got up)"]
+    for out, options, says in (
+        (tmp_path / "file", QUIET, "is a file"),
+        (tmp_path / "out", Options(jobs=1, log=tmp_path), "--log"),
     ):
-        told = run(lab, *wrong)
-        assert told.returncode == 2
-        assert "Traceback" not in told.stderr
+        with pytest.raises(RigError, match=says):
+            run_batch([str(lab)], out, options)
     assert not list((tmp_path / "out").glob("*.csv"))

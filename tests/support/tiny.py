@@ -23,12 +23,13 @@ FRAMES = 8
 def tiny_clip(path: Path, seed: int = 0) -> Path:
     """Write eight frames of a nodding head, a quarter of the usual size; another seed gives another clip."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), RATE_HZ, SIZE)
+    plain = path.with_name("plain.avi")  # OpenCV takes no odd names
+    writer = cv2.VideoWriter(str(plain), cv2.VideoWriter_fourcc(*"MJPG"), RATE_HZ, SIZE)
     for frame in _frames(seed % 5):
         shade = np.full_like(frame, seed // 5)
         writer.write(cv2.add(frame, shade))
     writer.release()
-    return path
+    return plain.replace(path)
 
 
 def tiny_lab(folder: Path, names: Sequence[str]) -> Path:
@@ -40,7 +41,7 @@ def tiny_lab(folder: Path, names: Sequence[str]) -> Path:
 
 @cache
 def _frames(seed: int) -> tuple[np.ndarray, ...]:
-    angles = 8 * np.sin(np.arange(FRAMES) / 2 + seed)
+    angles = 9 * np.cos(np.pi * np.arange(FRAMES) / (FRAMES - 1)) + seed
     drawn = draw_frames(Look(marker="ring"), angles, seed=seed)
     return tuple(cv2.resize(frame, SIZE, interpolation=cv2.INTER_AREA) for frame in drawn)
 
