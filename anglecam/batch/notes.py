@@ -40,7 +40,7 @@ class Note:
     call_is_wrong: bool = False
     """Whether a rig file, not the clip, is to blame."""
     passing: bool = False
-    """Whether it may go otherwise another time with nothing changed: the disk was full, the clip still being written."""
+    """Whether another time may be different though nothing has changed: a full disk, a clip still being written."""
     unchanged: bool = False
     """Whether this is what an earlier call found."""
 

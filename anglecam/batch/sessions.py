@@ -16,7 +16,7 @@ from anglecam.batch.notes import Note, SessionNote, Store
 from anglecam.batch.process import Lost, MeasuringProcess
 from anglecam.batch.row import FAILED, cannot_write
 from anglecam.batch.sources import Source
-from anglecam.batch.work import Settings, fetch_beside, require_version, time_allowed, told, unfinished
+from anglecam.batch.work import Settings, fetch_beside, require_same_batch, time_allowed, told, unfinished
 from anglecam.errors import AnglecamError, InputError, RigError, blame
 from anglecam.session import CLIP_ENDINGS, COMMAND_ENDING, SERIES_ENDING
 from anglecam.terminal import printable
@@ -93,7 +93,9 @@ def do_session(job: SessionJob, settings: Settings, process: MeasuringProcess) -
     with unfinished(store, settings.run) as work:
         try:
             with blame(Path(job.address)):
-                require_version(settings)
+                require_same_batch(settings, store)
+                if not measured and not any(file.endswith(SERIES_ENDING) for file in names_in(job.address)):
+                    return note  # what is wrong has been told of every clip
                 note = replace(note, configuration=_configuration(job, settings, measured))
                 if before is not None and _is_done(before, note, settings, store):
                     return replace(before, unchanged=True)
@@ -103,7 +105,7 @@ def do_session(job: SessionJob, settings: Settings, process: MeasuringProcess) -
             note = replace(note, cause=cause, call_is_wrong=isinstance(problem, RigError))
         note = replace(note, wall_time_s=round(time.monotonic() - began, 3))
         if not is_current(store.lock, settings.run):
-            return note
+            return replace(note, model=None, verdict=None, cause="the batch had ended before this was done")
         stale = before.files if before is not None and before.place == note.place else {}
         try:
             published: SessionNote = store.publish(note, made, stale, settings.run)

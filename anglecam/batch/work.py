@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import socket
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -83,7 +84,7 @@ def do_clip(job: ClipJob, settings: Settings, process: MeasuringProcess) -> Note
     with unfinished(store, settings.run) as work:
         try:
             with blame(Path(job.address)):
-                require_version(settings)
+                require_same_batch(settings, store)
                 note = _identified(note, settings)
                 if before is not None and _is_done(before, note, job, settings, store):
                     return _renewed(before, note, settings, store)
@@ -108,10 +109,12 @@ def unfinished(store: Store, run: str) -> Iterator[Path]:
         shutil.rmtree(work, ignore_errors=True)
 
 
-def require_version(settings: Settings) -> None:
-    """Refuse to mix the results of two versions."""
+def require_same_batch(settings: Settings, store: Store) -> None:
+    """Refuse to work with another version than whoever started the batch, or for a folder that is not its folder."""
     if settings.version != __version__:
         raise RigError(f"this worker has anglecam {__version__}; the batch was started by {settings.version}")
+    if not is_current(store.lock, settings.run):
+        raise RigError(f"--out {store.out}: {socket.gethostname()} does not see the folder that the batch sees there")
 
 
 def told(problem: Exception | str, address: str, work: Path) -> str:
@@ -243,7 +246,7 @@ def _failed(note: Note, cause: str, *, call_is_wrong: bool = False, passing: boo
 def _published(note: Note, made: dict[str, Path], before: Note | None, settings: Settings, store: Store) -> Note:
     """Put results and note in place, if this run still has the folder."""
     if not is_current(store.lock, settings.run):
-        return note
+        return _failed(note, "the batch had ended before this was done", passing=True)
     stale = before.files if before is not None and before.place == note.place else {}
     try:
         published: Note = store.publish(note, made, stale, settings.run)
