@@ -6,12 +6,13 @@ Films: thirty frames of a nodding head, 320 × 240, ten of them under many names
 process (one thread, as the batch's jobs have), by a batch with one job and by a batch with two.
 
 - Gain: wall time with two jobs over that with one.
-- Overhead: wall time × jobs less the sum of the clips' wall times, as a share of wall time × jobs; and wall time with one
-  job over that of the bare loop, less one. Both include starting Python twice and writing the index.
-- Memory: the batch's own resident size when a tenth, half and all of the clips are done, without its measuring processes.
-- Kills: a batch with two jobs is killed (SIGKILL, in turn the batch or one of its measuring processes) at instants drawn
-  evenly over the time that an unbroken one takes, and started again until it has ended, with `--retry-failed` after the
-  last; every file that it has left is then compared, byte by byte, with the unbroken one's, wall times apart.
+- Overhead: wall time × jobs less the sum of the clips' wall times, as a share of wall time × jobs; and wall time with
+  one job over that of the bare loop, less one. Both include starting Python and writing the index.
+- Memory: the batch's own resident size when a tenth, half and all of the clips are done, its measuring processes apart.
+- Kills: a batch with two jobs is killed (SIGKILL, in turn the batch itself and first one of its measuring processes) at
+  instants drawn evenly over the time that an unbroken one takes, and started again with `--retry-failed` until it has
+  come to its end; every file that it has then left is compared, byte by byte, with the unbroken one's, wall times
+  apart, and it begins anew, until it has been killed often enough.
 """
 
 from __future__ import annotations
@@ -108,34 +109,39 @@ def overhead(out: Path, took: float, jobs: int) -> float:
 
 
 def killed_and_resumed(lab: Path, unbroken: Path, out: Path, kills: int, span: float) -> str:
-    """Kill a batch again and again, let it end, and say what it has left."""
-    rng = random.Random(7)
-    hit = 0
-    for turn in range(kills):
-        running = subprocess.Popen(
-            batch_command(lab, "--out", out, "--jobs", 2, "--quiet", "--retry-failed"), stderr=subprocess.DEVNULL
-        )
+    """Kill a batch again and again, let it come to its end, and say what it has left."""
+    rng, expected = random.Random(7), results(unbroken)
+    hit = ends = 0
+    differing: set[str] = set()
+    while hit < kills or out.exists():
+        patience = rng.uniform(0.0, span) if hit < kills else None
+        running = subprocess.Popen(batch_command(lab, "--out", out, "--jobs", 2, "--quiet", "--retry-failed"))
         try:
-            running.wait(rng.uniform(0.0, span))
+            status = running.wait(patience)
         except subprocess.TimeoutExpired:
-            workers = children(running.pid)
-            victim = rng.choice(workers) if turn % 2 and workers else running.pid
-            os.kill(victim, signal.SIGKILL)
+            kill(running, worker_first=bool(hit % 2), rng=rng)
             hit += 1
-            if victim != running.pid:
-                time.sleep(rng.uniform(0.0, 1.0))
-                running.kill()
-            running.wait()
-            while any(map(is_alive, workers)):
-                time.sleep(0.01)
-        if not turn % 5:  # begin anew, so that kills fall into every part of a batch
-            shutil.rmtree(out, ignore_errors=True)
-    last = subprocess.run(batch_command(lab, "--out", out, "--jobs", 2, "--quiet", "--retry-failed"), check=False)
-    found, expected = results(out), results(unbroken)
-    differing = sorted(name for name in found.keys() | expected.keys() if found.get(name) != expected.get(name))
-    left = unfinished(out)
-    same = "the same byte by byte" if not differing else f"{len(differing)} differ, such as {differing[0]}"
-    return f"{hit} kills; status {last.returncode}; {len(expected)} files: {same}; {len(left)} left unfinished"
+            continue
+        found = results(out)
+        differing |= {name for name in found.keys() | expected.keys() if found.get(name) != expected.get(name)}
+        differing |= set(unfinished(out)) | ({f"status {status}"} if status else set())
+        ends += 1
+        shutil.rmtree(out)
+    same = "each time the same byte by byte" if not differing else f"differing: {', '.join(sorted(differing)[:5])}"
+    return f"{hit} kills, after which it came to its end {ends} times; {len(expected)} files, {same}"
+
+
+def kill(running: subprocess.Popen[bytes], *, worker_first: bool, rng: random.Random) -> None:
+    """Kill a batch, before it perhaps one of its measuring processes, and wait until all of it is gone."""
+    workers = children(running.pid)
+    if worker_first and workers:
+        os.kill(rng.choice(workers), signal.SIGKILL)
+        time.sleep(rng.uniform(0.0, 0.2))
+    workers = children(running.pid)
+    running.kill()
+    running.wait()
+    while any(map(is_alive, workers)):
+        time.sleep(0.01)
 
 
 def main() -> None:
@@ -153,7 +159,7 @@ def main() -> None:
         print(f"overhead by the clips' own wall times: {overhead(top / 'one', one, 1):.1%} with one job, ", end="")
         print(f"{overhead(top / 'two', two, 2):.1%} with two; over the bare loop {one / plain - 1.0:.1%}")
         print(f"memory when a tenth, half, all are done: {', '.join(f'{size:.0f}' for size in sizes)} MB")
-        print(killed_and_resumed(lab, top / "two", top / "killed", kills, 0.8 * two))
+        print(killed_and_resumed(lab, top / "two", top / "killed", kills, two))
 
 
 if __name__ == "__main__":

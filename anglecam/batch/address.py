@@ -8,15 +8,21 @@ from __future__ import annotations
 
 import os
 import posixpath
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import fsspec
 
-from anglecam.errors import InputError, RigError
+from anglecam.errors import AnglecamError, InputError, RigError
 
 _PROCESS_ONLY = ("memory",)
 """Stores that exist within one process."""
+
+
+class PassingError(InputError):
+    """A store could not be asked; another time may be different."""
 
 
 def normalised(address: str) -> str:
@@ -68,6 +74,27 @@ def store(address: str) -> tuple[Any, str]:
         raise RigError(f"{address}: {protocol}:// is no protocol that fsspec knows") from error
 
 
+@contextmanager
+def asking(address: str) -> Iterator[tuple[Any, str]]:
+    """Give a remote address's file system and path, and turn whatever its library raises into one line.
+
+    Raises
+    ------
+    PassingError
+        Where the store does not answer or refuses.
+    FileNotFoundError
+        Where nothing is there.
+    """
+    fs, path = store(address)
+    try:
+        yield fs, path
+    except (AnglecamError, FileNotFoundError):
+        raise
+    except Exception as fault:  # every store has exceptions of its own
+        said = (str(fault).strip() or type(fault).__name__).splitlines()[0]
+        raise PassingError(f"{address}: cannot be read ({getattr(fault, 'strerror', None) or said})") from fault
+
+
 def parent(address: str) -> str:
     """Return the folder that a file lies in."""
     if not is_remote(address):
@@ -92,24 +119,30 @@ def join(folder: str, file: str) -> str:
 
 
 def names_in(folder: str) -> frozenset[str]:
-    """List the names in a folder; none where it cannot be listed."""
-    try:
-        if not is_remote(folder):
+    """List the names in a folder; none where it is not there, or is here and cannot be listed."""
+    if not is_remote(folder):
+        try:
             return frozenset(entry.name for entry in Path(folder).iterdir())
-        fs, path = store(folder)
-        return frozenset(name(entry) for entry in fs.ls(path, detail=False))
-    except OSError:
+        except OSError:
+            return frozenset()
+    try:
+        with asking(folder) as (fs, path):
+            return frozenset(name(entry) for entry in fs.ls(path, detail=False))
+    except FileNotFoundError:
         return frozenset()
 
 
 def read_small(address: str) -> bytes | None:
-    """Read a whole file; ``None`` where there is none or it cannot be read."""
-    try:
-        if not is_remote(address):
+    """Read a whole file; ``None`` where it is not there, or is here and cannot be read."""
+    if not is_remote(address):
+        try:
             return Path(address).read_bytes()
-        fs, path = store(address)
-        return bytes(fs.cat_file(path))
-    except OSError:
+        except OSError:
+            return None
+    try:
+        with asking(address) as (fs, path):
+            return bytes(fs.cat_file(path))
+    except FileNotFoundError:
         return None
 
 
@@ -118,13 +151,12 @@ def fetch(address: str, to: Path) -> None:
 
     Raises
     ------
-    InputError
+    PassingError
         Where it cannot be read, or not be written here.
     """
-    fs, path = store(address)
     to.parent.mkdir(parents=True, exist_ok=True)
     try:
-        fs.get_file(path, str(to))
-    except Exception as fault:  # every store has exceptions of its own
-        said = (str(fault).strip() or type(fault).__name__).splitlines()[0]
-        raise InputError(f"{address}: cannot be fetched ({getattr(fault, 'strerror', None) or said})") from fault
+        with asking(address) as (fs, path):
+            fs.get_file(path, str(to))
+    except FileNotFoundError as problem:
+        raise InputError(f"{address}: no such file") from problem

@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from anglecam.batch.run import Options, run_batch
 from anglecam.errors import RigError
 from anglecam.terminal import errors, screen
 from anglecam.threads import cores
@@ -38,6 +37,8 @@ def batch(
     ] = None,
 ) -> None:
     """Measure folders of clips, each once: results, index.csv and index.parquet; identify the sessions among them."""
+    from anglecam.batch.run import Options, run_batch  # stores and tables, which no other verb needs
+
     if dask is not None and dask != "local" and jobs is not None:
         raise RigError("--jobs: a Dask scheduler's workers say how many clips are measured at a time; leave it out")
     result = run_batch(

@@ -6,6 +6,7 @@ job whose worker is lost is done by another.
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable
 from concurrent.futures import CancelledError
@@ -50,6 +51,8 @@ class DaskTeam(Generic[Job, Done]):
         self._size = size
 
     def __enter__(self) -> DaskTeam[Job, Done]:
+        for logger in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
+            logging.getLogger(logger).setLevel(logging.CRITICAL + 1)  # what is wrong is said here, in one line
         self._cluster = None
         try:
             if self._address == "local":

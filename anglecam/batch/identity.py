@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from anglecam.batch.address import is_remote, join, parent, read_small, stem, store
+from anglecam.batch.address import asking, is_remote, join, parent, read_small, stem
 from anglecam.errors import InputError
 from anglecam.session import COMMAND_ENDING
 
@@ -37,12 +37,12 @@ def stamp(address: str) -> Stamp:
     Raises
     ------
     InputError
-        Where there is no such file.
+        Where there is no such file, or its store does not answer.
     """
     try:
         if is_remote(address):
-            fs, path = store(address)
-            return {"size": int(fs.size(path) or 0), "key": str(fs.ukey(path))}
+            with asking(address) as (fs, path):
+                return {"size": int(fs.size(path) or 0), "key": str(fs.ukey(path))}
         found = Path(address).stat()
     except FileNotFoundError as problem:
         raise InputError(f"{address}: no such file") from problem

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from anglecam.batch.address import is_remote, join, name, normalised, parent, store
+from anglecam.batch.address import asking, is_remote, join, name, normalised, parent, store
 from anglecam.errors import AnglecamError, InputError, RigError
 from anglecam.session import CLIP_ENDINGS
 
@@ -60,14 +60,16 @@ def find_sources(asked: Sequence[str], out: Path) -> tuple[list[Source], list[An
     found: dict[str, Source] = {}
     for given, listed in _unlisted(asked):
         try:
+            if is_remote(given):
+                store(given)[0].invalidate_cache()  # what was listed before may no longer be so
             for source in _expand(given, out.resolve(), problems):
                 found.setdefault(source.address, source)
         except RigError as problem:
             if not listed:
                 raise
             problems.append(problem)
-        except OSError as problem:
-            problems.append(InputError(f"{given}: cannot be searched ({_reason(problem)})"))
+        except InputError as problem:
+            problems.append(problem)
     return sorted(found.values()), problems
 
 
@@ -116,15 +118,15 @@ def _kind(address: str) -> tuple[bool, bool]:
     """Tell whether there is a folder, or a file, at an address."""
     if not is_remote(address):
         return os.path.isdir(address), os.path.isfile(address)  # noqa: PTH112, PTH113
-    fs, path = store(address)
-    return fs.isdir(path), fs.isfile(path)
+    with asking(address) as (fs, path):
+        return fs.isdir(path), fs.isfile(path)
 
 
 def _matches(pattern: str, root: str) -> list[str]:
     if not is_remote(pattern):
         return glob.glob(pattern, recursive=True)  # noqa: PTH207  (Path.glob takes no absolute pattern)
-    fs, path = store(pattern)
-    return _below(root, fs.glob(path))
+    with asking(pattern) as (fs, path):
+        return _below(root, fs.glob(path))
 
 
 def _below(root: str, paths: Iterable[str]) -> list[str]:
@@ -136,8 +138,8 @@ def _below(root: str, paths: Iterable[str]) -> list[str]:
 def _search(folder: str, out: Path, problems: list[AnglecamError]) -> list[str]:
     """List the clips in a folder and all below it."""
     if is_remote(folder):
-        fs, path = store(folder)
-        found = _below(folder, fs.find(path))
+        with asking(folder) as (fs, path):
+            found = _below(folder, fs.find(path))
         return sorted(file for file in found if _is_clip(file) and not _is_hidden(file[len(folder) :]))
 
     def denied(problem: OSError) -> None:
@@ -156,7 +158,3 @@ def _is_clip(address: str) -> bool:
 
 def _is_hidden(below: str) -> bool:
     return any(part.startswith(".") for part in below.split("/"))
-
-
-def _reason(problem: OSError) -> str:
-    return problem.strerror or str(problem).splitlines()[0]

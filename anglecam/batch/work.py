@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from anglecam import __version__
-from anglecam.batch.address import fetch, is_remote, join, name, names_in, parent, stem
+from anglecam.batch.address import PassingError, fetch, is_remote, join, name, names_in, parent, stem
 from anglecam.batch.identity import calibration_named, clip_configuration, content_hash, is_settled, stamp
 from anglecam.batch.lock import is_current
 from anglecam.batch.notes import Note, Store
@@ -94,7 +94,8 @@ def do_clip(job: ClipJob, settings: Settings, process: MeasuringProcess) -> Note
                     return _renewed(before, note, settings, store)
                 note, made = _measured(note, job, settings, process, clip, work)
         except AnglecamError as problem:
-            note = _failed(note, told(problem, job.address, work), call_is_wrong=isinstance(problem, RigError))
+            cause, passing = told(problem, job.address, work), isinstance(problem, PassingError)
+            note = _failed(note, cause, call_is_wrong=isinstance(problem, RigError), passing=passing)
         note = replace(note, row=replace(note.row, wall_time_s=round(time.monotonic() - began, 3)))
         return _published(note, made, before, settings, store)
 
@@ -219,7 +220,7 @@ def _measured(
     if "cause" in answer:
         cause = told(answer["cause"], job.address, work)
         return _failed(note, cause, call_is_wrong=answer["call_is_wrong"], passing=answer["passing"]), {}
-    if stamp(note.address) != note.stamp:
+    if not is_remote(note.address) and stamp(note.address) != note.stamp:
         return _failed(note, "it changed while it was being measured", passing=True), {}
     made = {job.place + file.name[len(clip.stem) :]: file for file in sorted(into.iterdir())}
     if job.keep:

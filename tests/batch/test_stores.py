@@ -73,3 +73,21 @@ def test_clips_in_s3_give_what_clips_in_a_folder_give_and_are_fetched_once(lab, 
         monkeypatch.undo()
     finally:
         server.stop()
+
+
+def test_a_store_that_does_not_answer_costs_no_clip_its_place(tmp_path, monkeypatch):
+    tiny_lab(tmp_path / "lab", ["a.avi", "b.avi"])
+    kind = type(fsspec.filesystem("memory"))
+    fsspec.filesystem("memory").put(str(tmp_path / "lab"), "/moody", recursive=True)
+    get_file = kind.get_file
+
+    def refuse(store, path, *args, **kwargs):
+        if path.endswith("a.avi"):
+            raise RuntimeError("503: slow down\nand more")
+        return get_file(store, path, *args, **kwargs)
+
+    monkeypatch.setattr(kind, "get_file", refuse)
+    result = run_batch(["memory://moody"], tmp_path / "out", QUIET)
+    assert [str(p) for p in result.problems] == ["memory://moody/a.avi: cannot be read (503: slow down)"]
+    monkeypatch.undo()
+    assert not run_batch(["memory://moody"], tmp_path / "out", QUIET).problems
