@@ -27,8 +27,6 @@ class Note:
 
     row: Row
     address: str
-    root: str
-    """The folder that it was found under."""
     place: str
     """Where its results are, relative to the output folder, without an ending."""
     stamp: Stamp | None = None

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
-from anglecam.batch.address import is_of_one_process, normalised, stem
+from anglecam.batch.address import is_of_one_process, join, normalised, stem
 from anglecam.batch.ledger import Ledger
 from anglecam.batch.lock import locked
 from anglecam.batch.notes import Note, SessionNote, Store
@@ -136,9 +136,9 @@ class Plan:
 
 def _plan(sources: Sequence[Source], asked: Sequence[str], store: Store, options: Options) -> Plan:
     here = {source.address for source in sources}
-    roots = {source.root for source in sources} | {normalised(one) for one in asked}
+    searched = tuple(join(normalised(one), "") for one in asked)
     # what a folder of this call no longer holds is no longer told of
-    earlier = tuple(note for note in store.clips() if note.address in here or note.root not in roots)
+    earlier = tuple(n for n in store.clips() if n.address in here or not n.address.startswith(searched))
     found = find_sessions(sources)
     places = session_places([(folder, root) for folder, root, _ in found])
     sessions = tuple(SessionJob(folder, places[folder], clips, options.close) for folder, _, clips in found)
@@ -147,7 +147,7 @@ def _plan(sources: Sequence[Source], asked: Sequence[str], store: Store, options
     for job in sessions:  # where the loop writes series that are free of what the camera did
         taken |= {"/".join(filter(None, (job.place, "corrected", stem(clip)))) for clip in job.clips}
     clip_place = clip_places(sources, taken)
-    clips = tuple(ClipJob(s.address, s.root, clip_place[s.address], s.address in in_session) for s in sources)
+    clips = tuple(ClipJob(s.address, clip_place[s.address], s.address in in_session) for s in sources)
     return Plan(clips, sessions, earlier)
 
 

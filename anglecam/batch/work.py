@@ -53,7 +53,6 @@ class ClipJob:
     """A clip to be measured."""
 
     address: str
-    root: str
     place: str
     keep: bool
     """Whether the series is wanted for a session."""
@@ -79,7 +78,7 @@ def do_clip(job: ClipJob, settings: Settings, process: MeasuringProcess) -> Note
     began = time.monotonic()
     store = Store(Path(settings.out))
     before = store.read_clip(job.address)
-    note = Note(Row(printable(job.address), version=__version__), job.address, job.root, job.place)
+    note = Note(Row(printable(job.address), version=__version__), job.address, job.place)
     made: dict[str, Path] = {}
     with unfinished(store, settings.run) as work:
         try:
@@ -182,8 +181,8 @@ def _is_done(before: Note, note: Note, job: ClipJob, settings: Settings, store: 
 
 
 def _renewed(before: Note, note: Note, settings: Settings, store: Store) -> Note:
-    """Keep what an earlier call found; a clip that was merely touched or moved to need not be read again."""
-    renewed = replace(before, stamp=note.stamp, settled=note.settled, root=note.root)
+    """Keep what an earlier call found; a clip that was merely touched need not be read again."""
+    renewed = replace(before, stamp=note.stamp, settled=note.settled)
     if renewed != before:
         with contextlib.suppress(OSError):
             store.renew(renewed, settings.run)

@@ -178,6 +178,8 @@ def test_the_index_goes_on_telling_of_other_folders_and_forgets_what_is_no_longe
     assert (out / "a.angles.csv").read_bytes() == first  # mon's
     assert [row["series"] for row in rows(out).values()] == ["a.angles.csv", "b.angles.csv", "tue/a.angles.csv"]
     (mon / "b.avi").unlink()
+    run_batch([str(mon / "a.avi")], out, QUIET)
+    assert len(rows(out)) == 3  # a clip's folder was not searched
     run_batch([str(mon)], out, QUIET)
     assert list(rows(out)) == [f"{mon}/a.avi", f"{tue}/a.avi"]
 

@@ -53,7 +53,7 @@ def test_killed_and_resumed_it_ends_as_if_it_had_never_been_killed(lab, unbroken
     out = tmp_path / "out"
     for done in (1, 3):
         batch = start(lab, "--out", out, "--jobs", 2, "--quiet")
-        wait_until(lambda done=done: len(list(out.rglob("*.angles.csv"))) >= done)
+        wait_until(lambda done=done: len(list(out.glob("*/*.angles.csv"))) >= done)
         workers = children(batch.pid)
         assert workers
         batch.kill()
@@ -105,7 +105,7 @@ def test_a_second_batch_on_the_same_folder_is_told_so_and_a_killed_one_is_in_nob
 def test_interrupted_it_ends_at_once_and_nothing_in_flight_counts_as_failed(lab, unbroken, tmp_path):
     out = tmp_path / "out"
     batch = start(lab, "--out", out, "--jobs", 2, "--quiet")
-    wait_until(lambda: list(out.rglob("*.angles.csv")))
+    wait_until(lambda: list(out.glob("*/*.angles.csv")))
     batch.send_signal(signal.SIGINT)
     _, told = batch.communicate(timeout=30)
     assert batch.returncode not in (0, 2)
