@@ -12,46 +12,27 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from anglecam import __version__
+from anglecam.batch.cli import batch
 from anglecam.calibrate import calibrate_clip
 from anglecam.calibration import write_calibration
 from anglecam.errors import AnglecamError, InputError, RigError, blame
 from anglecam.exchange import Also, write_also
-from anglecam.export import fitted_model, transfer_as_dict, write_mat
-from anglecam.files import write_json
-from anglecam.identify import ESTIMATORS, Estimator, Identified, declared_start, identify_records
-from anglecam.loop.close import Verdict, close_records
-from anglecam.loop.correct import FOLDER as CORRECTED
-from anglecam.loop.correct import corrected
-from anglecam.loop.holdout import split_records
-from anglecam.loop.result import next_experiment, verdict_as_dict, write_next_command
+from anglecam.identify import ESTIMATORS, Estimator
 from anglecam.marks.angle import MeasuredTracks
 from anglecam.measure import Measurement
 from anglecam.neck.file import read_neck
 from anglecam.neck_cli import app as neck
-from anglecam.recordings import Measured, Shown, measure_recording, measure_session, shown_to_loop
+from anglecam.recordings import Measured, measure_recording, measure_session, shown_to_loop
 from anglecam.report.budget_page import budget_table, write_budget
 from anglecam.report.calibration_figure import plot_calibration
-from anglecam.report.figures import plot_series
-from anglecam.report.page import write_report
 from anglecam.report.summary import loop_table, model_table, response_table, series_table
-from anglecam.response import Response, responses, responses_as_dicts
+from anglecam.results import close_session, identify_session, write_measurement
 from anglecam.rig import Rig, read_rig
-from anglecam.series import write_series
-from anglecam.session import (
-    SERIES_ENDING,
-    Command,
-    Session,
-    command_beside,
-    find_clips,
-    read_session,
-    recording_name,
-    rig_beside,
-)
+from anglecam.session import Session, command_beside, find_clips, read_session, recording_name, rig_beside
 from anglecam.terminal import errors, make_folder, screen
 from anglecam.video.overlay import write_overlay
 
@@ -64,6 +45,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(neck, name="neck")
+app.command()(batch)
 
 Out = Annotated[Path, typer.Option("--out", help="Folder for the results; made if missing.")]
 RigFile = Annotated[
@@ -114,13 +96,10 @@ def measure(
                     raise InputError(f"{clip}: {done[name]} has the same name; measure them to separate folders")
                 done[name] = clip
                 measurement = _measure(clip, declared if declared is not None else rig_beside(clip), bars)
-                write_series(measurement.series, out / f"{name}{SERIES_ENDING}")
+                answers = write_measurement(measurement, command_beside(clip), out)
                 write_also(measurement.series, also or (), out / name)
-                answers = _responses(measurement, command_beside(clip))
                 if answers:
-                    write_json(out / f"{name}.responses.json", responses_as_dicts(answers))
                     tables.append(response_table(clip.name, answers))
-                plot_series(measurement.series, out / f"{name}.png")
                 if overlay:
                     write_overlay(_film(clip, measurement), measurement, out / f"{name}.overlay.mp4")
                 rows.append(measurement)
@@ -199,12 +178,7 @@ def identify(
         raise RigError(f"--neck {neck}: only --estimator neck looks at it")
     declared = read_neck(neck).large_angle if estimator == "neck" else None
     opened, measured = _open(session, out)
-    fitted = [r for r in measured.records if r.name not in opened.rig.held_out]
-    held_out = [r for r in measured.records if r.name in opened.rig.held_out]
-    if not fitted:
-        raise RigError(f"{session}: every recording that can be used is held out; nothing is left to fit")
-    model = identify_records(fitted, opened.rig, chosen, held_out=held_out, neck=declared)
-    _write_model(model, out, "model")
+    model = identify_session(opened, measured, out, chosen, declared)
     screen.print(model_table([model]))
     for doubt in model.doubts:
         screen.print(doubt, soft_wrap=True, highlight=False, markup=False)
@@ -232,42 +206,16 @@ def close(
         errors.print(
             "the angles measured are free of something that the pictures show; the loop begins with what they show"
         )
-    fitted, held_out = split_records(shown.records, names)
     with _progress() as bars:
-        bar = bars.add_task("extended Kalman filter", total=None)
-        models = [identify_records(fitted, opened.rig, estimator, held_out=held_out) for estimator in ("ekf", "oe2")]
-        verdict = close_records(
-            shown.records,
-            held_out=names,
-            starts=[declared_start(opened.rig)],
-            progress=lambda stage: bars.update(bar, description=stage),
-        )
-        bars.update(bar, description="report")
-        for model, name in zip(models, ("ekf", "model"), strict=True):
-            _write_model(model, out, name)
-        experiment = next_experiment(verdict)
-        write_next_command(experiment, out)
-        result = verdict_as_dict(verdict, experiment)
-        write_json(out / "loop.json", result)
-        _write_corrected(shown, verdict, out / CORRECTED)
-        title = session.resolve().name
-        write_report(
-            out / "report.html", title, verdict, result, experiment, measured.series, models, measured.problems
+        bar = bars.add_task("", total=None)
+        closed = close_session(
+            opened, measured, shown, out, held_out=names, progress=lambda stage: bars.update(bar, description=stage)
         )
         bars.update(bar, description="done", completed=1, total=1)
-    screen.print(model_table(models))
-    screen.print(loop_table(verdict, experiment))
+    screen.print(model_table(closed.models))
+    screen.print(loop_table(closed.verdict, closed.experiment))
     screen.print(f"report: {out / 'report.html'}", soft_wrap=True)
     _end(measured.problems)
-
-
-def _write_corrected(shown: Shown, verdict: Verdict, folder: Path) -> None:
-    """Write the series that the loop saw without what it found the camera to do, if it found anything."""
-    for series, record in zip(shown.series, shown.records, strict=True):
-        right = corrected(series, verdict.after, record.view)
-        if right is not None:
-            make_folder(folder)
-            write_series(right, folder / f"{series.name}{SERIES_ENDING}")
 
 
 def main() -> None:
@@ -318,13 +266,6 @@ def _expand(paths: list[Path], problems: list[AnglecamError]) -> Iterator[Path]:
             yield path
 
 
-def _write_model(model: Identified, out: Path, name: str) -> None:
-    """Write a model as ``NAME.json`` and for MATLAB as ``NAME.mat``."""
-    exported = fitted_model(model)
-    write_json(out / f"{name}.json", model.as_dict() | {"transfer_function": transfer_as_dict(exported)})
-    write_mat(exported, out / f"{name}.mat")
-
-
 def _film(source: Path, measurement: Measurement | MeasuredTracks) -> Path:
     """Return the film to draw an overlay on."""
     if not isinstance(measurement, MeasuredTracks):
@@ -347,12 +288,6 @@ def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement | MeasuredTrac
     for note in measurement.notes:
         screen.print(f"{clip}: {note}", soft_wrap=True, highlight=False, markup=False)
     return measurement
-
-
-def _responses(measurement: Measurement | MeasuredTracks, command: Command | None) -> tuple[Response, ...]:
-    series = measurement.series
-    changes = [] if command is None else command.time[1:][np.diff(command.angle) != 0.0].tolist()
-    return responses(series.time, series.angle, series.sigma, changes)
 
 
 def _say_what_is_not_applied(rig: Rig, where: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from anglecam.errors import InputError, blame
@@ -13,7 +13,7 @@ from anglecam.marks.files import TRACKS_ENDINGS
 from anglecam.measure import Measurement, measure_clip
 from anglecam.rig import Rig
 from anglecam.series import AngleSeries, read_series, write_series
-from anglecam.session import SERIES_ENDING, Command, Session
+from anglecam.session import SERIES_ENDING, Command, Recording, Session
 from anglecam.uncorrected import uncorrected
 
 
@@ -112,30 +112,54 @@ def measure_session(
     Measured
         In the order of the recordings' names.
     """
-    series, records, problems, notes = [], [], list(session.problems), []
+    notes: list[str] = []
+
+    def measured(recording: Recording) -> tuple[AngleSeries, str | None]:
+        name = recording.name
+        with blame(recording.source):
+            measurement = measure_recording(
+                recording.source,
+                session.rig,
+                recording.command,
+                progress=lambda done, total: progress(name, done, total),
+            )
+        if out is not None:
+            write_series(measurement.series, out / f"{name}{SERIES_ENDING}")
+        if isinstance(measurement, MeasuredTracks):
+            notes.extend(f"{recording.source}: {note}" for note in measurement.notes)
+        return measurement.series, measurement.truncated
+
+    gathered = gather_session(session, measured)
+    return replace(gathered, notes=tuple(notes))
+
+
+def gather_session(session: Session, series_of: Callable[[Recording], tuple[AngleSeries, str | None]]) -> Measured:
+    """Read every series of a session and take those of its clips and tracks from ``series_of``.
+
+    Parameters
+    ----------
+    session : Session
+        From `anglecam.session.read_session`.
+    series_of : callable
+        From a recording to its series and, where its file ends too early, how much of it could be read.
+
+    Returns
+    -------
+    Measured
+        In the order of the recordings' names.
+    """
+    series, records, problems = [], [], list(session.problems)
     zero_known = session.rig.neutral != "auto"
     for recording in session.recordings:
-        name = recording.name
         try:
             if recording.is_series:
                 one = read_series(recording.source)
             else:
-                with blame(recording.source):
-                    measurement = measure_recording(
-                        recording.source,
-                        session.rig,
-                        recording.command,
-                        progress=lambda done, total, name=name: progress(name, done, total),  # type: ignore[misc]
-                    )
-                one = measurement.series
-                if out is not None:
-                    write_series(one, out / f"{name}{SERIES_ENDING}")
-                if isinstance(measurement, MeasuredTracks):
-                    notes += [f"{recording.source}: {note}" for note in measurement.notes]
-                if measurement.truncated:
-                    problems.append(InputError(f"{recording.source}: {measurement.truncated}"))
+                one, truncated = series_of(recording)
+                if truncated:
+                    problems.append(InputError(f"{recording.source}: {truncated}"))
             series.append(one)
             records.append(record_from_series(one, recording.command, zero_known=zero_known))
         except InputError as problem:
             problems.append(problem)
-    return Measured(tuple(series), tuple(records), tuple(problems), tuple(notes))
+    return Measured(tuple(series), tuple(records), tuple(problems))

@@ -145,13 +145,15 @@ def find_clips(directory: Path) -> list[Path]:
     return sorted(p for p in directory.iterdir() if p.is_file() and p.suffix.lower() in CLIP_ENDINGS)
 
 
-def read_session(directory: Path) -> Session:
+def read_session(directory: Path, rig: Rig | None = None) -> Session:
     """Read a session's rig and commands and list its recordings.
 
     Parameters
     ----------
     directory : Path
         The session's folder.
+    rig : Rig, optional
+        In place of the ``rig.yaml`` in it.
 
     Returns
     -------
@@ -167,7 +169,8 @@ def read_session(directory: Path) -> Session:
     if not directory.is_dir():
         found = "is a file; a session is a folder" if directory.is_file() else "no such folder"
         raise RigError(f"{directory}: {found}")
-    rig = rig_beside(directory)
+    own = rig is None
+    rig = rig_beside(directory) if rig is None else rig
     sources: dict[str, Path] = {}
     problems: list[InputError] = []
     for clip in find_clips(directory):
@@ -182,7 +185,7 @@ def read_session(directory: Path) -> Session:
         found = f"no clip ({', '.join(CLIP_ENDINGS)}) and no *{SERIES_ENDING} in it"
         raise RigError(f"{directory}: {found}" if not idle else idle[0])
     unknown = sorted(set(rig.held_out) - set(sources))
-    if unknown:
+    if unknown and own:
         raise RigError(f"{directory / 'rig.yaml'}: held_out names {unknown[0]}, which is no recording here")
     recordings = []
     for name, source in sorted(sources.items()):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from unicodedata import category
 
 from rich.console import Console
 
@@ -27,3 +28,8 @@ def make_folder(out: Path) -> None:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
         raise RigError(f"--out {out}: this folder cannot be made ({problem.strerror})") from problem
+
+
+def printable(text: str) -> str:
+    """Return text that every file and terminal takes on one line, whatever bytes a file's name is made of."""
+    return "".join(c.encode("unicode_escape").decode() if category(c) in ("Cc", "Cs", "Zl", "Zp") else c for c in text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -19,6 +18,7 @@ from anglecam.estimate.record import Record
 from anglecam.loop.holdout import Prediction, predict_unseen
 from anglecam.loop.screen import Forecast
 from anglecam.simulate.plant import Plant
+from anglecam.threads import native_threads
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -176,8 +176,8 @@ def rivals(
 
 
 def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    """Do the same with every item, on all cores: the integrator, which takes most of the time, lets go of Python."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    """Do the same with every item side by side: the integrator, which takes most of the time, lets go of Python."""
+    with ThreadPoolExecutor(native_threads()) as pool:
         return list(pool.map(work, items))
 
 

@@ -18,6 +18,7 @@ from av.video.frame import PictureType
 from numpy.typing import NDArray
 
 from anglecam.errors import InputError
+from anglecam.threads import native_threads
 from anglecam.video.container import is_cut_short
 
 Image = NDArray[Any]
@@ -51,6 +52,8 @@ class ClipInfo:
     """px."""
     declared_frames: int
     """The container's own count, 0 where it states none. It may be wrong in an intact file."""
+    codec: str
+    """As FFmpeg calls it, such as ``h264``."""
     coarse_colour: bool
     """Whether colour is stored at a lower resolution than brightness."""
     cut_short: bool
@@ -91,7 +94,8 @@ def inspect_clip(path: Path) -> ClipInfo:
         stream = container.streams.video[0]
         planes = stream.codec_context.format.components if stream.codec_context.format else ()
         coarse = any(plane.width < stream.width for plane in planes)
-        return ClipInfo(path, stream.width, stream.height, stream.frames, coarse, is_cut_short(path))
+        codec = stream.codec_context.name
+        return ClipInfo(path, stream.width, stream.height, stream.frames, codec, coarse, is_cut_short(path))
 
 
 def read_frames(path: Path, *, brightness: bool = False) -> Iterator[Frame]:
@@ -187,6 +191,7 @@ def _decode(path: Path) -> Iterator[tuple[float, av.VideoFrame | None]]:
     with _open(path) as container:
         stream = container.streams.video[0]
         stream.codec_context.thread_type = "SLICE"
+        stream.codec_context.thread_count = native_threads()
         base = float(stream.time_base or 0.0)
         is_avi = container.format.name == "avi"
         pending: list[int] = []

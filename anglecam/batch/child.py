@@ -1,0 +1,161 @@
+"""The program that measures: a line of JSON in for each clip or session, a line of JSON out.
+
+It makes files in the folder that it is told and nowhere else, and says what it found; where they go, and what is
+remembered, is not its concern. It uses one core, and ends when whoever started it is gone.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import json
+import os
+import queue
+import signal
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from anglecam.batch.kept import keep_series, read_kept
+from anglecam.batch.row import cannot_write
+from anglecam.errors import AnglecamError, InputError, RigError, blame
+from anglecam.measure import Measurement, measure_clip
+from anglecam.recordings import gather_session, measure_recording, shown_to_loop
+from anglecam.results import close_session, identify_session, write_measurement
+from anglecam.rig import read_rig
+from anglecam.series import AngleSeries
+from anglecam.session import Recording, command_beside, read_session, rig_beside
+from anglecam.video.frames import inspect_clip
+
+_GRACE_S = 60.0
+"""After its time limit a process whose starter is gone, and which does not heed that, ends by itself."""
+
+
+def measure(request: dict[str, Any]) -> dict[str, Any]:
+    """Measure one clip as `anglecam measure` does.
+
+    Parameters
+    ----------
+    request : dict
+        ``clip``; ``rig`` or null; ``into``, an existing folder; ``keep``, a file for the whole series or null.
+
+    Returns
+    -------
+    dict
+        What the index says of the clip, or the ``cause`` why there are no results, whether the ``call_is_wrong``, and
+        whether it is ``passing``: another time may be different.
+    """
+    clip, into = Path(request["clip"]), Path(request["into"])
+    found: dict[str, Any] = {}
+    try:
+        with blame(clip):
+            rig = read_rig(Path(request["rig"])) if request["rig"] else rig_beside(clip)
+            command = command_beside(clip)
+            info = inspect_clip(clip)
+            found |= {"width_px": info.width, "height_px": info.height, "codec": info.codec}
+            measurement = measure_clip(clip, rig, command)
+        found |= _figures(measurement) | {"truncated": measurement.truncated}
+        with blame(clip):
+            try:
+                write_measurement(measurement, command, into)
+                if request["keep"]:
+                    keep_series(measurement.series, Path(request["keep"]))
+            except OSError as problem:
+                return found | {"cause": cannot_write(problem), "call_is_wrong": False, "passing": True}
+    except AnglecamError as problem:
+        found |= {"cause": str(problem), "call_is_wrong": isinstance(problem, RigError), "passing": False}
+    return found
+
+
+def fit(request: dict[str, Any]) -> dict[str, Any]:
+    """Identify one session as `anglecam identify` does, or go the whole way as `anglecam close`.
+
+    Parameters
+    ----------
+    request : dict
+        ``session``; ``rig`` or null; ``into``, an existing folder; ``kept``, from a clip's file name to its series;
+        ``close``.
+
+    Returns
+    -------
+    dict
+        ``verdict`` and ``problems``, or the ``cause`` why there is no model and whether the ``call_is_wrong``.
+    """
+    folder, into = Path(request["session"]), Path(request["into"])
+    kept: dict[str, str] = request["kept"]
+
+    def series_of(recording: Recording) -> tuple[AngleSeries, str | None]:
+        if not recording.is_clip:  # tracks by another program
+            with blame(recording.source):
+                tracked = measure_recording(recording.source, opened.rig, recording.command)
+            return tracked.series, tracked.truncated
+        if recording.source.name not in kept:
+            raise InputError(f"{recording.source}: could not be measured")
+        return read_kept(Path(kept[recording.source.name])), None
+
+    try:
+        with blame(folder):
+            opened = read_session(folder, read_rig(Path(request["rig"])) if request["rig"] else None)
+            measured = gather_session(opened, series_of)
+            if not measured.records:
+                raise InputError(f"{folder}: no recording can be used")
+            verdict = None
+            if request["close"]:
+                names = [name for name in opened.rig.held_out if name in {r.name for r in opened.recordings}]
+                shown = shown_to_loop(opened, measured)
+                verdict = close_session(opened, measured, shown, into, held_out=names).verdict.verdict
+            else:
+                identify_session(opened, measured, into)
+    except AnglecamError as problem:
+        return {"cause": str(problem), "call_is_wrong": isinstance(problem, RigError), "problems": []}
+    return {"verdict": verdict, "problems": [str(problem) for problem in measured.problems]}
+
+
+def _figures(measurement: Measurement) -> dict[str, Any]:
+    series = measurement.series
+    n, span = len(series.time), float(series.time[-1] - series.time[0])
+    sigma = np.degrees(series.sigma[series.ok])
+    rate = (n - 1) / span if span > 0.0 else None
+    return {
+        "frames": n,
+        "rate_hz": _rounded(rate),
+        "duration_s": None if rate is None else _rounded(n / rate),
+        "share_measured": _rounded(float(series.ok.mean())),
+        "median_sigma_deg": _rounded(float(np.median(sigma))) if len(sigma) else None,
+    }
+
+
+def _rounded(value: float | None) -> float | None:
+    """Keep what is worth reading: nine digits."""
+    return None if value is None else float(f"{value:.9g}")
+
+
+def main() -> None:
+    """Answer requests until there are no more."""
+    answers = os.fdopen(os.dup(1), "w", encoding="ascii")
+    os.dup2(2, 1)  # no library's chatter among the answers
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the starter's to answer
+    cv2.setNumThreads(1)
+    requests: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(requests,), daemon=True).start()
+    while True:
+        request = requests.get()
+        faulthandler.dump_traceback_later(request["time_limit"] + _GRACE_S, exit=True, file=2)
+        answer = fit(request) if "session" in request else measure(request)
+        faulthandler.cancel_dump_traceback_later()
+        answers.write(json.dumps(answer) + "\n")
+        answers.flush()
+
+
+def _listen(requests: queue.SimpleQueue[dict[str, Any]]) -> None:
+    """Take requests in; when the starter is gone, end at once, whatever is being measured."""
+    for line in sys.stdin:
+        requests.put(json.loads(line))
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    main()

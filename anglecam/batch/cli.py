@@ -1,0 +1,65 @@
+"""`anglecam batch`: folders of clips, measured once each, on one machine or many."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from anglecam.errors import RigError
+from anglecam.terminal import errors, screen
+from anglecam.threads import cores
+
+
+def batch(
+    folders: Annotated[
+        list[str],
+        typer.Argument(metavar="FOLDER", help="Folders, clips, globs, @list.txt; or addresses such as s3://lab/clips."),
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Folder for results and index; made if missing.")],
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", min=1, metavar="N", help="Clips at a time, one core each; all cores.")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option("--dask", metavar="ADDRESS", help="A Dask scheduler; local starts one here.")
+    ] = None,
+    close: Annotated[bool, typer.Option("--close", help="Find what each session's model lacks.")] = False,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Do again what failed.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress.")] = False,
+    log: Annotated[Path | None, typer.Option("--log", help="Add a line of JSON for every clip to this file.")] = None,
+    time_limit: Annotated[
+        float | None, typer.Option("--time-limit", min=0.001, metavar="S", help="For one clip; default by its size.")
+    ] = None,
+    rig: Annotated[
+        Path | None, typer.Option("--rig", help="Rig file for all clips; default: rig.yaml beside each clip.")
+    ] = None,
+) -> None:
+    """Measure folders of clips, each once: results, index.csv and index.parquet; identify the sessions among them."""
+    from anglecam.batch.run import Options, run_batch  # stores and tables, which no other verb needs
+
+    if dask is not None and dask != "local" and jobs is not None:
+        raise RigError("--jobs: a Dask scheduler's workers say how many clips are measured at a time; leave it out")
+    result = run_batch(
+        folders,
+        out,
+        Options(
+            jobs=jobs or cores(),
+            dask=dask,
+            close=close,
+            retry_failed=retry_failed,
+            quiet=quiet,
+            log=log,
+            time_limit=time_limit,
+            rig=rig,
+        ),
+    )
+    if not quiet:
+        counts = Counter(row.status for row in result.rows)
+        told = ", ".join(f"{counts[status]} {status}" for status in ("ok", "truncated", "failed") if counts[status])
+        screen.print(f"{len(result.rows)} clips{': ' if told else ''}{told}; {out / 'index.csv'}", soft_wrap=True)
+    for problem in result.problems:
+        errors.print(str(problem))
+    if result.problems:
+        raise typer.Exit(2 if any(isinstance(problem, RigError) for problem in result.problems) else 1)

@@ -1,0 +1,160 @@
+"""From what was asked for to a list of clips, in the order of their addresses.
+
+A folder is searched to its depths, hidden files and folders apart (``._clip.avi`` is no clip); a glob means what
+matches it; ``@list.txt`` means the addresses in it, one a line; anything else is a clip.
+"""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from anglecam.batch.address import asking, is_remote, join, name, normalised, parent, store
+from anglecam.errors import AnglecamError, InputError, RigError
+from anglecam.session import CLIP_ENDINGS
+
+_MAGIC = frozenset("*?[")
+
+
+@dataclass(frozen=True, order=True)
+class Source:
+    """A clip and the folder that it was found under."""
+
+    address: str
+    """Absolute path, or address with its protocol."""
+    root: str
+    """The folder that was asked for; a single clip's own folder."""
+
+    @property
+    def below_root(self) -> str:
+        """The clip's folder relative to ``root``, ``""`` where that is the same."""
+        return parent(self.address)[len(self.root) :].strip("/")
+
+
+def find_sources(asked: Sequence[str], out: Path) -> tuple[list[Source], list[AnglecamError]]:
+    """Find the clips that a call is about.
+
+    Parameters
+    ----------
+    asked : sequence of str
+        Folders, clips, globs, ``@list.txt``, each local or remote.
+    out : Path
+        The folder for results, which is not searched.
+
+    Returns
+    -------
+    sources : list of Source
+        In the order of their addresses, each once.
+    problems : list of AnglecamError
+        Folders that cannot be searched or hold no clip, one line each.
+
+    Raises
+    ------
+    RigError
+        Where a folder or list that was asked for does not exist.
+    """
+    problems: list[AnglecamError] = []
+    found: dict[str, Source] = {}
+    for given, listed in _unlisted(asked):
+        try:
+            if is_remote(given):
+                store(given)[0].invalidate_cache()  # what was listed before may no longer be so
+            for source in _expand(given, out.resolve(), problems):
+                found.setdefault(source.address, source)
+        except RigError as problem:
+            if not listed:
+                raise
+            problems.append(problem)
+        except InputError as problem:
+            problems.append(problem)
+    return sorted(found.values()), problems
+
+
+def _unlisted(asked: Sequence[str]) -> Iterator[tuple[str, bool]]:
+    """Yield every address, and whether it stood in a list."""
+    for given in asked:
+        if not given.startswith("@"):
+            yield given, False
+            continue
+        try:
+            lines = Path(given[1:]).read_bytes().splitlines()
+        except OSError as problem:
+            raise RigError(f"{given}: this list cannot be read ({problem.strerror})") from problem
+        for line in lines:
+            text = os.fsdecode(line).strip()
+            if text and not text.startswith("#"):
+                yield text, True
+
+
+def _expand(given: str, out: Path, problems: list[AnglecamError]) -> Iterator[Source]:
+    """Yield what one address means."""
+    address = normalised(given)
+    folder, single = _kind(address)
+    if folder:
+        clips = _search(address, out, problems)
+        if not clips:
+            problems.append(InputError(f"{given}: no clip in this folder"))
+        yield from (Source(clip, address) for clip in clips)
+    elif single or not _MAGIC & set(address):
+        if not single and not _is_clip(address):
+            raise RigError(f"{given}: no such folder")
+        yield Source(address, parent(address))
+    else:
+        root = address[: min(address.index(c) for c in _MAGIC if c in address)].rpartition("/")[0] or "/"
+        matches = _matches(address, root)
+        clips = [m for m in matches if _is_clip(m)]
+        for match in sorted(set(matches) - set(clips)):
+            if _kind(match)[0]:
+                clips += _search(match, out, problems)
+        if not clips:
+            problems.append(InputError(f"{given}: no clip matches"))
+        yield from (Source(clip, root) for clip in clips)
+
+
+def _kind(address: str) -> tuple[bool, bool]:
+    """Tell whether there is a folder, or a file, at an address."""
+    if not is_remote(address):
+        return os.path.isdir(address), os.path.isfile(address)  # noqa: PTH112, PTH113
+    with asking(address) as (fs, path):
+        return fs.isdir(path), fs.isfile(path)
+
+
+def _matches(pattern: str, root: str) -> list[str]:
+    if not is_remote(pattern):
+        return glob.glob(pattern, recursive=True)  # noqa: PTH207  (Path.glob takes no absolute pattern)
+    with asking(pattern) as (fs, path):
+        return _below(root, fs.glob(path))
+
+
+def _below(root: str, paths: Iterable[str]) -> list[str]:
+    """Return the addresses of what a file system lists below ``root``."""
+    start = store(root)[1].rstrip("/")
+    return [join(root, path[len(start) :].lstrip("/")) for path in paths]
+
+
+def _search(folder: str, out: Path, problems: list[AnglecamError]) -> list[str]:
+    """List the clips in a folder and all below it."""
+    if is_remote(folder):
+        with asking(folder) as (fs, path):
+            found = _below(folder, fs.find(path))
+        return sorted(file for file in found if _is_clip(file) and not _is_hidden(file[len(folder) :]))
+
+    def denied(problem: OSError) -> None:
+        problems.append(InputError(f"{problem.filename}: cannot be searched ({problem.strerror})"))
+
+    clips = []
+    for here, below, files in os.walk(folder, onerror=denied):
+        below[:] = [d for d in below if not d.startswith(".") and Path(here, d).resolve() != out]
+        clips += [join(here, file) for file in files if _is_clip(file) and not file.startswith(".")]
+    return sorted(clips)
+
+
+def _is_clip(address: str) -> bool:
+    return name(address).lower().endswith(CLIP_ENDINGS)
+
+
+def _is_hidden(below: str) -> bool:
+    return any(part.startswith(".") for part in below.split("/"))

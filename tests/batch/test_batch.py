@@ -1,0 +1,200 @@
+"""A folder of clips from beginning to end: what `measure` writes, an index, nothing done twice, nothing lost."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+
+import duckdb
+import pandas as pd
+import pytest
+
+from anglecam.batch.run import Options, run_batch
+from anglecam.errors import RigError
+from anglecam.measure import measure_clip
+from anglecam.results import write_measurement
+from anglecam.rig import Rig
+from support.tiny import FRAMES, SIZE, results, tiny_clip, tiny_lab
+from support.tiny import run_batch as run
+
+QUIET = Options(jobs=1, quiet=True)
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """Return a lab's folder with two bad clips in it, and what one batch made of it."""
+    top = tmp_path_factory.mktemp("lab")
+    lab = tiny_lab(top / "clips", ["b.avi", "mon/a.avi", "mon/a.mkv.avi", "tue/a.avi"])
+    (lab / "mon" / "empty.mp4").touch()
+    (lab / "tue" / "text.avi").write_text("not a film\n" * 50)
+    (lab / "tue" / "rig.yaml").write_text("facing: left\n")
+    told = run(lab, "--out", top / "out", "--jobs", 2, "--log", top / "log.jsonl")
+    return lab, top / "out", told
+
+
+def rows(out):
+    with (out / "index.csv").open(newline="") as stream:
+        return {row["path"]: row for row in csv.DictReader(stream)}
+
+
+def test_each_clip_has_what_measure_writes_in_the_folder_it_has_below_the_one_asked_for(done, tmp_path):
+    lab, out, _ = done
+    for name, rig in (("b.avi", Rig()), ("mon/a.avi", Rig()), ("tue/a.avi", Rig(facing="left"))):
+        clip = lab / name
+        write_measurement(measure_clip(clip, rig), None, tmp_path / clip.parent.name)
+        for ending in (".angles.csv", ".png"):
+            alone = (tmp_path / clip.parent.name / f"{clip.stem}{ending}").read_bytes()
+            assert (out / name).with_name(clip.stem + ending).read_bytes() == alone
+
+
+def test_the_index_has_a_row_a_clip_and_says_what_became_of_it(done):
+    lab, out, _ = done
+    index = rows(out)
+    assert list(index) == sorted(str(p) for p in lab.rglob("*") if p.suffix in (".avi", ".mp4"))
+    good = index[f"{lab}/mon/a.avi"]
+    assert good["status"] == "ok"
+    assert good["series"] == "mon/a.angles.csv"
+    assert (int(good["frames"]), int(good["width_px"]), int(good["height_px"])) == (FRAMES, *SIZE)
+    assert float(good["rate_hz"]) == pytest.approx(30.0)
+    assert float(good["duration_s"]) == pytest.approx(FRAMES / 30.0)
+    assert good["codec"] == "mjpeg"
+    assert float(good["share_measured"]) == 1.0
+    assert 0.0 < float(good["median_sigma_deg"]) < 1.0
+    assert int(good["size_bytes"]) == (lab / "mon/a.avi").stat().st_size
+    assert index[f"{lab}/mon/empty.mp4"]["status"] == "failed"
+    assert index[f"{lab}/mon/empty.mp4"]["cause"] == "empty file"
+
+
+def test_the_index_can_be_asked_by_duckdb_and_pandas(done):
+    _, out, _ = done
+    counted = duckdb.sql(f"SELECT status, count(*) FROM '{out}/index.parquet' GROUP BY 1 ORDER BY 1").fetchall()
+    assert counted == [("failed", 2), ("ok", 4)]
+    table = pd.read_parquet(out / "index.parquet")
+    assert table[table.status == "ok"].frames.sum() == 4 * FRAMES
+    text = pd.read_csv(out / "index.csv")
+    assert list(text.columns) == list(table.columns)
+
+
+def test_a_clip_that_fails_costs_itself_one_line_and_exit_status_1(done):
+    lab, _, told = done
+    assert told.returncode == 1
+    lines = [line for line in told.stderr.splitlines() if " of 6: " not in line]
+    assert lines == [
+        f"{lab}/mon/empty.mp4: empty file",
+        f"{lab}/tue/text.avi: not a readable video file (Invalid data found when processing input)",
+    ]
+    assert "6 clips: 4 ok, 2 failed" in told.stdout
+
+
+def test_the_log_is_a_line_of_json_for_every_clip(done):
+    _, out, _ = done
+    lines = [json.loads(line) for line in (out.parent / "log.jsonl").read_text().splitlines()]
+    assert sorted(line["clip"] for line in lines) == list(rows(out))
+    assert all(line.keys() >= {"time", "status", "cause", "wall_time_s"} for line in lines)
+
+
+def test_progress_is_plain_lines_where_there_is_no_terminal_and_quiet_is_quiet(done):
+    lab, out, told = done
+    assert sum(" of 6: " in line for line in told.stderr.splitlines()) == 6
+    quiet = run(lab / "mon" / "a.avi", lab / "b.avi", "--out", out.parent / "quiet", "--quiet")
+    assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
+
+
+def test_nothing_is_done_twice_and_what_has_changed_is_done_again(done, tmp_path):
+    lab, out, _ = done
+    lab, out = shutil.copytree(lab, tmp_path / "clips"), tmp_path / "out"
+    run_batch([str(lab)], out, QUIET)
+    first, notes = results(out), notes_of(out)
+    again = run_batch([str(lab)], out, QUIET)
+    assert (results(out), notes_of(out)) == (first, notes)
+    assert len(again.problems) == 2  # what failed is told again, and not tried again
+    tiny_clip(lab / "b.avi", seed=11)  # its content,
+    (lab / "mon" / "rig.yaml").write_text("facing: left\n")  # its rig
+    (lab / "tue" / "a.command.csv").write_text("time_s,command_deg\n0,0\n0.1,5\n")  # or its command
+    (out / "mon" / "a.mkv.angles.csv").unlink()
+    run_batch([str(lab)], out, QUIET)
+    changed = {name for name, content in results(out).items() if first.get(name) != content}
+    assert {"b.angles.csv", "mon/a.angles.csv", "mon/a.mkv.angles.csv"} <= changed
+    redone = {name for name in notes if notes_of(out)[name] != notes[name]}
+    assert len(redone) == 5  # b, two in mon and its empty one, tue/a
+    assert rows(out)[f"{lab}/tue/text.avi"]["wall_time_s"] == first_row(first, f"{lab}/tue/text.avi", notes)
+
+
+def first_row(first, path, notes):
+    found = [json.loads(note) for note in notes.values() if json.loads(note)["row"]["path"] == path]
+    return str(found[0]["row"]["wall_time_s"])
+
+
+def notes_of(out):
+    """Return what is remembered of each clip; a note is written anew only where something is done."""
+    found = {}
+    for path in (out / ".anglecam" / "clips").glob("*.json"):
+        note = json.loads(path.read_text())
+        note.pop("settled")
+        found[path.name] = json.dumps(note)
+    return found
+
+
+def test_a_clip_that_was_merely_touched_is_not_measured_again(tmp_path):
+    clip = tiny_clip(tmp_path / "clips" / "a.avi")
+    run_batch([str(clip)], tmp_path / "out", QUIET)
+    before = (tmp_path / "out" / "a.angles.csv").stat().st_mtime_ns
+    os.utime(clip, (1e9, 1e9))
+    run_batch([str(clip)], tmp_path / "out", QUIET)
+    assert (tmp_path / "out" / "a.angles.csv").stat().st_mtime_ns == before
+
+
+def test_what_failed_is_tried_again_when_asked_or_changed_and_its_old_results_are_gone(tmp_path):
+    clip, out = tiny_clip(tmp_path / "clips" / "a.avi"), tmp_path / "out"
+    assert not run_batch([str(clip)], out, QUIET).problems
+    whole = clip.read_bytes()
+    clip.write_bytes(b"")
+    assert [str(p) for p in run_batch([str(clip)], out, QUIET).problems] == [f"{clip}: empty file"]
+    assert sorted(p.name for p in out.iterdir()) == [".anglecam", "index.csv", "index.parquet"]
+    clip.write_bytes(whole)
+    result = run_batch([str(clip)], out, Options(jobs=1, quiet=True, time_limit=0.001))
+    assert "took longer than its time limit of 0.001 s" in str(result.problems[0])
+    assert run_batch([str(clip)], out, QUIET).rows[0].status == "failed"
+    assert run_batch([str(clip)], out, Options(jobs=1, quiet=True, retry_failed=True)).rows[0].status == "ok"
+
+
+def test_a_wrong_rig_file_costs_its_own_folder_and_is_exit_status_2_at_the_end(tmp_path):
+    lab = tiny_lab(tmp_path / "clips", ["good/a.avi", "wrong/b.avi"])
+    (lab / "wrong" / "rig.yaml").write_text("pivott: {}\n")
+    told = run(lab, "--out", tmp_path / "out", "--quiet")
+    assert told.returncode == 2
+    assert told.stderr.splitlines() == [f"{lab}/wrong/b.avi: {lab}/wrong/rig.yaml: unknown key pivott"]
+    assert (tmp_path / "out" / "good" / "a.angles.csv").exists()
+
+
+def test_the_index_goes_on_telling_of_other_folders_and_forgets_what_is_no_longer_there(tmp_path):
+    out = tmp_path / "out"
+    mon, tue = tiny_lab(tmp_path / "mon", ["a.avi", "b.avi"]), tiny_lab(tmp_path / "tue", ["a.avi"])
+    run_batch([str(mon)], out, QUIET)
+    first = (out / "a.angles.csv").read_bytes()
+    run_batch([str(tue)], out, QUIET)
+    assert (out / "a.angles.csv").read_bytes() == first  # mon's
+    assert [row["series"] for row in rows(out).values()] == ["a.angles.csv", "b.angles.csv", "tue/a.angles.csv"]
+    (mon / "b.avi").unlink()
+    run_batch([str(mon / "a.avi")], out, QUIET)
+    assert len(rows(out)) == 3  # a clip's folder was not searched
+    run_batch([str(mon)], out, QUIET)
+    assert list(rows(out)) == [f"{mon}/a.avi", f"{tue}/a.avi"]
+
+
+def test_wrong_calls_are_exit_status_2_and_do_nothing(tmp_path):
+    lab = tiny_lab(tmp_path / "clips", ["a.avi"])
+    (tmp_path / "rig.yaml").write_text("facing: up\n")
+    (tmp_path / "file").touch()
+    told = run(lab, "--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out")
+    assert told.returncode == 2
+    assert told.stderr.splitlines() == [f"{tmp_path}/rig.yaml: facing: input should be 'right' or 'left' (got up)"]
+    for out, options, says in (
+        (tmp_path / "file", QUIET, "is a file"),
+        (tmp_path / "out", Options(jobs=1, log=tmp_path), "--log"),
+    ):
+        with pytest.raises(RigError, match=says):
+            run_batch([str(lab)], out, options)
+    assert not list((tmp_path / "out").glob("*.csv"))

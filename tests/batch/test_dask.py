@@ -1,0 +1,76 @@
+"""The same jobs on Dask workers: real processes, one of which is killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from anglecam.batch.run import Options, run_batch
+from anglecam.errors import RigError
+from support.tiny import children, is_alive, results, tiny_lab
+
+pytest.importorskip("distributed")
+
+
+@pytest.fixture
+def cluster(tmp_path):
+    """Start a scheduler and two workers as a user does."""
+    file = tmp_path / "scheduler.json"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
+    dask = [sys.executable, "-c", "from dask.__main__ import main; main()"]
+    scheduler = subprocess.Popen(
+        [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", file], **quiet
+    )
+    workers = [
+        subprocess.Popen([*dask, "worker", "--scheduler-file", file, "--nthreads", "1", "--no-dashboard"], **quiet)
+        for _ in range(2)
+    ]
+    until = time.monotonic() + 60.0
+    while not file.exists() or not file.read_text():
+        assert time.monotonic() < until
+        time.sleep(0.05)
+    yield json.loads(file.read_text())["address"], workers
+    for process in (*workers, scheduler):
+        process.terminate()
+    for process in (*workers, scheduler):
+        process.wait(30)
+
+
+def test_a_worker_killed_in_the_middle_loses_nothing(cluster, tmp_path):
+    address, workers = cluster
+    lab, out = tiny_lab(tmp_path / "lab", [f"{k}.avi" for k in range(12)]), tmp_path / "out"
+    killed = []
+
+    def kill_one():
+        while len(list(out.glob("*.angles.csv"))) < 2:
+            time.sleep(0.005)
+        nanny = workers[0].pid
+        below = children(nanny)
+        for pid in (nanny, *below):
+            os.kill(pid, signal.SIGKILL)
+            killed.append(pid)
+
+    killer = threading.Thread(target=kill_one)
+    killer.start()
+    result = run_batch([str(lab)], out, Options(jobs=1, quiet=True, dask=address))
+    killer.join()
+    assert killed
+    assert not any(map(is_alive, killed))
+    assert not result.problems
+    assert [row.status for row in result.rows] == ["ok"] * 12
+    run_batch([str(lab)], tmp_path / "here", Options(jobs=2, quiet=True))
+    assert results(out) == results(tmp_path / "here")
+
+
+def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path, monkeypatch):
+    monkeypatch.setattr("anglecam.batch.cluster._WAIT_S", 1.0)
+    lab = tiny_lab(tmp_path / "lab", ["a.avi"])
+    with pytest.raises(RigError, match=r"^--dask tcp://127\.0\.0\.1:9: no scheduler with a worker there \(.*\)$"):
+        run_batch([str(lab)], tmp_path / "out", Options(jobs=1, quiet=True, dask="tcp://127.0.0.1:9"))

@@ -1,0 +1,114 @@
+"""Killed at any instant, a batch leaves nothing half done, and the next goes on to the same end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+
+import pytest
+
+from anglecam.batch.process import Lost, MeasuringProcess
+from anglecam.batch.run import Options
+from anglecam.batch.run import run_batch as run_here
+from anglecam.errors import RigError
+from support.tiny import batch_command, children, is_alive, results, tiny_clip, tiny_lab, unfinished
+
+TWO = Options(jobs=2, quiet=True)
+NAMES = [f"{folder}/{k}.avi" for folder in ("mon", "tue") for k in range(3)]
+
+
+def start(*arguments):
+    return subprocess.Popen(batch_command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def wait_until(true, timeout=60.0):
+    until = time.monotonic() + timeout
+    while not true():
+        assert time.monotonic() < until, "waited in vain"
+        time.sleep(0.01)
+
+
+def end_of(process):
+    """Bury a killed batch and wait until its workers have seen that it is gone."""
+    process.wait()
+    process.stdout.close()
+    process.stderr.close()
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    return tiny_lab(tmp_path_factory.mktemp("lab"), NAMES)
+
+
+@pytest.fixture(scope="module")
+def unbroken(lab, tmp_path_factory):
+    out = tmp_path_factory.mktemp("unbroken")
+    assert not run_here([str(lab)], out, TWO).problems
+    return results(out)
+
+
+def test_killed_and_resumed_it_ends_as_if_it_had_never_been_killed(lab, unbroken, tmp_path):
+    out = tmp_path / "out"
+    for done in (1, 3):
+        batch = start(lab, "--out", out, "--jobs", 2, "--quiet")
+        wait_until(lambda done=done: len(list(out.glob("*/*.angles.csv"))) >= done)
+        workers = children(batch.pid)
+        assert workers
+        batch.kill()
+        end_of(batch)
+        wait_until(lambda workers=workers: not any(map(is_alive, workers)))  # nobody measures for nobody
+        whole = {n: c for n, c in unbroken.items() if n.endswith((".csv", ".png")) and n != "index.csv"}
+        for path in out.rglob("*"):
+            name = str(path.relative_to(out))
+            if name in whole:
+                assert path.read_bytes() == whole[name]
+    assert not run_here([str(lab)], out, Options(jobs=1, quiet=True)).problems
+    assert results(out) == unbroken
+    assert unfinished(out) == []
+
+
+@pytest.mark.parametrize("sent", [signal.SIGSEGV, signal.SIGKILL])
+def test_a_measuring_process_that_dies_costs_its_clip_alone(lab, unbroken, tmp_path, sent):
+    out = tmp_path / "out"
+    batch = start(lab / "mon", "--out", out, "--jobs", 1, "--quiet")
+    wait_until(lambda: children(batch.pid))
+    os.kill(children(batch.pid)[0], sent)
+    _, told = batch.communicate(timeout=120)
+    assert batch.returncode == 1
+    cause = f"the process that measured it died of signal {int(sent)} ({sent.name})"
+    assert told.splitlines() == [f"{lab}/mon/0.avi: {cause}"]
+    assert sorted(p.name for p in out.glob("*.angles.csv")) == ["1.angles.csv", "2.angles.csv"]
+
+
+def test_a_clip_that_takes_too_long_is_ended_and_the_next_is_measured(tmp_path):
+    process, clip = MeasuringProcess(), tiny_clip(tmp_path / "a.avi")
+    request = {"clip": str(clip), "rig": None, "into": str(tmp_path), "keep": None}
+    with pytest.raises(Lost, match=r"took longer than its time limit of 0\.05 s"):
+        process.ask(request, 0.05)
+    assert process.ask(request, 60.0)["frames"] == 8
+    process.close()
+
+
+def test_a_second_batch_on_the_same_folder_is_told_so_and_a_killed_one_is_in_nobodys_way(lab, tmp_path):
+    out = tmp_path / "out"
+    first = start(lab, "--out", out, "--quiet")
+    wait_until(lambda: first.poll() is not None or children(first.pid))
+    with pytest.raises(RigError, match=rf"--out {out}: another batch is at work there \(process {first.pid} on .*\)"):
+        run_here([str(lab)], out, TWO)
+    first.kill()
+    end_of(first)
+    assert not run_here([str(lab / "tue" / "2.avi")], out, Options(jobs=1, quiet=True)).problems
+
+
+def test_interrupted_it_ends_at_once_and_nothing_in_flight_counts_as_failed(lab, unbroken, tmp_path):
+    out = tmp_path / "out"
+    batch = start(lab, "--out", out, "--jobs", 2, "--quiet")
+    wait_until(lambda: list(out.glob("*/*.angles.csv")))
+    batch.send_signal(signal.SIGINT)
+    _, told = batch.communicate(timeout=30)
+    assert batch.returncode not in (0, 2)
+    assert "Traceback" not in told
+    assert not run_here([str(lab)], out, TWO).problems
+    assert results(out) == unbroken

@@ -1,0 +1,96 @@
+"""Folders with commands are sessions: identified, or the whole way, as by the commands for one session."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+
+import fsspec
+import numpy as np
+import pytest
+
+from anglecam.batch.run import Options, run_batch
+from anglecam.recordings import measure_session
+from anglecam.results import identify_session
+from anglecam.series import AngleSeries, write_series
+from anglecam.session import read_session
+from support.motion import Plant
+from support.series import session as make_records
+from support.tiny import tiny_clip, tiny_lab
+
+QUIET = Options(jobs=2, quiet=True)
+
+
+@pytest.fixture
+def lab(made_once, tmp_path):
+    """Return a copy of the lab that may be changed."""
+    return shutil.copytree(made_once, tmp_path / "lab")
+
+
+@pytest.fixture(scope="module")
+def made_once(tmp_path_factory):
+    """Return a lab with one session of four series and a clip, and a folder beside it that is none."""
+    folder = tiny_lab(tmp_path_factory.mktemp("made"), ["plain/a.avi", "neck/nod.avi"])
+    (folder / "neck" / "nod.command.csv").write_text("time_s,command_deg\n0,0\n0.1,5\n")
+    for record in make_records(Plant(dead_time_s=0.04), 4):
+        n = len(record.time)
+        series = AngleSeries(record.name, record.time, record.angle, np.full(n, np.radians(0.05)), ("ok",) * n)
+        write_series(series, folder / "neck" / f"{record.name}.angles.csv")
+        rows = np.column_stack([record.command.time, np.degrees(record.command.angle)])
+        text = "\n".join(f"{t:.6f},{u:.6f}" for t, u in rows)
+        (folder / "neck" / f"{record.name}.command.csv").write_text(f"time_s,command_deg\n{text}\n")
+    (folder / "neck" / "rig.yaml").write_text("held_out: [random]\n")
+    return folder
+
+
+def test_a_session_is_identified_as_alone_and_done_again_only_if_something_has_changed(lab, tmp_path):
+    out = tmp_path / "out"
+    result = run_batch([str(lab)], out, QUIET)
+    told = [str(problem) for problem in result.problems]
+    opened = read_session(lab / "neck")
+    measured = measure_session(opened)
+    identify_session(opened, measured, tmp_path / "alone")
+    model = (out / "neck" / "model.json").read_bytes()
+    assert model == (tmp_path / "alone" / "model.json").read_bytes()
+    assert [row.model for row in result.rows] == ["neck/model.json", None]
+    assert told == [f"{lab}/neck: {problem}" for problem in measured.problems]
+    written = (out / "neck" / "model.json").stat().st_mtime_ns
+    assert run_batch([str(lab)], out, QUIET).rows == result.rows
+    assert (out / "neck" / "model.json").stat().st_mtime_ns == written
+    (lab / "neck" / "rig.yaml").write_text("held_out: [chirp]\n")
+    run_batch([str(lab)], out, QUIET)
+    assert (out / "neck" / "model.json").read_bytes() != model
+
+
+def test_close_goes_the_whole_way_and_the_index_tells_the_verdict(lab, tmp_path):
+    out = tmp_path / "out"
+    run_batch([str(lab)], out, Options(jobs=2, quiet=True, close=True))
+    loop = json.loads((out / "neck" / "loop.json").read_text())
+    assert loop["verdict"] == "attributed"
+    assert [effect["id"] for effect in loop["effects"]] == ["dead_time"]
+    assert (out / "neck" / "report.html").exists()
+    rows = list(csv.DictReader((out / "index.csv").open()))
+    assert [(row["verdict"], row["model"]) for row in rows] == [("attributed", "neck/model.json"), ("", "")]
+
+
+def test_a_session_that_cannot_be_fitted_is_told_once_and_its_clips_are_measured(tmp_path):
+    folder = tiny_lab(tmp_path / "lab", ["a.avi", "b.avi"])
+    (folder / "a.command.csv").write_text("time_s,command_deg\n0,0\n0.1,5\n")
+    (folder / "rig.yaml").write_text("held_out: [a, b]\n")
+    fsspec.filesystem("memory").put(str(folder), "/unfit", recursive=True)
+    for address, out in ((str(folder), tmp_path / "here"), ("memory://unfit", tmp_path / "there")):
+        result = run_batch([address], out, QUIET)
+        assert [row.status for row in result.rows] == ["ok", "ok"]
+        assert result.rows[0].cause.startswith("no model: ")
+        assert len([p for p in result.problems if str(p).startswith(f"{address}: ")]) == len(result.problems)
+        assert "/unfinished/" not in str(result.problems)
+        assert (out / "a.angles.csv").exists()
+
+
+def test_where_no_clip_of_a_session_can_be_measured_nothing_more_is_said_than_that(tmp_path):
+    lab = tmp_path / "lab"
+    tiny_clip(lab / "a.avi").write_bytes(b"")
+    (lab / "a.command.csv").write_text("time_s,command_deg\n0,0\n0.1,5\n")
+    result = run_batch([str(lab)], tmp_path / "out", QUIET)
+    assert [str(p) for p in result.problems] == [f"{lab}/a.avi: empty file"]

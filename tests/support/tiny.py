@@ -1,0 +1,95 @@
+"""Clips of a few hundred milliseconds of work each, for tests that are about many clips and not about angles."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from .drawn import RATE_HZ, Look, draw_frames
+
+SIZE = (160, 120)
+FRAMES = 8
+
+
+def tiny_clip(path: Path, seed: int = 0) -> Path:
+    """Write eight frames of a nodding head, a quarter of the usual size; another seed gives another clip."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    plain = path.with_name("plain.avi")  # OpenCV takes no odd names
+    writer = cv2.VideoWriter(str(plain), cv2.VideoWriter_fourcc(*"MJPG"), RATE_HZ, SIZE)
+    for frame in _frames(seed % 5):
+        shade = np.full_like(frame, seed // 5)
+        writer.write(cv2.add(frame, shade))
+    writer.release()
+    return plain.replace(path)
+
+
+def tiny_lab(folder: Path, names: Sequence[str]) -> Path:
+    """Write tiny clips, each with its own content."""
+    for seed, name in enumerate(names):
+        tiny_clip(folder / name, seed)
+    return folder
+
+
+@cache
+def _frames(seed: int) -> tuple[np.ndarray, ...]:
+    angles = 9 * np.cos(np.pi * np.arange(FRAMES) / (FRAMES - 1)) + seed
+    drawn = draw_frames(Look(marker="ring"), angles, seed=seed)
+    return tuple(cv2.resize(frame, SIZE, interpolation=cv2.INTER_AREA) for frame in drawn)
+
+
+def batch_command(*arguments: object) -> list[str]:
+    """Return the command line of a batch."""
+    return [sys.executable, "-c", "from anglecam.cli import main; main()", "batch", *map(str, arguments)]
+
+
+def run_batch(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
+    """Run a batch as a user does, to its end."""
+    return subprocess.run(
+        batch_command(*arguments), capture_output=True, text=True, timeout=300, check=False, **options
+    )
+
+
+def results(out: Path) -> dict[str, bytes]:
+    """Return every file that a batch has left for the user, without the index's wall times."""
+    found = {}
+    for path in sorted(out.rglob("*")):
+        inside = path.relative_to(out)
+        if path.is_file() and inside.parts[0] != ".anglecam" and inside.suffix != ".parquet":
+            found[str(inside)] = path.read_bytes()
+    found["index.csv"] = b"\n".join(_without_wall_time(found["index.csv"]))
+    return found
+
+
+def unfinished(out: Path) -> list[str]:
+    """List what a killed batch has left that is not whole."""
+    return [p.name for p in out.rglob("*") if p.is_file() and ("unfinished" in p.parts or p.name.startswith("."))]
+
+
+def children(pid: int) -> list[int]:
+    """List the processes that a process has started."""
+    listed = Path(f"/proc/{pid}/task")
+    return [int(c) for task in listed.iterdir() for c in (task / "children").read_text().split()]
+
+
+def is_alive(pid: int) -> bool:
+    """Tell whether a process is there and not merely waiting to be buried."""
+    try:
+        os.kill(pid, 0)
+        return ") Z " not in Path(f"/proc/{pid}/stat").read_text()
+    except (ProcessLookupError, FileNotFoundError):
+        return False
+
+
+def _without_wall_time(table: bytes) -> list[bytes]:
+    rows = list(csv.reader(io.StringIO(table.decode())))
+    at = rows[0].index("wall_time_s")
+    return [repr(row[:at] + row[at + 1 :]).encode() for row in rows]
