@@ -19,6 +19,7 @@ from anglecam import __version__
 from anglecam.batch.cli import batch
 from anglecam.calibrate import calibrate_clip
 from anglecam.calibration import write_calibration
+from anglecam.clip_results import write_measurement
 from anglecam.errors import AnglecamError, InputError, RigError, blame
 from anglecam.exchange import Also, write_also
 from anglecam.identify import ESTIMATORS, Estimator
@@ -30,9 +31,9 @@ from anglecam.recordings import Measured, measure_recording, measure_session, sh
 from anglecam.report.budget_page import budget_table, write_budget
 from anglecam.report.calibration_figure import plot_calibration
 from anglecam.report.summary import loop_table, model_table, response_table, series_table
-from anglecam.results import close_session, identify_session, write_measurement
 from anglecam.rig import Rig, read_rig
 from anglecam.session import Session, command_beside, find_clips, read_session, recording_name, rig_beside
+from anglecam.session_results import close_session, identify_session
 from anglecam.terminal import errors, make_folder, screen
 from anglecam.video.overlay import write_overlay
 

@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from anglecam.errors import InputError
 from anglecam.files import write_atomically
 
+CORRECTED = "corrected"
+"""Folder of a session's series without what the camera did."""
 OK = "ok"
 STATUSES = (OK, "no_mouth", "occluded", "ambiguous", "no_pivot", "duplicate", "undecodable")
 """``ok`` or why a frame has no angle."""

@@ -42,7 +42,7 @@ BARE = """
 import sys, cv2
 from pathlib import Path
 from anglecam.measure import measure_clip
-from anglecam.results import write_measurement
+from anglecam.clip_results import write_measurement
 from anglecam.session import rig_beside
 cv2.setNumThreads(1)
 for clip in sorted(Path(sys.argv[1]).glob("*.avi")):

@@ -21,10 +21,10 @@ import numpy as np
 
 from anglecam.batch.kept import keep_series, read_kept
 from anglecam.batch.row import cannot_write
+from anglecam.clip_results import write_measurement
 from anglecam.errors import AnglecamError, InputError, RigError, blame
 from anglecam.measure import Measurement, measure_clip
 from anglecam.recordings import gather_session, measure_recording, shown_to_loop
-from anglecam.results import close_session, identify_session, write_measurement
 from anglecam.rig import read_rig
 from anglecam.series import AngleSeries
 from anglecam.session import Recording, command_beside, read_session, rig_beside
@@ -84,6 +84,8 @@ def fit(request: dict[str, Any]) -> dict[str, Any]:
     dict
         ``verdict`` and ``problems``, or the ``cause`` why there is no model and whether the ``call_is_wrong``.
     """
+    from anglecam.session_results import close_session, identify_session  # a second of imports, which no clip needs
+
     folder, into = Path(request["session"]), Path(request["into"])
     kept: dict[str, str] = request["kept"]
 

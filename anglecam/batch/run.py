@@ -27,8 +27,8 @@ from anglecam.batch.sessions import SessionJob, do_session, find_sessions
 from anglecam.batch.sources import Source, find_sources
 from anglecam.batch.work import ClipJob, Settings, do_clip
 from anglecam.errors import AnglecamError, RigError
-from anglecam.loop.correct import FOLDER as CORRECTED
 from anglecam.rig import read_rig
+from anglecam.series import CORRECTED
 from anglecam.terminal import make_folder
 
 Job = ClipJob | SessionJob

@@ -11,8 +11,6 @@ from anglecam.estimate.output_error import Fit
 from anglecam.series import AngleSeries
 from anglecam.simulate.plant import Plant
 
-FOLDER = "corrected"
-"""Of the series, beside ``loop.json``."""
 ROUNDS = 20
 """Of a fixed point whose map differs from the identity by a few per cent: each gains more than a decimal."""
 

@@ -14,7 +14,6 @@ from anglecam.effects import effect
 from anglecam.files import write_atomically
 from anglecam.identify import Identified
 from anglecam.loop.close import Verdict
-from anglecam.loop.correct import FOLDER as CORRECTED
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.gate import Test
 from anglecam.loop.remainder import leftover_torque
@@ -22,7 +21,7 @@ from anglecam.loop.result import NEXT_COMMAND, plain, sentence, size_of, split_u
 from anglecam.loop.rounds import applicable
 from anglecam.report import loop_figures as figures
 from anglecam.report.path_figure import path_figure
-from anglecam.series import AngleSeries
+from anglecam.series import CORRECTED, AngleSeries
 
 COLOURS = {"attributed": "#1f6f8b", "nothing_missing": "#3d7a4a", "unexplained": "#b5651d"}
 ESTIMATORS = {"ekf": "extended Kalman filter", "oe2": "output error"}

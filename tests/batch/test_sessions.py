@@ -12,9 +12,9 @@ import pytest
 
 from anglecam.batch.run import Options, run_batch
 from anglecam.recordings import measure_session
-from anglecam.results import identify_session
 from anglecam.series import AngleSeries, write_series
 from anglecam.session import read_session
+from anglecam.session_results import identify_session
 from support.motion import Plant
 from support.series import session as make_records
 from support.tiny import tiny_clip, tiny_lab

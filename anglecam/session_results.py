@@ -1,4 +1,4 @@
-"""What measuring, identifying and closing leave in a folder, for one clip or one session at a time."""
+"""What identifying and closing leave in a folder, for one session at a time."""
 
 from __future__ import annotations
 
@@ -6,27 +6,20 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from anglecam.errors import RigError
 from anglecam.export import fitted_model, transfer_as_dict, write_mat
 from anglecam.files import write_json
 from anglecam.identify import Estimator, Identified, declared_start, identify_records
 from anglecam.loop.close import Verdict, close_records
-from anglecam.loop.correct import FOLDER as CORRECTED
 from anglecam.loop.correct import corrected
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.holdout import split_records
 from anglecam.loop.result import next_experiment, verdict_as_dict, write_next_command
-from anglecam.marks.angle import MeasuredTracks
-from anglecam.measure import Measurement
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.recordings import Measured, Shown
-from anglecam.report.figures import plot_series
 from anglecam.report.page import write_report
-from anglecam.response import Response, responses, responses_as_dicts
-from anglecam.series import write_series
-from anglecam.session import SERIES_ENDING, Command, Session
+from anglecam.series import CORRECTED, write_series
+from anglecam.session import SERIES_ENDING, Session
 from anglecam.terminal import make_folder
 
 
@@ -39,35 +32,6 @@ class Closed:
     verdict: Verdict
     experiment: Experiment | None
     """What to record next, where that would tell something."""
-
-
-def write_measurement(
-    measurement: Measurement | MeasuredTracks, command: Command | None, out: Path
-) -> tuple[Response, ...]:
-    """Write ``NAME.angles.csv``, a plot and, where the angle goes from rest to rest, ``NAME.responses.json``.
-
-    Parameters
-    ----------
-    measurement : Measurement or MeasuredTracks
-        Of one clip.
-    command : Command, optional
-        What was commanded.
-    out : Path
-        Folder for the files.
-
-    Returns
-    -------
-    tuple of Response
-        How the angle answered every change.
-    """
-    series = measurement.series
-    write_series(series, out / f"{series.name}{SERIES_ENDING}")
-    changes = [] if command is None else command.time[1:][np.diff(command.angle) != 0.0].tolist()
-    answers = responses(series.time, series.angle, series.sigma, changes)
-    if answers:
-        write_json(out / f"{series.name}.responses.json", responses_as_dicts(answers))
-    plot_series(series, out / f"{series.name}.png")
-    return answers
 
 
 def identify_session(

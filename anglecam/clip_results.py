@@ -1,0 +1,44 @@
+"""What measuring leaves in a folder, for one clip at a time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from anglecam.files import write_json
+from anglecam.marks.angle import MeasuredTracks
+from anglecam.measure import Measurement
+from anglecam.report.figures import plot_series
+from anglecam.response import Response, responses, responses_as_dicts
+from anglecam.series import write_series
+from anglecam.session import SERIES_ENDING, Command
+
+
+def write_measurement(
+    measurement: Measurement | MeasuredTracks, command: Command | None, out: Path
+) -> tuple[Response, ...]:
+    """Write ``NAME.angles.csv``, a plot and, where the angle goes from rest to rest, ``NAME.responses.json``.
+
+    Parameters
+    ----------
+    measurement : Measurement or MeasuredTracks
+        Of one clip.
+    command : Command, optional
+        What was commanded.
+    out : Path
+        Folder for the files.
+
+    Returns
+    -------
+    tuple of Response
+        How the angle answered every change.
+    """
+    series = measurement.series
+    write_series(series, out / f"{series.name}{SERIES_ENDING}")
+    changes = [] if command is None else command.time[1:][np.diff(command.angle) != 0.0].tolist()
+    answers = responses(series.time, series.angle, series.sigma, changes)
+    if answers:
+        write_json(out / f"{series.name}.responses.json", responses_as_dicts(answers))
+    plot_series(series, out / f"{series.name}.png")
+    return answers
