@@ -9,8 +9,9 @@ from rich.console import Console
 
 from anglecam.errors import RigError
 
-screen = Console(width=None if sys.stdout.isatty() else 120)
-errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+# a file may be called [red].avi or :boom:.avi
+screen = Console(width=None if sys.stdout.isatty() else 120, markup=False, emoji=False)
+errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False, emoji=False)
 
 
 def make_folder(out: Path) -> None:
