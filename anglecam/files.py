@@ -14,7 +14,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
-
 _NAMED = 40
 """Characters of a file's name in that of its unfinished form, so that no name becomes too long by it."""
 _MOST_JSON = 64 * 2**20

@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from anglecam.errors import printable
 from anglecam.series import AngleSeries
 
 Floats = NDArray[np.float64]
@@ -58,12 +59,13 @@ def plot_series(series: AngleSeries, path: Path) -> None:
             for t in series.time[lost]:
                 top.axvline(t, color=BEFORE, lw=0.6, alpha=0.5)
             top.plot([], [], color=BEFORE, lw=0.6, label=f"no angle: {lost.sum()} of {len(lost)} frames")
-        top.set(ylabel="angle from neutral, °", title=series.name)
+        top.set(ylabel="angle from neutral, °")
+        top.set_title(printable(series.name), parse_math=False)
         figure.legend(*top.get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8)
         bottom.plot(series.time, np.degrees(series.sigma), color=AFTER, lw=1.0)
         bottom.set(xlabel="time on the clip's clock, s", ylabel="sigma, °", ylim=(0.0, None))
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=110)
+        figure.savefig(path, dpi=110, format="png")
         plt.close(figure)
 
 

@@ -218,8 +218,8 @@ def _decode(path: Path) -> Iterator[tuple[float, av.VideoFrame | None]]:
                     # a single one is a damaged picture; two of the same other size are another film
                     if shown == other:
                         raise InputError(
-                            f"{path}: pictures of {shown[0]} × {shown[1]} px at {pts * base:g} s, not {size[0]} × {size[1]}"
-                            " as before; cut the film there"
+                            f"{path}: pictures of {shown[0]} × {shown[1]} px at {pts * base:g} s, not of"
+                            f" {size[0]} × {size[1]} as its header says; cut the film there"
                         )
                     usable = False
                 other = None if shown == size else shown
