@@ -6,6 +6,8 @@ stands in it beside. What is read may be YAML, XML or JSON, as cv2.FileStorage w
 
 from __future__ import annotations
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,12 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import RigError
-from anglecam.files import write_atomically
+from anglecam.files import read_text, write_atomically
 
 Floats = NDArray[np.float64]
 
 DISTORTION_NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "taux", "tauy")
 """OpenCV's order."""
+_MOST_BYTES = 512 * 1024
+"""A calibration with the corners of a hundred pictures has as much."""
+_STACK = 512 * _MOST_BYTES
+"""OpenCV takes up to 330 bytes of stack for each level of nesting, which is at least a byte of text."""
 _LENGTHS = (4, 5, 8, 12, 14)
 _IN_MEMORY = cv2.FILE_STORAGE_MEMORY
 _MATRIX_KEYS = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "K")
@@ -145,7 +151,7 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
 def _open(path: Path) -> dict[str, Any]:
     """Read a file's content as numbers, texts, lists and mappings."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path, _MOST_BYTES)
     except OSError as error:
         raise RigError(f"{path}: calibration cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
@@ -153,13 +159,28 @@ def _open(path: Path) -> dict[str, Any]:
     if not text.lstrip().startswith(("%YAML", "<?xml", "{")):
         text = f"%YAML:1.0\n---\n{text}"  # as ROS writes it, without the line that OpenCV asks for
     try:
-        store = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | _IN_MEMORY)
-        content = _plain(store.root())
-    except (cv2.error, SystemError) as error:  # the binding raises SystemError for a text that cannot be parsed
+        content = _parsed(text)
+    # the binding raises SystemError for a text that cannot be parsed
+    except (cv2.error, SystemError, RecursionError) as error:
         raise RigError(f"{path}: not a calibration: not YAML, XML or JSON as OpenCV writes it") from error
     if not isinstance(content, dict):
         raise RigError(f"{path}: not a calibration: no keys in it")
     return content
+
+
+def _parsed(text: str) -> Any:
+    """Let OpenCV read a text, on a stack that is deep enough for whatever so many bytes can nest."""
+
+    def read() -> Any:
+        store = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | _IN_MEMORY)
+        return _plain(store.root())
+
+    before = threading.stack_size(_STACK)
+    try:
+        with ThreadPoolExecutor(1) as deep:
+            return deep.submit(read).result()
+    finally:
+        threading.stack_size(before)
 
 
 def _plain(node: Any) -> Any:

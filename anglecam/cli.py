@@ -6,6 +6,7 @@ with the call or a rig file is one line and exit status 2. Progress is shown on 
 
 from __future__ import annotations
 
+import io
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,7 +21,7 @@ from anglecam.batch.cli import batch
 from anglecam.calibrate import calibrate_clip
 from anglecam.calibration import write_calibration
 from anglecam.clip_results import write_measurement
-from anglecam.errors import AnglecamError, InputError, RigError, blame
+from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.exchange import Also, write_also
 from anglecam.identify import ESTIMATORS, Estimator
 from anglecam.marks.angle import MeasuredTracks
@@ -108,6 +109,8 @@ def measure(
                     raise InputError(f"{clip}: {measurement.truncated}")
             except AnglecamError as problem:
                 problems.append(problem)
+            except OSError as problem:
+                problems.append(InputError(f"{clip}: its results cannot be written ({problem.strerror or problem})"))
     if rows:
         screen.print(series_table(rows))
     for table in tables:
@@ -137,6 +140,8 @@ def budget(
                     raise InputError(f"{clip}: {measurement.truncated}")
             except AnglecamError as problem:
                 problems.append(problem)
+            except OSError as problem:
+                problems.append(InputError(f"{clip}: its results cannot be written ({problem.strerror or problem})"))
     _end(problems)
 
 
@@ -159,7 +164,7 @@ def calibrate(
     terms = ", ".join(found.terms) or "no distortion"
     screen.print(f"{out / clip.stem}.calibration.yaml: {len(found.views)} views, {terms}", soft_wrap=True)
     for note in found.notes:
-        errors.print(note)
+        errors.print(printable(note))
 
 
 @app.command()
@@ -221,6 +226,9 @@ def close(
 
 def main() -> None:
     """Run the command line; every failure is one line on standard error and an exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a file's name may be of bytes that are no text
+            stream.reconfigure(errors="backslashreplace")
     try:
         with blame(Path("anglecam")):
             app()
@@ -241,14 +249,14 @@ def _open(session: Path, out: Path) -> tuple[Session, Measured]:
     make_folder(out)
     _say_what_is_not_applied(opened.rig, session / "rig.yaml")
     for note in opened.notes:
-        errors.print(note)
+        errors.print(printable(note))
     with _progress() as bars:
         tasks = {r.name: bars.add_task(r.source.name, total=None) for r in opened.recordings if r.is_clip}
         measured = measure_session(
             opened, out=out, progress=lambda name, n, total: bars.update(tasks[name], completed=n, total=total or None)
         )
     for note in measured.notes:
-        screen.print(note, soft_wrap=True, highlight=False, markup=False)
+        screen.print(printable(note), soft_wrap=True, highlight=False, markup=False)
     if not measured.records:
         for problem in measured.problems:
             errors.print(str(problem))
@@ -287,13 +295,13 @@ def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement | MeasuredTrac
             progress=lambda n, total: bars.update(bar, completed=n, total=total or None),
         )
     for note in measurement.notes:
-        screen.print(f"{clip}: {note}", soft_wrap=True, highlight=False, markup=False)
+        screen.print(printable(f"{clip}: {note}"), soft_wrap=True, highlight=False, markup=False)
     return measurement
 
 
 def _say_what_is_not_applied(rig: Rig, where: Path) -> None:
     for key in rig.not_applied():
-        errors.print(f"{where}: {key} is declared but this version does not apply it")
+        errors.print(printable(f"{where}: {key} is declared but this version does not apply it"))
 
 
 @contextmanager

@@ -9,6 +9,12 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from anglecam.errors import RigError
+from anglecam.files import read_text
+
+_MOST_BYTES = 256 * 1024
+"""A file that names a thousand recordings has a tenth of it."""
+_DEEPEST = 20
+"""Levels of nesting; a rig has four."""
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -45,12 +51,14 @@ def read_declared(path: Path, kind: type[Section]) -> Section:
         Naming the file, the key and the cause.
     """
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        text = read_text(path, _MOST_BYTES)
+        _require_plain(path, text)
+        content = yaml.safe_load(text)
     except OSError as error:
         raise RigError(f"{path}: cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
         raise RigError(f"{path}: not a UTF-8 text file") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+    except (yaml.YAMLError, ValueError) as error:
         problem = getattr(error, "problem", None) or "not valid YAML"
         mark = getattr(error, "problem_mark", None)
         where = f", line {mark.line + 1}" if mark else ""
@@ -65,14 +73,39 @@ def read_declared(path: Path, kind: type[Section]) -> Section:
         raise RigError(f"{path}: {_first(error)}") from error
 
 
+def _require_plain(path: Path, text: str) -> None:
+    """Refuse what YAML can do beyond keys and values, before anything is built of it.
+
+    Aliases make a page into more values than a memory holds, nesting can be deeper than Python's stack, and tags ask
+    for types that nothing here declares.
+    """
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        more = "an alias" if isinstance(event, yaml.AliasEvent) else "a tag" if getattr(event, "tag", None) else None
+        if depth > _DEEPEST:
+            more = f"more than {_DEEPEST} levels"
+        if more:
+            raise RigError(f"{path}: line {event.start_mark.line + 1}: {more}; only plain keys and values are read")
+
+
 def _first(error: ValidationError) -> str:
     """Say the most telling of pydantic's findings in one line."""
     findings = error.errors()
     unknown = [f for f in findings if f["type"] == "extra_forbidden"]
     finding = (unknown or findings)[0]
-    key = ".".join(str(part) for part in finding["loc"] if part not in ("Mouth", "literal['auto']", "float"))
+    key = ".".join(str(part)[:60] for part in finding["loc"] if part not in ("Mouth", "literal['auto']", "float"))
     if unknown:
         return f"unknown key {key}"
     said = finding["msg"].removeprefix("Value error, ").replace("tuple", "list")
-    got = "" if finding["type"] == "value_error" else f" (got {str(finding['input'])[:60]})"
+    got = "" if finding["type"] == "value_error" else f" (got {_shown(finding['input'])})"
     return f"{key}: {said[0].lower()}{said[1:]}{got}"
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, int) and value.bit_length() > 200:  # Python does not write out what is longer than its limit
+        return f"a number of {value.bit_length()} bits"
+    return str(value)[:60]

@@ -5,10 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from unicodedata import category
 
 
 class AnglecamError(Exception):
-    """Base of every failure that is told to the user in one line: ``what: how much, what next``."""
+    """Base of every failure that is told to the user in one line: ``what: how much, what next``.
+
+    One line it is whatever a file is called and whatever stands in it: see `printable`.
+    """
+
+    def __init__(self, line: str) -> None:
+        super().__init__(printable(line))
 
 
 class RigError(AnglecamError):
@@ -32,3 +39,8 @@ def blame(path: Path) -> Iterator[None]:
         text = str(fault).strip().splitlines()
         cause = f"{type(fault).__name__}: {text[0] if text else ''}"
         raise InputError(f"{path}: internal error, please report it ({cause})") from fault
+
+
+def printable(text: str) -> str:
+    """Return text that every file and terminal takes on one line, whatever bytes a file's name is made of."""
+    return "".join(c.encode("unicode_escape").decode() if category(c) in ("Cc", "Cs", "Zl", "Zp") else c for c in text)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam import __version__
+from anglecam.errors import printable
 from anglecam.files import write_whole
 from anglecam.series import AngleSeries, series_columns
 
@@ -72,7 +73,7 @@ def write_netcdf(series: AngleSeries, path: Path) -> None:
             {
                 "source_software": "anglecam",
                 "source_software_version": __version__,
-                "source_file": series.name,
+                "source_file": printable(series.name),
                 "ds_type": "poses",
                 "time_unit": "seconds",
                 "fps": _rate_hz(series.time),
@@ -113,9 +114,9 @@ def write_parquet(series: AngleSeries, path: Path) -> None:
         array = pa.array(values, from_pandas=True)  # NaN becomes null
         fields.append(pa.field(name, array.type, metadata=None if unit is None else {"unit": unit}))
         arrays.append(array)
-    about = {"source_software": f"anglecam {__version__}", "name": series.name}
-    with write_whole(path) as unfinished:
-        parquet.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=about)), unfinished)
+    about = {"source_software": f"anglecam {__version__}", "name": printable(series.name)}
+    with write_whole(path) as unfinished, unfinished.open("wb") as stream:  # of a name pyarrow makes an address
+        parquet.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=about)), stream)
 
 
 def _marks(places_px: NDArray[np.float64] | None, n: int) -> NDArray[np.float64]:

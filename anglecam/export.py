@@ -9,7 +9,6 @@ large angles goes out as its linearisation at neutral, Eq. (33), beside its phys
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from scipy import io, signal
 
 from anglecam.errors import InputError
+from anglecam.files import read_json
 from anglecam.identify import Identified
 from anglecam.neck.large_angle import linearise
 from anglecam.simulate.large_angle import QUANTITIES, LargeAngle
@@ -134,7 +134,7 @@ def read_model(path: Path) -> FittedModel:
         Naming the file and what is wrong with it.
     """
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
+        told = read_json(path)
         parameters = told["parameters"]
         large = {q.name for q in QUANTITIES} >= set(parameters)
         order = tuple(parameters) if large else THIRD_ORDER if "d0_per_s3" in parameters else SECOND_ORDER
@@ -146,7 +146,7 @@ def read_model(path: Path) -> FittedModel:
         sides = transfer and [np.asarray(transfer[side], dtype=float) for side in ("numerator", "denominator")]
     except OSError as fault:
         raise InputError(f"{path}: cannot be read ({fault.strerror or fault})") from fault
-    except (ValueError, KeyError, TypeError, AttributeError) as fault:
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError) as fault:
         raise InputError(f"{path}: not a model.json of anglecam identify") from fault
     if sides and np.isfinite(values).all():
         return FittedModel(f"{name} at neutral", names, values, covariance, *sides)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import math
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import InputError
-from anglecam.files import write_atomically
+from anglecam.files import open_text, write_atomically
 
 CORRECTED = "corrected"
 """Folder of a session's series without what the camera did."""
@@ -40,6 +41,13 @@ COLUMNS = (
     "status",
 )
 CONTRACT_RADII_PX = (6.0, 10.0)
+_MOST_BYTES = 256 * 2**20
+_MOST_ROWS = 1_000_000
+"""Nine hours at 30 Hz; a file of ours has 110 bytes for each."""
+_LONGEST_STATUS = max(map(len, STATUSES)) + 1
+"""Characters; longer than any, so that what is cut is none of them."""
+_LARGEST = 1e12
+"""No time in s, angle in degrees or place in px is as large; squares of what is smaller stay finite."""
 
 Floats = NDArray[np.float64]
 
@@ -169,7 +177,7 @@ def read_series(path: Path) -> AngleSeries:
 
 
 def read_columns(path: Path, *, required: Sequence[str], may_be_empty: bool = False) -> dict[str, NDArray]:
-    """Read a CSV file's columns by name: those that anglecam knows as float arrays, others as text.
+    """Read those columns of a CSV file that anglecam knows, by name: numbers as floats, ``status`` as text.
 
     Parameters
     ----------
@@ -183,7 +191,7 @@ def read_columns(path: Path, *, required: Sequence[str], may_be_empty: bool = Fa
     Returns
     -------
     dict of str to ndarray
-        Every column of the file.
+        The columns that are required, and those of an angle series that are there.
 
     Raises
     ------
@@ -191,28 +199,45 @@ def read_columns(path: Path, *, required: Sequence[str], may_be_empty: bool = Fa
         Naming the file, the line and the cause.
     """
     try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            rows = list(csv.reader(stream))
+        with open_text(path, _MOST_BYTES) as stream:
+            rows = csv.reader(stream)
+            header = [cell.strip() for cell in next(rows, ())]
+            known = _known(path, header, required)
+            numbers = {name: array("d") for name in known if name != "status"}
+            status: list[str] = []
+            n = 0
+            for number, row in enumerate(rows, start=2):
+                if not any(cell.strip() for cell in row):
+                    continue
+                if len(row) != len(header):
+                    raise InputError(f"{path}: line {number} has {len(row)} cells, the header has {len(header)}")
+                n += 1
+                if n > _MOST_ROWS:
+                    raise InputError(f"{path}: more than {_MOST_ROWS:,} rows are not read")
+                for name, column in numbers.items():
+                    column.append(_number(path, number, name, row[known[name]].strip(), may_be_empty))
+                if "status" in known:
+                    status.append(row[known["status"]].strip()[:_LONGEST_STATUS])
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: cannot be read as CSV ({_reason(error)})") from error
-    if not rows or not any(cell.strip() for cell in rows[0]):
+    if not n:
+        raise InputError(f"{path}: a header but no rows")
+    columns: dict[str, NDArray] = {name: np.asarray(column) for name, column in numbers.items()}
+    return columns | ({"status": np.array(status)} if "status" in known else {})
+
+
+def _known(path: Path, header: list[str], required: Sequence[str]) -> dict[str, int]:
+    """Return which of a header's columns are to be read, and where they stand."""
+    if not any(header):
         raise InputError(f"{path}: empty file; expected a header with {','.join(required)}")
-    header = [cell.strip() for cell in rows[0]]
     missing = [name for name in required if name not in header]
     if missing:
         raise InputError(f"{path}: no column {missing[0]} in the header ({','.join(header)[:80]})")
-    columns: dict[str, list] = {name: [] for name in header}
-    for number, row in enumerate(rows[1:], start=2):
-        if not any(cell.strip() for cell in row):
-            continue
-        if len(row) != len(header):
-            raise InputError(f"{path}: line {number} has {len(row)} cells, the header has {len(header)}")
-        for name, cell in zip(header, row, strict=True):
-            numeric = name in required or (name in COLUMNS and name != "status")
-            columns[name].append(_number(path, number, name, cell.strip(), may_be_empty) if numeric else cell.strip())
-    if not columns[header[0]]:
-        raise InputError(f"{path}: a header but no rows")
-    return {name: np.array(column) for name, column in columns.items()}
+    known = {name: i for i, name in enumerate(header) if name in required or name in COLUMNS}
+    twice = [name for name in known if header.count(name) > 1]
+    if twice:
+        raise InputError(f"{path}: column {twice[0]} stands twice in the header")
+    return known
 
 
 def require_increasing(path: Path, time: Floats) -> None:
@@ -231,7 +256,9 @@ def _number(path: Path, line: int, name: str, cell: str, may_be_empty: bool) -> 
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InputError(f"{path}: line {line}: {name} is {cell!r}, not a number")
+        raise InputError(f"{path}: line {line}: {name} is {cell[:40]!r}, not a number")
+    if abs(value) > _LARGEST:
+        raise InputError(f"{path}: line {line}: {name} is {value:g}; no recording has that")
     return value
 
 

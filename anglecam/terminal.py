@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from unicodedata import category
 
 from rich.console import Console
 
 from anglecam.errors import RigError
 
-screen = Console(width=None if sys.stdout.isatty() else 120)
-errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
+# a file may be called [red].avi or :boom:.avi
+screen = Console(width=None if sys.stdout.isatty() else 120, markup=False, emoji=False)
+errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False, emoji=False)
 
 
 def make_folder(out: Path) -> None:
@@ -28,8 +28,3 @@ def make_folder(out: Path) -> None:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
         raise RigError(f"--out {out}: this folder cannot be made ({problem.strerror})") from problem
-
-
-def printable(text: str) -> str:
-    """Return text that every file and terminal takes on one line, whatever bytes a file's name is made of."""
-    return "".join(c.encode("unicode_escape").decode() if category(c) in ("Cc", "Cs", "Zl", "Zp") else c for c in text)

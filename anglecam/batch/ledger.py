@@ -13,8 +13,7 @@ from anglecam.batch.notes import Note, SessionNote, Store
 from anglecam.batch.row import FAILED, Row, cannot_write
 from anglecam.batch.sessions import SessionJob
 from anglecam.batch.work import Settings
-from anglecam.errors import AnglecamError, InputError, RigError
-from anglecam.terminal import printable
+from anglecam.errors import AnglecamError, InputError, RigError, printable
 
 _INDEX_EVERY_S = 10.0
 _INDEX_SHARE = 0.02

@@ -17,9 +17,8 @@ from anglecam.batch.process import Lost, MeasuringProcess
 from anglecam.batch.row import FAILED, cannot_write
 from anglecam.batch.sources import Source
 from anglecam.batch.work import Settings, fetch_beside, require_same_batch, time_allowed, told, unfinished
-from anglecam.errors import AnglecamError, InputError, RigError, blame
+from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.session import CLIP_ENDINGS, COMMAND_ENDING, SERIES_ENDING
-from anglecam.terminal import printable
 
 _LEAST_TIME_S = 3600.0
 """For fitting, and for the bootstraps of the loop."""

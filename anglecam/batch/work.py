@@ -22,9 +22,8 @@ from anglecam.batch.lock import is_current
 from anglecam.batch.notes import Note, Store
 from anglecam.batch.process import Lost, MeasuringProcess
 from anglecam.batch.row import FAILED, OK, TRUNCATED, Row, cannot_write
-from anglecam.errors import AnglecamError, InputError, RigError, blame
+from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.session import COMMAND_ENDING
-from anglecam.terminal import printable
 
 _LEAST_TIME_S = 600.0
 _TIME_PER_BYTE_S = 1e-5

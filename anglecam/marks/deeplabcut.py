@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import InputError
+from anglecam.files import open_text
 from anglecam.marks.hdf5 import as_text, read_array, read_texts
 from anglecam.marks.names_in_pickle import read_names
 from anglecam.marks.tracks import MOST_VALUES, Tracks, unique_in_order
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 _HEADERS = (["scorer", "bodyparts", "coords"], ["scorer", "individuals", "bodyparts", "coords"])
+_MOST_BYTES = 20 * MOST_VALUES
 _COORDS = {"x", "y", "likelihood"}
 _USUAL_LIMIT = 0.6
 """DeepLabCut's own ``pcutoff``."""
@@ -58,7 +60,7 @@ def read_csv(path: Path) -> Tracks:
         Where it is none of that: one line with the file, the row and the cause.
     """
     try:
-        with path.open(newline="", encoding="utf-8-sig") as stream:
+        with open_text(path, _MOST_BYTES) as stream:
             rows = (row for row in csv.reader(stream) if any(cell.strip() for cell in row))
             head = list(itertools.islice(rows, 3))
             if len(head) > 1 and head[1][0].strip() == "individuals":

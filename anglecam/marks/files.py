@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
 from anglecam.errors import InputError
+from anglecam.files import open_text
 from anglecam.marks import deeplabcut, sleap
 from anglecam.marks.hdf5 import open_hdf5
 from anglecam.marks.tracks import Tracks
@@ -69,7 +71,7 @@ def name_by_tool(stem: str) -> str | None:
 def _looks_like_tracks(path: Path) -> bool:
     if path.suffix.lower() not in HDF5_ENDINGS:
         try:
-            with path.open(encoding="utf-8-sig") as stream:
+            with open_text(path, sys.maxsize) as stream:
                 return stream.readline(7) == "scorer,"
         except (OSError, UnicodeDecodeError):
             return False

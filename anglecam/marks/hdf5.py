@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import InputError
+from anglecam.files import open_regular
 from anglecam.marks.tracks import MOST_VALUES
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
     import h5py
 
     try:
+        with open_regular(path):  # HDF5's own opening waits for ever at a pipe
+            pass
         with h5py.File(path, "r") as file:
             yield file
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, IndexError) as fault:

@@ -6,7 +6,6 @@ slows a neck down without changing where it rests; K_p makes it faster and takes
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import InputError
+from anglecam.files import read_json
 from anglecam.neck.constraints import Constraint, least
 from anglecam.neck.pd import ClosedLoop, PdGains, close_loop, rest_gain
 
@@ -143,7 +143,7 @@ def nod_from_responses(path: Path, number: int | None = None) -> Nod:
         Naming the file and what is wrong with it.
     """
     try:
-        told = json.loads(path.read_text(encoding="utf-8"))
+        told = read_json(path)
         all_of_it = [[_figure(r[key]) for key in ("rise_time_s", "overshoot")] for r in told]
     except OSError as fault:
         raise InputError(f"{path}: cannot be read ({fault.strerror or fault})") from fault

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from anglecam.calibrate import BoardCalibration
+from anglecam.errors import printable
 from anglecam.lens import Lens
 from anglecam.report.figures import AFTER, FAINT, MEASURED, STYLE
 
@@ -35,12 +36,13 @@ def plot_calibration(found: BoardCalibration, path: Path, title: str) -> None:
         _draw_distortion(axes[2], found)
         lens = found.calibration
         figure.suptitle(
-            f"{title}: {lens.views} poses, {lens.rms_px:.3f} px RMS, focal length {lens.focal_px:.1f} ±"
+            f"{printable(title)}: {lens.views} poses, {lens.rms_px:.3f} px RMS, focal length {lens.focal_px:.1f} ±"
             f" {lens.sigma('fx'):.1f} px, distortion {' '.join(found.terms) or 'none'}",
             fontsize=10,
+            parse_math=False,
         )
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=110)
+        figure.savefig(path, dpi=110, format="png")
         plt.close(figure)
 
 

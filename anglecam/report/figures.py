@@ -15,8 +15,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from anglecam.errors import printable
 from anglecam.series import AngleSeries
-from anglecam.terminal import printable
 
 Floats = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ def plot_series(series: AngleSeries, path: Path) -> None:
         bottom.plot(series.time, np.degrees(series.sigma), color=AFTER, lw=1.0)
         bottom.set(xlabel="time on the clip's clock, s", ylabel="sigma, °", ylim=(0.0, None))
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=110)
+        figure.savefig(path, dpi=110, format="png")
         plt.close(figure)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from anglecam.errors import printable
 from anglecam.estimate.output_error import Fit
 from anglecam.estimate.record import Record
 from anglecam.loop.attribute import Candidate
@@ -115,7 +116,7 @@ def unseen_figure(before: Prediction, after: Prediction | None) -> str:
             ax.plot(record.time, np.degrees(record.angle), ".", color=MEASURED, ms=3, label="measured")
             path = record.angle - prediction.residuals[i]
             ax.plot(record.time, np.degrees(path), color=COLOURS[label], lw=1.2, label="predicted")
-            ax.set_title(f"{labels(before.records)[i]}, {label}", loc="left", fontsize=9)
+            ax.set_title(f"{labels(before.records)[i]}, {label}", loc="left", fontsize=9, parse_math=False)
             ax.set_xlabel("time, s")
             ax.legend(fontsize=8)
         axes[0, 0].set_ylabel("angle, °")
@@ -151,7 +152,7 @@ def error_figure(before: Prediction, after: Prediction | None, floor: float) -> 
                 for ax in row:
                     ax.plot(time, np.degrees(after.residuals[i]), color=AFTER, lw=0.9, label="error after")
                 row[1].set_title("after, on its own scale", loc="left", fontsize=8, color="#5c6670")
-            row[0].set_title(names[i], loc="left", fontsize=9)
+            row[0].set_title(names[i], loc="left", fontsize=9, parse_math=False)
             row[0].set_ylabel("error, °")
         for ax in axes[-1]:
             ax.set_xlabel("time, s")
@@ -226,8 +227,11 @@ def experiment_figure(experiment: Experiment, verdict: Verdict) -> str:
 
 def labels(records: Sequence[Record]) -> list[str]:
     """Name recordings; of parts of one recording also when they are."""
-    names = [r.name for r in records]
-    return [r.name if names.count(r.name) == 1 else f"{r.name}, {r.time[0]:.1f} … {r.time[-1]:.1f} s" for r in records]
+    names = [printable(r.name) for r in records]
+    return [
+        name if names.count(name) == 1 else f"{name}, {r.time[0]:.1f} … {r.time[-1]:.1f} s"
+        for name, r in zip(names, records, strict=True)
+    ]
 
 
 def _foretell(fit: Fit, command: Command, time: Floats, like: Record) -> Floats:
@@ -276,7 +280,7 @@ def _panels(names: Sequence[str], draw: Callable[[Axes, int], None], ylabel: str
                 ax.set_axis_off()
                 continue
             draw(ax, i)
-            ax.set_title(names[i], loc="left", fontsize=9)
+            ax.set_title(names[i], loc="left", fontsize=9, parse_math=False)
             if i % columns == 0:
                 ax.set_ylabel(ylabel)
             if i >= n - columns:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from rich.table import Table
 
+from anglecam.errors import printable
 from anglecam.identify import Identified
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import Experiment
@@ -28,7 +29,7 @@ def series_table(measurements: Sequence[Measurement | MeasuredTracks]) -> Table:
         ok = series.ok
         degrees = np.degrees(series.angle[ok])
         table.add_row(
-            series.name,
+            printable(series.name),
             f"{ok.sum()} of {len(ok)}",
             f"{_plain(degrees.min())} … {_plain(degrees.max())}",
             f"{np.degrees(np.median(series.sigma[ok])):.4f}",
@@ -42,7 +43,7 @@ def series_table(measurements: Sequence[Measurement | MeasuredTracks]) -> Table:
 def response_table(name: str, answers: Sequence[Response]) -> Table:
     """Tabulate how a clip's angle went from rest to rest."""
     table = Table(
-        "start, s", "from → to, °", "rise, s", "overshoot, %", "settled after, s", "peak, °/s", title=name,
+        "start, s", "from → to, °", "rise, s", "overshoot, %", "settled after, s", "peak, °/s", title=printable(name),
         title_justify="left",
     )  # fmt: skip
     for column in table.columns:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from anglecam.errors import InputError
 from anglecam.threads import native_threads
 from anglecam.video.container import is_cut_short
+from anglecam.video.opening import LONGEST_S, MOST_FRAMES, open_film
 
 Image = NDArray[Any]
 """Bytes, but cv2's type hints do not know it."""
@@ -88,9 +89,9 @@ def inspect_clip(path: Path) -> ClipInfo:
     Raises
     ------
     InputError
-        Where the file is missing, empty, no video file, or has no video stream.
+        As `anglecam.video.opening.open_film`.
     """
-    with _open(path) as container:
+    with open_film(path) as container:
         stream = container.streams.video[0]
         planes = stream.codec_context.format.components if stream.codec_context.format else ()
         coarse = any(plane.width < stream.width for plane in planes)
@@ -116,7 +117,8 @@ def read_frames(path: Path, *, brightness: bool = False) -> Iterator[Frame]:
     Raises
     ------
     InputError
-        As `inspect_clip`, and where timestamps do not increase or there is no frame at all.
+        As `inspect_clip`, and where timestamps do not increase, pictures change their size, there is no frame at all,
+        or more of them, or a longer time, than any film has.
     """
     for index, (time, picture) in enumerate(_decode(path)):
         image = None if picture is None else _brightness(picture) if brightness else _colours(picture)
@@ -161,26 +163,6 @@ def sample_frames(path: Path, most: int) -> Sample:
     return Sample(tuple(kept), count, decoded)
 
 
-def _open(path: Path) -> av.container.InputContainer:
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
-    if not path.is_file():
-        raise InputError(f"{path}: not a file")
-    try:
-        if path.stat().st_size == 0:
-            raise InputError(f"{path}: empty file")
-        container = av.open(str(path), mode="r")
-    except (av.error.FFmpegError, OSError, ValueError) as error:
-        if path.suffix.lower() in (".mp4", ".mov") and is_cut_short(path):
-            raise InputError(f"{path}: truncated: its index is missing, no frame can be read") from error
-        reason = getattr(error, "strerror", None) or "unknown format"
-        raise InputError(f"{path}: not a readable video file ({reason})") from error
-    if not container.streams.video:
-        container.close()
-        raise InputError(f"{path}: no video stream in it")
-    return container
-
-
 def _decode(path: Path) -> Iterator[tuple[float, av.VideoFrame | None]]:
     """Yield (time in s, picture or None) in the order of presentation.
 
@@ -188,7 +170,7 @@ def _decode(path: Path) -> Iterator[tuple[float, av.VideoFrame | None]]:
     with that timestamp, or a later one, comes out: what is left behind was lost. Where a container gives packets
     no presentation time (AVI with reordered frames), only a packet that raises is known to be lost.
     """
-    with _open(path) as container:
+    with open_film(path) as container:
         stream = container.streams.video[0]
         stream.codec_context.thread_type = "SLICE"
         stream.codec_context.thread_count = native_threads()
@@ -196,18 +178,25 @@ def _decode(path: Path) -> Iterator[tuple[float, av.VideoFrame | None]]:
         is_avi = container.format.name == "avi"
         pending: list[int] = []
         broken: set[int] = set()
+        first: int | None = None
         last: int | None = None
         delay: int | None = None
-        some = False
+        size = stream.width, stream.height  # the decoder's own change when a film changes in the middle
+        other: tuple[int, int] | None = None
 
         def row(pts: int, picture: av.VideoFrame | None) -> tuple[float, av.VideoFrame | None]:
-            nonlocal last, some
+            nonlocal first, last
+            first = pts if first is None else first
             if last is not None and pts <= last:
                 raise InputError(f"{path}: timestamps do not increase at {pts * base:g} s")
-            last, some = pts, True
+            if (pts - first) * base > LONGEST_S:
+                raise InputError(f"{path}: frames at {first * base:g} s and at {pts * base:g} s; a week is the longest")
+            last = pts
             return (pts - (delay or 0)) * base, picture
 
-        for packet, pictures in _packets(path, container, stream):
+        for number, (packet, pictures) in enumerate(_packets(path, container, stream)):
+            if number > MOST_FRAMES:
+                raise InputError(f"{path}: more than {MOST_FRAMES:,} frames are not read")
             stamp = packet.pts if packet.pts is not None else packet.dts
             if delay is None and stamp is not None:
                 # AVI holds no presentation times: the frames follow each other from its start. libav makes them
@@ -227,12 +216,22 @@ def _decode(path: Path) -> Iterator[tuple[float, av.VideoFrame | None]]:
                     yield row(heapq.heappop(pending), None)
                 if pending and pending[0] == pts:
                     heapq.heappop(pending)
-                usable = not (picture.is_corrupt or pts in broken) and _same_size(picture, stream)
+                usable = not (picture.is_corrupt or pts in broken)
                 broken.discard(pts)
+                shown = picture.width, picture.height
+                if shown != size:
+                    # a single one is a damaged picture; two of the same other size are another film
+                    if shown == other:
+                        raise InputError(
+                            f"{path}: pictures of {shown[0]} × {shown[1]} px at {pts * base:g} s, not of"
+                            f" {size[0]} × {size[1]} as its header says; cut the film there"
+                        )
+                    usable = False
+                other = None if shown == size else shown
                 yield row(pts, picture if usable else None)
         while pending:
             yield row(heapq.heappop(pending), None)
-        if not some:
+        if last is None:
             cut = is_cut_short(path)
             raise InputError(f"{path}: truncated before its first frame" if cut else f"{path}: no frames in it")
 
@@ -261,10 +260,6 @@ def _packets(
             return
         except av.error.FFmpegError:
             yield packet, None
-
-
-def _same_size(picture: av.VideoFrame, stream: av.VideoStream) -> bool:
-    return picture.width == stream.width and picture.height == stream.height
 
 
 def _colours(picture: av.VideoFrame) -> Image:

@@ -19,6 +19,9 @@ _FLOOR_PX = 0.02
 _SLOW_PX = 0.04
 """Least standard deviation of a centroid's error that changes slowly along the path, px: what passes behind the
 mark's edge, and chroma at half resolution, shift it by 0.02 to 0.08 px in MJPG films."""
+_FLATTEST = 1e6
+"""Condition of the fit beyond which a path is a line: an arc of less than a tenth of a degree, of whose covariance no
+digit would be left."""
 _SLOW_LENGTHS_PX = (4.0, 16.0)
 """Ways along the path over which that error changes: what passes behind the edge, a codec's blocks."""
 
@@ -113,10 +116,9 @@ def fit_circle(points_px: Floats, *, start: tuple[Floats, float] | None = None) 
     distance = np.hypot(*d.T)
     residual = distance - radius
     J = np.column_stack([-d / distance[:, None], -np.ones(len(used))])
-    try:
-        bread = np.linalg.inv(J.T @ J)
-    except np.linalg.LinAlgError:
+    if np.linalg.cond(J) > _FLATTEST:
         return None
+    bread = np.linalg.inv(J.T @ J)
     scatter = float(np.sqrt((residual**2).sum() / max(len(used) - 3, 1)))
     n_poses = pose.max() + 1
     told = np.zeros((n_poses, 3))

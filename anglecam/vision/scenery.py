@@ -103,9 +103,11 @@ def find_scenery(pictures: Sequence[Image]) -> Scenery | None:
     Scenery or None
         ``None`` where too little goes together.
     """
+    if len(pictures) < 2:
+        return None
     levelled = [level(picture) for picture in pictures]
     centres, tensor = find_windows(pictures[0], pixel_noise(levelled))
-    if len(centres) < _FEWEST or len(pictures) < 2:
+    if len(centres) < _FEWEST:
         return None
     moved = np.stack([follow(levelled[0], one, centres) for one in levelled], axis=1)
     metric, information = metric_of(tensor)

@@ -77,10 +77,12 @@ def find_regions(image: Image, model: ColourModel, smallest_px2: float) -> list[
     patches, _ = cv2.findContours(core, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     sized = sorted(((cv2.contourArea(p), k) for k, p in enumerate(patches) if len(p) >= _FEWEST_EDGE_PX), reverse=True)
     large = [patches[k] for area, k in sized[:_MOST] if area >= smallest_px2]
-    return [_measure(fraction, smooth, core, patch, model) for patch in large]
+    measured = (_measure(fraction, smooth, core, patch, model) for patch in large)
+    return [region for region in measured if region is not None]
 
 
-def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], model: ColourModel) -> Region:
+def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], model: ColourModel) -> Region | None:
+    """Measure one patch; ``None`` where its neighbours leave nothing of it."""
     height, width = fraction.shape
     left, top, across, down = cv2.boundingRect(patch)
     right, bottom = left + across, top + down
@@ -105,6 +107,8 @@ def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], m
 
     y, x = np.mgrid[0 : own.shape[0], 0 : own.shape[1]].astype(np.float64)
     area = float(weight.sum())
+    if area <= 0.0:
+        return None
     cx, cy = float((weight * x).sum() / area), float((weight * y).sum() / area)
     dx, dy = x - cx, y - cy
     xx, yy, xy = ((weight * m).sum() / area for m in (dx * dx, dy * dy, dx * dy))

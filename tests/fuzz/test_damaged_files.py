@@ -1,0 +1,43 @@
+"""A short run of `benchmarks/fuzz`: damaged files are read, or refused in one line that names them; nothing else happens."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from benchmarks.fuzz import clips, texts
+from benchmarks.fuzz.trial import FINDING, REFUSED, RESULT, judge
+
+SEED = 7
+
+
+def _judged(generator, count: int, folder: Path) -> tuple[list[str], dict[str, set[str]]]:
+    """Return what was found, and for each kind of damage which outcomes there were."""
+    readers, findings, outcomes = generator.readers(), [], {}
+    for number, case in generator.cases(count, SEED):
+        path = folder / f"{number}-{case.name}"
+        path.write_bytes(case.content)
+        outcome = judge(readers[case.reader], path, generator.MOST_BYTES)
+        outcomes.setdefault(case.damage, set()).add(outcome.kind)
+        if outcome.kind == FINDING:
+            findings.append(f"{path.name}, {case.damage}: {outcome.said}")
+    return findings, outcomes
+
+
+def test_damaged_texts_are_read_or_refused_in_one_line(tmp_path):
+    findings, outcomes = _judged(texts, 250, tmp_path)
+    assert not findings, "\n".join(findings)
+    assert set(outcomes) == set(texts.DAMAGES)
+    assert set.union(*outcomes.values()) == {RESULT, REFUSED}
+
+
+def test_damaged_clips_are_measured_or_refused_in_one_line(tmp_path):
+    findings, outcomes = _judged(clips, 60, tmp_path)
+    assert not findings, "\n".join(findings)
+    assert set(outcomes) == set(clips.DAMAGES)
+    assert set.union(*outcomes.values()) == {RESULT, REFUSED}
+
+
+def test_a_number_gives_the_same_damage_every_time():
+    for generator in (clips, texts):
+        again = {number: case for number, case in generator.cases(3, SEED, first=20)}
+        assert again == {number: case for number, case in generator.cases(40, SEED) if number in again}
