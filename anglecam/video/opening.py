@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -31,6 +32,8 @@ MOST_STREAMS = 64
 _OPENING_BYTES = 768 * 2**20
 """Of memory that opening may take: FFmpeg makes a film's whole index at once, of entries that cost no byte in the file.
 `MOST_FRAMES` have 80 MB of it; the rest is for the first pictures, which it decodes to know what they are."""
+_ONE_AT_A_TIME = threading.Lock()
+"""The limit is the process's: a second thread would take the first one's for what was there before."""
 _CONTAINERS = "avi,matroska,webm,mov,mp4,asf,flv,mpegts,mpeg,ogg,nut,mxf"
 """As FFmpeg calls those that carry times of their own and name no other file."""
 
@@ -91,14 +94,15 @@ def _little_memory() -> Iterator[None]:
         return
     import resource
 
-    before = resource.getrlimit(resource.RLIMIT_DATA)
-    held = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
-    limits = [limit for limit in before if limit != resource.RLIM_INFINITY]
-    resource.setrlimit(resource.RLIMIT_DATA, (min([held + _OPENING_BYTES, *limits]), before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_DATA, before)
+    with _ONE_AT_A_TIME:
+        before = resource.getrlimit(resource.RLIMIT_DATA)
+        held = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
+        limits = [limit for limit in before if limit != resource.RLIM_INFINITY]
+        resource.setrlimit(resource.RLIMIT_DATA, (min([held + _OPENING_BYTES, *limits]), before[1]))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_DATA, before)
 
 
 def _fault(container: av.container.InputContainer) -> str | None:
