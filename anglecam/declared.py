@@ -89,7 +89,8 @@ def _require_plain(path: Path, text: str) -> None:
         if depth > _DEEPEST:
             more = f"more than {_DEEPEST} levels"
         if more:
-            raise RigError(f"{path}: line {event.start_mark.line + 1}: {more}; only plain keys and values are read")
+            line = "" if event.start_mark is None else f"line {event.start_mark.line + 1}: "
+            raise RigError(f"{path}: {line}{more}; only plain keys and values are read")
 
 
 def _first(error: ValidationError) -> str:
