@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, TypeVar
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from anglecam.errors import RigError
 from anglecam.files import read_text
@@ -16,9 +16,19 @@ _MOST_BYTES = 256 * 1024
 _DEEPEST = 20
 """Levels of nesting; a rig has four."""
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+_LARGEST = 1e12
+"""Nothing about a rig or a neck is larger in its unit, nor smaller than the inverse: powers of it stay finite."""
+
+
+def _not_tiny(value: float) -> float:
+    if value * _LARGEST < 1.0:
+        raise ValueError(f"{value:g} is too small")
+    return value
+
+
+Positive = Annotated[float, Field(gt=0, le=_LARGEST, allow_inf_nan=False), AfterValidator(_not_tiny)]
+NotNegative = Annotated[float, Field(ge=0, le=_LARGEST, allow_inf_nan=False)]
+Finite = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False)]
 
 
 class Declared(BaseModel):
@@ -89,7 +99,8 @@ def _require_plain(path: Path, text: str) -> None:
         if depth > _DEEPEST:
             more = f"more than {_DEEPEST} levels"
         if more:
-            raise RigError(f"{path}: line {event.start_mark.line + 1}: {more}; only plain keys and values are read")
+            line = "" if event.start_mark is None else f"line {event.start_mark.line + 1}: "
+            raise RigError(f"{path}: {line}{more}; only plain keys and values are read")
 
 
 def _first(error: ValidationError) -> str:

@@ -129,6 +129,20 @@ def test_a_calibration_nested_without_end_does_not_end_the_process(tmp_path, kin
     assert "not a calibration" in done.stdout
 
 
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("head: {centre_of_mass_m: 1.0e+308}", "head.centre_of_mass_m: input should be less than"),
+        ("head: {centre_of_mass_m: 1.0e-320}", "head.centre_of_mass_m: 9.99989e-321 is too small"),
+        ("linkage: {ground_m: 5.0, coupler_m: 0.01, rocker_m: 0.01, crank_m: 0.01}", ""),
+    ],
+)
+def test_a_neck_that_cannot_be_is_the_files_fault(tmp_path, text, says):
+    path = tmp_path / "neck.yaml"
+    path.write_text(text)
+    assert says in refusal(read_neck, path)
+
+
 @pytest.mark.parametrize("name", ["model.json", "a.responses.json"])
 @pytest.mark.parametrize(
     "text",

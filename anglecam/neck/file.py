@@ -17,6 +17,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from anglecam.declared import Declared, Finite, NotNegative, Positive, read_declared
+from anglecam.errors import RigError
 from anglecam.neck.command_table import TABLE_3, CommandScale
 from anglecam.neck.damping import Film
 from anglecam.neck.design import known
@@ -195,11 +196,15 @@ def read_neck(path: Path | None) -> Neck:
     Raises
     ------
     RigError
-        Naming the file, the key and the cause.
-    ValueError
-        Where the declared links close nowhere.
+        Naming the file, the key and the cause; also where the declared links close nowhere.
     """
-    return neck_of(NeckFile() if path is None else read_declared(path, NeckFile))
+    if path is None:
+        return neck_of(NeckFile())
+    told = read_declared(path, NeckFile)
+    try:
+        return neck_of(told)
+    except ValueError as fault:
+        raise RigError(f"{path}: {fault}") from fault
 
 
 def neck_of(told: NeckFile) -> Neck:

@@ -112,11 +112,28 @@ FILES = {
     "responses": ("steps.responses.json", RESPONSES),
 }
 VALUES = (
-    "nan", ".nan", "inf", "-inf", "-.inf", "1e308", "-1e309", "1e-320", "0", "-1", "", "null", "true", "x" * 300, "0x1F",
-    "9" * 400, "9" * 5000, "0x" + "f" * 5000, "1_000", "2001-99-99", "1:99", "!!timestamp x", "!!int ''", "!!bool 7",
-    "!!python/object/apply:os.system [ls]", "!!binary x", "&a [*a]", "*a", "<<", "=", '"\\0"', '"\\ud800"', "'", '"', "[[", "{",
-    "{}", "[]", "[1]", "a\nb", "\x00", "\x1b[2J", "\u2028", "٣", "١٢", "../../etc/passwd", "/dev/zero", "\ud800", "-", "- -",
-)  # fmt: skip
+    *(
+        "nan",
+        ".nan",
+        "inf",
+        "-inf",
+        "-.inf",
+        "1e308",
+        "-1e309",
+        "1e-320",
+        "0",
+        "-1",
+        "0x1F",
+        "1_000",
+        "1:99",
+        "٣",
+        "١٢",
+    ),
+    *("9" * 400, "9" * 5000, "0x" + "f" * 5000, "x" * 300, "2001-99-99", "", "null", "true", "<<", "=", "-", "- -"),
+    *("!!timestamp x", "!!int ''", "!!bool 7", "!!binary x", "!!python/object/apply:os.system [ls]", "&a [*a]", "*a"),
+    *('"\\0"', '"\\ud800"', "'", '"', "[[", "{", "{}", "[]", "[1]", "a\nb", "\x00", "\x1b[2J", "\u2028", "\ud800"),
+    *("../../etc/passwd", "/dev/zero"),
+)
 
 Damage = Callable[[np.random.Generator, str], bytes]
 

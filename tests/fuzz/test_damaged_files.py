@@ -1,4 +1,4 @@
-"""A short run of `benchmarks/fuzz`: damaged files are read, or refused in one line that names them; nothing else happens."""
+"""A short run of `benchmarks/fuzz`: damaged files are read, or refused in one line that names them."""
 
 from __future__ import annotations
 
@@ -39,5 +39,5 @@ def test_damaged_clips_are_measured_or_refused_in_one_line(tmp_path):
 
 def test_a_number_gives_the_same_damage_every_time():
     for generator in (clips, texts):
-        again = {number: case for number, case in generator.cases(3, SEED, first=20)}
+        again = dict(generator.cases(3, SEED, first=20))
         assert again == {number: case for number, case in generator.cases(40, SEED) if number in again}
