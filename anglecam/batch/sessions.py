@@ -10,7 +10,7 @@ from pathlib import Path
 
 from anglecam import __version__
 from anglecam.batch.address import is_remote, join, name, names_in, parent, read_small, stem
-from anglecam.batch.identity import combined
+from anglecam.batch.identity import combined, content_hash
 from anglecam.batch.lock import is_current
 from anglecam.batch.notes import Note, SessionNote, Store
 from anglecam.batch.process import Lost, MeasuringProcess
@@ -18,6 +18,7 @@ from anglecam.batch.row import FAILED, cannot_write
 from anglecam.batch.sources import Source
 from anglecam.batch.work import Settings, fetch_beside, require_same_batch, time_allowed, told, unfinished
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
+from anglecam.marks.files import find_tracks
 from anglecam.session import CLIP_ENDINGS, COMMAND_ENDING, SERIES_ENDING
 
 _LEAST_TIME_S = 3600.0
@@ -118,6 +119,8 @@ def _configuration(job: SessionJob, settings: Settings, measured: Sequence[Note]
     files = sorted(f for f in names_in(job.address) if f.endswith((COMMAND_ENDING, SERIES_ENDING)))
     parts: dict[str, bytes | str | None] = {f"file {f}": read_small(join(job.address, f)) for f in files}
     parts |= {f"clip {note.address}": f"{note.row.sha256} {note.row.configuration}" for note in measured}
+    if not is_remote(job.address):  # another program's tracks stand in a clip's place
+        parts |= {f"tracks {path.name}": content_hash(path) for path in find_tracks(Path(job.address))}
     parts["rig"] = read_small(settings.rig or join(job.address, "rig.yaml"))
     parts["close"] = str(job.close)
     return combined(parts)

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from anglecam.batch.run import Options, run_batch
+from anglecam.batch.sessions import SessionJob, _configuration
+from anglecam.batch.work import Settings
 from anglecam.recordings import measure_session
 from anglecam.series import AngleSeries, write_series
 from anglecam.session import read_session
@@ -94,3 +96,13 @@ def test_where_no_clip_of_a_session_can_be_measured_nothing_more_is_said_than_th
     (lab / "a.command.csv").write_text("time_s,command_deg\n0,0\n0.1,5\n")
     result = run_batch([str(lab)], tmp_path / "out", QUIET)
     assert [str(p) for p in result.problems] == [f"{lab}/a.avi: empty file"]
+
+
+def test_a_session_depends_on_tracks_that_stand_in_a_clips_place(tmp_path):
+    job, settings = SessionJob(str(tmp_path), "", (), close=False), Settings(out=str(tmp_path / "out"), run="one")
+    tracks = tmp_path / "nodDLC_resnet50_headshuffle1_500.csv"
+    found = []
+    for x in (10.0, 11.0):
+        tracks.write_text(f"scorer,a,a,a\nbodyparts,nose,nose,nose\ncoords,x,y,likelihood\n0,{x},20.0,0.9\n")
+        found.append(_configuration(job, settings, []))
+    assert found[0] != found[1]
