@@ -107,8 +107,10 @@ def close_records(
         task, base = _begin(records, held_out, starts, np.random.default_rng(seed), progress)
         progress("residual")
         first = look(task, base)
-        progress("candidates")
-        candidates = [] if first.gate.passed else candidates_of(task, first)
+        candidates: list[Candidate] = []
+        if not first.gate.passed:
+            progress("candidates")
+            candidates = candidates_of(task, first)
         last = trace(task, first, candidates)
         progress("verdict")
         return _conclude(task, first, last, candidates)
