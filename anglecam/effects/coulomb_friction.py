@@ -2,8 +2,10 @@
 
     θ̈ = c·u − a·θ̇ − b·θ − F·sgn θ̇                  while sliding, F ± D for the two directions
     θ̇ = 0      while |c·u − b·θ| ≤ max(F + B, F ± D)      the head sticks, and more than sliding takes breaks it away
+    F ± D + (B ∓ D)·exp(−(θ̇/ω_s)²)                        in place of F ± D: Stribeck's curve from one to the other
 
-F, D and B are torques divided by the moment of inertia. The paper's damping is a lubricant film alone, Eqs. (19)–(22).
+F, D and B are torques divided by the moment of inertia; with ω_s = 0 friction falls at once. The
+paper's damping is a lubricant film alone, Eqs. (19)–(22).
 """
 
 from __future__ import annotations
@@ -19,19 +21,21 @@ from anglecam.effects.effect import Effect, Parameter
 @njit
 def _dry(parameters: NDArray) -> tuple[float, float, float, float]:
     mean, difference, more = parameters[0], parameters[1], parameters[2]
-    return max(mean + difference, 0.0), max(mean - difference, 0.0), mean + more if more > 0.0 else 0.0, 0.0
+    breakaway = mean + more if more > 0.0 else 0.0
+    return max(mean + difference, 0.0), max(mean - difference, 0.0), breakaway, parameters[3]
 
 
 EFFECT = Effect(
     id="coulomb_friction",
     station="load",
     summary="Dry friction opposes motion with a torque that does not depend on speed, and holds the head near rest.",
-    equation="θ̈ = c·u − a·θ̇ − b·θ − (F ± D)·sgn θ̇; at rest while |c·u − b·θ| ≤ max(F + B, F ± D)",
+    equation="θ̈ = c·u − a·θ̇ − b·θ − (F ± D)·sgn θ̇, F + B near rest; θ̇ = 0 while |c·u − b·θ| ≤ max(F + B, F ± D)",
     relaxes="Eq. (22): damping is viscous only",
     parameters=(
         Parameter("friction_deg_per_s2", 0.0, 0.0, 500.0, (0.3, 3.0, 15.0), math.degrees(1.0)),
-        Parameter("asymmetry_deg_per_s2", 0.0, -250.0, 250.0, (), math.degrees(1.0)),
-        Parameter("breakaway_excess_deg_per_s2", 0.0, 0.0, 500.0, (), math.degrees(1.0)),
+        Parameter("asymmetry_deg_per_s2", 0.0, -250.0, 250.0, (0.0,), math.degrees(1.0), late=True),
+        Parameter("breakaway_excess_deg_per_s2", 0.0, 0.0, 500.0, (0.3, 3.0), math.degrees(1.0), late=True),
+        Parameter("stribeck_speed_deg_per_s", 0.0, 0.0, 10.0, (0.05, 0.3), math.degrees(1.0), late=True),
     ),
     aliases=("quadratic_drag", "backlash", "dead_zone"),
     separating_experiment="a slow triangle of small amplitude, on which dry friction shows as a constant lag in angle",

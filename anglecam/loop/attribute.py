@@ -10,12 +10,13 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.stats import chi2, norm
 
 from anglecam.effects import Effect
 from anglecam.estimate.output_error import Fit, fit_output_error
 from anglecam.estimate.record import Record
 from anglecam.loop.holdout import Prediction, predict_unseen
+from anglecam.loop.refit import effects_of
 from anglecam.loop.screen import Forecast
 from anglecam.simulate.plant import Plant
 from anglecam.threads import native_threads
@@ -31,8 +32,8 @@ what was not fitted."""
 FULFILLED = 0.7
 """Share of its forecast that a fit must reach, or else it begins again from the effect's own start; and if it then
 reaches less than `HOPEFUL`, from half and twice the forecast's."""
-HELD = 1e-9
-"""How far a parameter that is held may go, SI."""
+ASKED_FOR = 0.01
+"""Late parameters of an effect are left out unless without them so good a fit of them would be this improbable."""
 ALIAS_LEVEL = 0.05
 
 
@@ -53,8 +54,8 @@ class Candidate:
 
     @property
     def effect(self) -> Effect:
-        """What was added."""
-        return self.forecast.effect
+        """What was added, with those of its parameters that the data asked for."""
+        return effects_of(self.fit)[-1]
 
     @property
     def evidence(self) -> float:
@@ -114,20 +115,17 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
         raise TypeError("only a Plant takes effects")
     plant, effect = base.model, forecast.effect
 
+    early = [p for p in effect.parameters if not p.late]
+
     def fit_from(start: NDArray[np.float64]) -> Fit:
-        # a shape without a start of its own is released last: at once, it may stand in for the size
-        late = [p for p in effect.parameters[1:] if not p.starts]
-        values = np.append(base.parameters, start)
-        if late:
-            held = [replace(p, lower=p.null - HELD, upper=p.null + HELD) if p in late else p for p in effect.parameters]
-            first = plant.with_effect(replace(effect, parameters=tuple(held)))
-            values = fit_output_error(first, records, [values], own=base.own, phi=base.phi).parameters
-        return fit_output_error(plant.with_effect(effect), records, [values], own=base.own, phi=base.phi)
+        values = np.append(base.parameters, start[: len(early)])
+        some = replace(effect, parameters=tuple(early))
+        return fit_output_error(plant.with_effect(some), records, [values], own=base.own, phi=base.phi)
 
     first = effect.null
     first[0] = effect.parameters[0].starts[0]
     near = [effect.null + share * (forecast.start - effect.null) for share in (0.5, 2.0)]
-    enough = [FULFILLED if len(effect.parameters) == 1 else math.inf, HOPEFUL, HOPEFUL, HOPEFUL]
+    enough = [FULFILLED if len(early) == 1 else math.inf, HOPEFUL, HOPEFUL, HOPEFUL]
     best = base
     # several parameters may have several valleys, and dry friction has them beside whatever has a kink
     for start, share in zip([forecast.start, first, *near], enough, strict=True):
@@ -135,6 +133,21 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
         best = fit if best is base or fit.cost < best.cost else best
         if log_likelihood_gain(base.cost, best.cost, len(base.white)) >= share * forecast.gain:
             break
+    return _with_late(plant, effect, best, records)
+
+
+def _with_late(plant: Plant, effect: Effect, fit: Fit, records: Sequence[Record]) -> Fit:
+    """Let in the late parameters of a fit's last effect, one after another, as far as the data ask for them.
+
+    At once, they would stand in for the size; one alone may show nothing that it and the next do show.
+    """
+    best, spent = fit, 0
+    for count in range(len(effects_of(fit)[-1].parameters) + 1, len(effect.parameters) + 1):
+        richer = plant.with_effect(replace(effect, parameters=effect.parameters[:count]))
+        starts = [np.append(fit.parameters, value) for value in effect.parameters[count - 1].starts]
+        fit, spent = fit_output_error(richer, records, starts, own=fit.own, phi=fit.phi), spent + 1
+        if 2.0 * log_likelihood_gain(best.cost, fit.cost, len(fit.white)) > chi2.isf(ASKED_FOR, spent):
+            best, spent = fit, 0
     return best
 
 
@@ -171,7 +184,7 @@ def rivals(
     return {
         other.effect.id: fit
         for other, fit, gap in zip(others, fits, gaps, strict=True)
-        if gap <= widest and other.effect is not effect
+        if gap <= widest and other.effect.id != effect.id
     }
 
 

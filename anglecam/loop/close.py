@@ -23,7 +23,7 @@ from anglecam.estimate.start import start_parameters
 from anglecam.loop.attribute import Candidate, log_likelihood_gain, promising, rivals
 from anglecam.loop.gate import LEVEL, Gate
 from anglecam.loop.holdout import Gain, Prediction, compare, predict_unseen, split_records
-from anglecam.loop.refit import effects_of, recoloured, with_last, without
+from anglecam.loop.refit import effects_of, left_of, recoloured, with_last, without
 from anglecam.loop.rounds import SURE, Round, Task, applicable, candidates_of, look, smallest, trace
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.simulate.plant import Plant
@@ -172,7 +172,7 @@ def _remains(task: Task, first: Round, last: Round, before: Fit, noise: Noise) -
         return False
     driven = any(r.command is not None for r in task.fitted)
     share = REMAINDER if driven and task.floor is not None else REMAINDER_UNDRIVEN
-    # told by the noise floor, whatever shape it has, and by what would explain most of it, which is finer
+    # told by the noise floor, whatever it is, and by what would explain most of it, which is finer
     return (
         not named
         or _beyond(last.unseen, noise) > share * _beyond(first.unseen, noise)
@@ -186,16 +186,16 @@ def _beyond(prediction: Prediction, noise: Noise) -> float:
 
 
 def _could_still_gain(now: Round, before: Fit) -> float:
-    """Return what one more effect is forecast to explain, as a share of it and all that was explained since before."""
-    if not now.forecasts or now.forecasts[0].gain <= 0.0:
+    """Return what the gate's best test would explain, as a share of that and all that was explained since before."""
+    more = max(test.gain for test in now.gate.tests)
+    if more <= 0.0:
         return 0.0
-    more = now.forecasts[0].gain
     return more / (more + max(log_likelihood_gain(before.cost, now.fit.cost, len(before.white)), 0.0))
 
 
 def _rivals(fit: Fit, effect: Effect, task: Task) -> dict[str, Fit]:
     """Say of an effect, the others in place, what it cannot be told from."""
     base, best = without(fit, effect, task.fitted), with_last(fit, effect, task.fitted)
-    left = [e for e in task.ledger if e not in effects_of(fit)]
-    others = promising(forecasts(base, directions(base, task.fitted, changes(base, task.fitted, left))))
+    moved = changes(base, task.fitted, left_of(task.ledger, fit))
+    others = promising(forecasts(base, directions(base, task.fitted, moved)))
     return rivals(best, base, task.fitted, effect, others)

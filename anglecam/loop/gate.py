@@ -1,7 +1,8 @@
 """The gate: is there structure in the residual that noise would not leave there.
 
 Several tests look at the whitened residual of a fitted model: along what each effect that could be added would change,
-along functions of angle, velocity, command and time, and at its autocorrelation. Every statistic is a share of the
+along functions of angle, velocity, command and time, along what any torque over angle or speed would change, and at its
+autocorrelation. Every statistic is a share of the
 residual's own energy, so none of them needs the noise's size. The smallest of the tests' p-values is the gate's
 statistic; its null distribution comes from a parametric bootstrap: white noise, from which what the fit absorbs (the
 space of its Jacobian) is taken out as the fit takes it out. So neither the number of tests nor what they share has to
@@ -21,6 +22,7 @@ from scipy.stats import beta, chi2, norm
 from anglecam.estimate.output_error import Fit, whiten
 from anglecam.estimate.record import Record
 from anglecam.loop.screen import Direction, absorbed_space
+from anglecam.loop.torques import torque_responses
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +37,8 @@ class Test:
 
     name: str
     p_value: float
+    gain: float
+    """Log-likelihood that what it looks for would gain, less what noise would give it; 0 for an autocorrelation."""
 
 
 @dataclass(frozen=True)
@@ -80,36 +84,48 @@ def test_residual(fit: Fit, records: Sequence[Record], ways: Sequence[Direction]
     energy = np.sum(both**2, axis=0)
     energy[energy == 0.0] = 1.0
 
-    p_each = _p_of_effects(ways, both, energy, free)
-    for name, basis in _shapes(fit, records).items():
+    p_each, gains = _p_of_effects(ways, both, energy, free)
+    shapes = {f"residual against {name}": basis for name, basis in _shapes(fit, records).items()}
+    shapes |= {f"torque against {name}": basis for name, basis in torque_responses(fit, records).items()}
+    for name, basis in shapes.items():
         left = basis - absorbed @ (absorbed.T @ basis)
-        p_each[f"residual against {name}"] = _p_of_share(left, basis, both, energy, free)
-    p_each["autocorrelation"] = chi2.sf(_portmanteau(both, energy, records), LAGS)
+        p_each[name], gains[name] = _p_of_space(left, basis, both, energy, free)
+    p_each["autocorrelation"], gains["autocorrelation"] = chi2.sf(_portmanteau(both, energy, records), LAGS), 0.0
 
     # under the null the data are one more draw: the smallest of its p-values is ranked among all draws'
     smallest = np.min(list(p_each.values()), axis=0)
     p_value = np.mean(smallest <= smallest[0])
     critical = float(np.quantile(smallest[1:], LEVEL))
     needed = float((norm.isf(critical) + norm.isf(0.05)) * np.sqrt(fit.cost / free))
-    tests = tuple(Test(name, float(p[0])) for name, p in p_each.items())
+    tests = tuple(Test(name, float(p[0]), gains[name]) for name, p in p_each.items())
     return Gate(float(p_value), tests, _detectable(ways, needed))
 
 
-def _p_of_effects(ways: Sequence[Direction], residuals: Floats, energy: Floats, free: int) -> dict[str, Floats]:
-    """Return, for each effect and residual (columns), the least p-value of its directions.
+def _p_of_effects(
+    ways: Sequence[Direction], residuals: Floats, energy: Floats, free: int
+) -> tuple[dict[str, Floats], dict[str, float]]:
+    """Return, for each effect, the least p-value of its directions for every residual (columns), and the first's gain.
 
     Of white noise in n dimensions the share of the energy that falls into one of them is Beta(1/2, (n − 1)/2).
     """
     if not ways:
-        return {}
+        return {}, {}
     along = np.stack([way.change / way.size for way in ways]) @ residuals
     share = np.minimum(along**2 / energy, 1.0)
     p = beta.sf(share, 0.5, 0.5 * (free - 1))
+    gain = np.array([_gain(s, 1, free) for s in share[:, 0]])
     for i, way in enumerate(ways):
         if way.one_sided:
             p[i] = np.where(along[i] > 0.0, 0.5 * p[i], 1.0 - 0.5 * p[i])
+            gain[i] = gain[i] if along[i, 0] > 0.0 else 0.0
     ids = np.array([way.effect.id for way in ways])
-    return {f"effect {name}": p[ids == name].min(axis=0) for name in dict.fromkeys(ids)}
+    own = {f"effect {name}": ids == name for name in dict.fromkeys(ids)}
+    return {n: p[i].min(axis=0) for n, i in own.items()}, {n: float(gain[i].max()) for n, i in own.items()}
+
+
+def _gain(share: float, dimensions: int, free: int) -> float:
+    """Return what the log-likelihood gains where a share of the energy is explained, less what it does of noise."""
+    return float(-0.5 * free * np.log(max(1.0 - share, 1e-6)) - 0.5 * dimensions)
 
 
 def _detectable(ways: Sequence[Direction], needed: float) -> dict[str, float]:
@@ -152,8 +168,8 @@ def _shapes(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
     return {name: np.concatenate(blocks) for name, blocks in groups.items()}
 
 
-def _p_of_share(left: Floats, basis: Floats, residuals: Floats, energy: Floats, free: int) -> Floats:
-    """Return, for each residual (columns), the p-value of its share of energy within the space of ``left``.
+def _p_of_space(left: Floats, basis: Floats, residuals: Floats, energy: Floats, free: int) -> tuple[Floats, float]:
+    """Return the p-value of every residual's (columns) share of energy in the space of ``left``, and the first's gain.
 
     Of white noise in n dimensions the share that falls into k of them is Beta(k/2, (n − k)/2).
     """
@@ -161,9 +177,9 @@ def _p_of_share(left: Floats, basis: Floats, residuals: Floats, energy: Floats, 
     u = u[:, size > 1e-6 * max(float(np.linalg.norm(basis)), 1e-300)]
     k = u.shape[1]
     if k == 0:
-        return np.ones(residuals.shape[1])
+        return np.ones(residuals.shape[1]), 0.0
     share = np.minimum(np.sum((u.T @ residuals) ** 2, axis=0) / energy, 1.0)
-    return np.asarray(beta.sf(share, 0.5 * k, 0.5 * (free - k)))
+    return beta.sf(share, 0.5 * k, 0.5 * (free - k)), _gain(share[0], k, free)
 
 
 def _portmanteau(residuals: Floats, energy: Floats, records: Sequence[Record]) -> Floats:

@@ -16,6 +16,12 @@ def effects_of(fit: Fit) -> tuple[Effect, ...]:
     return _plant(fit).effects
 
 
+def left_of(ledger: Sequence[Effect], fit: Fit) -> list[Effect]:
+    """Return the effects that a fitted plant does not have."""
+    ids = [e.id for e in effects_of(fit)]
+    return [e for e in ledger if e.id not in ids]
+
+
 def recoloured(fit: Fit, records: Sequence[Record], phi: float) -> Fit:
     """Fit again with the noise's autocorrelation ``phi`` from frame to frame."""
     return fit_output_error(fit.model, records, [fit.parameters], own=fit.own, phi=phi)

@@ -21,7 +21,7 @@ from anglecam.estimate.record import Record
 from anglecam.loop.attribute import Candidate, fit_candidates, fit_with, promising, side_by_side
 from anglecam.loop.gate import Gate, test_residual
 from anglecam.loop.holdout import Prediction, compare, predict_unseen
-from anglecam.loop.refit import effects_of, recoloured, without
+from anglecam.loop.refit import effects_of, left_of, recoloured, without
 from anglecam.loop.screen import Change, Forecast, changes, directions, forecasts
 
 MOST_EFFECTS = 3
@@ -74,8 +74,7 @@ class Round:
 
 def look(task: Task, fit: Fit) -> Round:
     """Test what a fitted plant leaves over, whitened with the noise's colour as far as that can be told by now."""
-    left = [e for e in task.ledger if e not in effects_of(fit)]
-    moved = changes(fit, task.fitted, left)
+    moved = changes(fit, task.fitted, left_of(task.ledger, fit))
     fit = recoloured(fit, task.fitted, _colour(task, fit, moved))
     ways = directions(fit, task.fitted, moved)
     told, unseen = predict_unseen(fit, task.fitted, task.predicted)

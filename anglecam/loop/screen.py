@@ -146,12 +146,15 @@ def directions(fit: Fit, records: Sequence[Record], moved: Sequence[Change]) -> 
 
 
 def starts_of(effect: Effect) -> list[Floats]:
-    """List the parameters that an effect is tried with: its size at every start, its shape with the first of them."""
+    """List the parameters that an effect is tried with: its size at every start, its shape with the first of them.
+
+    Late ones stay at their null.
+    """
     size = effect.parameters[0]
     first = size.starts[0]
     starts = []
     for i, parameter in enumerate(effect.parameters):
-        for value in parameter.starts:
+        for value in () if parameter.late else parameter.starts:
             own = effect.null
             own[0], own[i] = first, value
             starts.append(own)

@@ -39,6 +39,8 @@ TESTS = {
     "residual against velocity": "a curve against the velocity",
     "residual against command": "a curve against the command of late",
     "residual against time": "a slow course over time",
+    "torque against angle": "a torque that depends on the angle",
+    "torque against velocity": "a torque that depends on the velocity",
     "autocorrelation": "each frame resembling those before it",
 }
 
