@@ -31,6 +31,7 @@ def test_the_hidden_effect_is_named_and_its_size_found(true, effect_id, name, va
     result = verdict_as_dict(close_records(session(true, 11), held_out=HELD_OUT))
     assert result["verdict"] == "attributed"
     assert [e["id"] for e in result["effects"]] == [effect_id]
+    assert list(result["effects"][0]["parameters"]) == [name]  # what friction can have beside its size is not asked for
     found = result["effects"][0]["parameters"][name]
     assert abs(found["value"] - value) < 3.0 * found["sigma"]
     assert result["rmse_deg"]["after"]["held_out"] == pytest.approx(0.05, rel=0.15)

@@ -1,0 +1,63 @@
+"""Curves of torque over angle and speed: they hold what any such torque leaves, in the ledger or not."""
+
+import math
+
+import numpy as np
+import pytest
+
+from anglecam.effects import effect
+from anglecam.estimate.output_error import fit_output_error
+from anglecam.loop.attribute import fit_with
+from anglecam.loop.gate import test_residual as _test_residual  # pytest would take it for a test of its own
+from anglecam.loop.holdout import split_records
+from anglecam.loop.screen import changes, directions, forecasts
+from anglecam.loop.torques import torque_responses
+from anglecam.simulate.plant import Plant
+from benchmarks.blind.sessions import HELD_OUT, session
+
+
+@pytest.mark.parametrize(
+    ("column", "effect_id", "size"),
+    [("angle", "stiffening_spring", 60.0), ("velocity", "damping_asymmetry", 0.3), ("velocity", "quadratic_drag", 0.3)],
+)
+def test_what_a_torque_over_angle_or_speed_changes_lies_within_their_curves(column, effect_id, size):
+    records = session({}, seed=5)
+    fit = fit_output_error(Plant(), records, [np.array([26.0, 524.0, 508.0])])
+    richer = Plant((effect(effect_id),))
+    paths = []
+    for value in (size, 0.0):
+        parameters = np.append(fit.parameters, value)
+        paths.append(
+            [richer.predict(parameters, r.time, r.command, own[:2]) for r, own in zip(records, fit.own, strict=True)]
+        )
+    change = np.concatenate(paths[0]) - np.concatenate(paths[1])
+    left = {}
+    for name, basis in torque_responses(fit, records).items():
+        inside, *_ = np.linalg.lstsq(basis, change, rcond=None)
+        left[name] = np.linalg.norm(change - basis @ inside) / np.linalg.norm(change)
+    assert left[column] < 0.15
+    assert left[column] < 0.3 * max(left.values())
+
+
+def test_stribecks_curve_is_found_with_all_its_numbers():
+    friction = {"torque": 4.0, "breakaway": 10.0, "stribeck_deg_per_s": 3.0}
+    records = session({"coulomb_friction": friction}, seed=1, sigma_deg=0.005)
+    base = fit_output_error(Plant(), records, [np.array([26.0, 524.0, 508.0])])
+    (forecast,) = forecasts(base, directions(base, records, changes(base, records, [effect("coulomb_friction")])))
+    fit = fit_with(base, records, forecast)
+    assert np.degrees(fit.rmse) < 1.05 * 0.005
+    true = [math.degrees(4.0), 0.0, math.degrees(6.0), 3.0]
+    assert fit.model.names[3:] == tuple(p.name for p in effect("coulomb_friction").parameters)
+    assert np.all(np.abs(np.degrees(fit.parameters[3:]) - true) < 3.0 * np.degrees(fit.sigma[3:]))
+    assert np.degrees(fit.parameters[-1]) == pytest.approx(3.0, rel=0.05)
+
+
+def test_the_gate_sees_a_slack_spring_behind_the_gravity_that_comes_nearest_to_it():
+    slack = {"slack_spring": {"stiffness": 9.1, "slack_deg": -0.27}}
+    fitted, _ = split_records(session(slack, seed=1), HELD_OUT)
+    near = np.array([26.1, 622.9, 435.6, math.radians(4625.0), math.radians(40.6)])
+    fit = fit_output_error(Plant((effect("gravity_geometry"),)), fitted, [near])
+    assert np.degrees(fit.rmse) < 1.05 * 0.05
+    gate = _test_residual(fit, fitted, [], np.random.default_rng(0))
+    assert gate.p_value < 0.01
+    assert min(gate.tests, key=lambda test: test.p_value).name == "torque against angle"
