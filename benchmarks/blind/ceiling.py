@@ -1,0 +1,85 @@
+"""How often any method at all could name the right effect: the distance from what acts to what comes nearest to it.
+
+    .venv/bin/python -m benchmarks.blind.ceiling [--seeds 5] [--cases NAME,NAME…]
+
+A session of `benchmarks.blind.attribution` is made without noise, and every other effect of the ledger is fitted to it.
+What the best of them leaves is the distance d from one to the other, in standard deviations of the noise over all
+frames that are fitted. Told which two it has to choose between, the best decision there is, by the larger likelihood, is right
+with probability Φ(d/2) (Neyman, Pearson, Phil. Trans. R. Soc. A 231, 1933). Whoever must choose among all is right less
+often; a loop that is right about as often as this has lost nothing.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections import defaultdict
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+from scipy.stats import norm
+
+from anglecam.estimate.output_error import fit_output_error
+from anglecam.loop.attribute import fit_with, promising
+from anglecam.loop.holdout import split_records
+from anglecam.loop.rounds import applicable
+from anglecam.loop.screen import changes, directions, forecasts
+from anglecam.simulate.plant import Plant
+from benchmarks.blind.attribution import CASES, SIGMA_DEG
+from benchmarks.blind.drawn import draw
+from benchmarks.blind.sessions import HELD_OUT, scaled, session, spec_of
+
+
+def nearest(name: str, seed: int) -> tuple[str, float]:
+    """Return which other effect comes nearest to the one that acts in a case, and d."""
+    case = CASES[name]
+    (acting,) = case.effects
+    effects = scaled(draw(acting, seed), seed, case.ratio, sigma_deg=SIGMA_DEG)
+    records = session(effects, seed=seed, sigma_deg=0.0)
+    fitted, _ = split_records(records, HELD_OUT)
+    plant = spec_of(effects, seed=seed).plant
+    base = fit_output_error(Plant(), fitted, [np.array([plant.a, plant.b, plant.c])])
+    others = [e for e in applicable(records) if e.id != acting]
+    tried = promising(forecasts(base, directions(base, fitted, changes(base, fitted, others))))
+    fits = {one.effect.id: fit_with(base, fitted, one) for one in tried}
+    rival = min(fits, key=lambda effect_id: fits[effect_id].cost)
+    return rival, float(np.sqrt(fits[rival].cost) / np.radians(SIGMA_DEG))
+
+
+def main(
+    seeds: Annotated[int, typer.Option(help="Sessions a case, from seed 0 on.")] = 5,
+    cases: Annotated[str, typer.Option(help="Names of cases of one effect; all without.")] = "",
+) -> None:
+    """Measure the distances and print what they allow."""
+    names = cases.split(",") if cases else [name for name, case in CASES.items() if case.group.startswith("one effect")]
+    found: dict[str, list[tuple[str, float]]] = defaultdict(list)
+    console = Console(width=None if Console().is_terminal else 120)
+    for seed in track(range(seeds), console=console):
+        for name in names:
+            try:
+                found[name].append(nearest(name, seed))
+            except ValueError as error:  # no size of the effect does it
+                console.print(f"{name}, seed {seed}: {error}")
+    table = Table("case", "nearest", "d, median", "d, least", "right first at best", title="What noise allows")
+    for name, pairs in found.items():
+        d = [one for _, one in pairs]
+        table.add_row(
+            name,
+            ", ".join(dict.fromkeys(rival for rival, _ in pairs)),
+            f"{statistics.median(d):.1f}",
+            f"{min(d):.1f}",
+            f"{100 * statistics.mean(norm.cdf(one / 2) for one in d):.0f} %",
+        )
+    console.print(table)
+    whole: dict[str, list[float]] = defaultdict(list)
+    for name, pairs in found.items():
+        whole[CASES[name].group] += [float(norm.cdf(one / 2)) for _, one in pairs]
+    for group, shares in whole.items():
+        console.print(f"{group}: {100 * statistics.mean(shares):.0f} % of {len(shares)} sessions")
+
+
+if __name__ == "__main__":
+    typer.run(main)
