@@ -4,9 +4,9 @@
 
 A session of `benchmarks.blind.attribution` is made without noise, and every other effect of the ledger is fitted to it.
 What the best of them leaves is the distance d from one to the other, in standard deviations of the noise over all
-frames that are fitted. Told which two it has to choose between, the best decision there is, by the larger likelihood, is right
-with probability Φ(d/2) (Neyman, Pearson, Phil. Trans. R. Soc. A 231, 1933). Whoever must choose among all is right less
-often; a loop that is right about as often as this has lost nothing.
+frames that are fitted. Told which two it has to choose between, the best decision there is, by the larger likelihood,
+is right with probability Φ(d/2) (Neyman, Pearson, Phil. Trans. R. Soc. A 231, 1933). Whoever must choose among all is
+right less often; a loop that is right about as often as this has lost nothing.
 """
 
 from __future__ import annotations
