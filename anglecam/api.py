@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from anglecam.errors import InputError
-from anglecam.identify import Estimator, Identified, declared_start, identify_records
+from anglecam.identification import Estimator, Identified, declared_start, identify_records
 from anglecam.loop.close import Verdict, close_records
 from anglecam.recordings import Measured, measure_recording, measure_session, shown_to_loop
 from anglecam.rig import Rig
@@ -48,7 +48,7 @@ def identify(session: str | Path, estimator: Estimator = "oe2") -> Identified:
     session : path
         A folder of clips or angle series, with commands or without.
     estimator : {'ekf', 'oe2', 'oe3'}
-        See `anglecam.identify.identify_records`.
+        See `anglecam.identification.identify_records`.
 
     Returns
     -------

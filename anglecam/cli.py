@@ -23,9 +23,9 @@ from anglecam.calibration import write_calibration
 from anglecam.clip_results import write_measurement
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.exchange import Also, write_also
-from anglecam.identify import ESTIMATORS, Estimator
+from anglecam.identification import ESTIMATORS, Estimator
 from anglecam.marks.angle import MeasuredTracks
-from anglecam.measure import Measurement
+from anglecam.measurement import Measurement
 from anglecam.neck.file import read_neck
 from anglecam.neck_cli import app as neck
 from anglecam.recordings import Measured, measure_recording, measure_session, shown_to_loop

@@ -8,7 +8,7 @@ import numpy as np
 
 from anglecam.files import write_json
 from anglecam.marks.angle import MeasuredTracks
-from anglecam.measure import Measurement
+from anglecam.measurement import Measurement
 from anglecam.report.figures import plot_series
 from anglecam.response import Response, responses, responses_as_dicts
 from anglecam.series import write_series

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.angles import Angles
-from anglecam.measure import Measurement
+from anglecam.measurement import Measurement
 from anglecam.registration import Registered
 from anglecam.rig import Rig
 from anglecam.series import OK

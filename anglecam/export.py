@@ -19,7 +19,7 @@ from scipy import io, signal
 
 from anglecam.errors import InputError
 from anglecam.files import read_json
-from anglecam.identify import Identified
+from anglecam.identification import Identified
 from anglecam.neck.large_angle import linearise
 from anglecam.simulate.large_angle import QUANTITIES, LargeAngle
 
@@ -66,7 +66,7 @@ class FittedModel:
 
 
 def fitted_model(model: Identified) -> FittedModel:
-    """Take the model that `anglecam.identify.identify_records` found.
+    """Take the model that `anglecam.identification.identify_records` found.
 
     Parameters
     ----------

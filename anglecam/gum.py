@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special
 
 Floats = NDArray[np.float64]
 Distribution = Literal["normal", "uniform"]
@@ -152,7 +152,7 @@ def combine(terms: Sequence[Term]) -> Combined:
 def coverage_factor(dof: float) -> float:
     """Return k for 95 %: Student's t, 1.960 where the degrees of freedom are infinite."""
     upper = (1.0 + COVERAGE) / 2.0
-    return float(stats.norm.ppf(upper) if math.isinf(dof) else stats.t.ppf(upper, dof))
+    return float(special.ndtri(upper) if math.isinf(dof) else special.stdtrit(dof, upper))
 
 
 def widening(rng: np.random.Generator, dof: float, trials: int) -> Floats:

@@ -10,7 +10,7 @@ from anglecam.errors import InputError, blame
 from anglecam.estimate.record import Record, record_from_series
 from anglecam.marks.angle import MeasuredTracks, measure_tracks
 from anglecam.marks.files import TRACKS_ENDINGS
-from anglecam.measure import Measurement, measure_clip
+from anglecam.measurement import Measurement, measure_clip
 from anglecam.rig import Rig
 from anglecam.series import AngleSeries, read_series, write_series
 from anglecam.session import SERIES_ENDING, Command, Recording, Session

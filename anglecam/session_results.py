@@ -9,7 +9,7 @@ from pathlib import Path
 from anglecam.errors import RigError
 from anglecam.export import fitted_model, transfer_as_dict, write_mat
 from anglecam.files import write_json
-from anglecam.identify import Estimator, Identified, declared_start, identify_records
+from anglecam.identification import Estimator, Identified, declared_start, identify_records
 from anglecam.loop.close import Verdict, close_records
 from anglecam.loop.correct import corrected
 from anglecam.loop.experiment import Experiment
@@ -48,7 +48,7 @@ def identify_session(
     out : Path
         Folder for the files.
     estimator : {'ekf', 'oe2', 'oe3', 'neck'}
-        See `anglecam.identify.identify_records`.
+        See `anglecam.identification.identify_records`.
     neck : LargeAngleNeck, optional
         What is known of the neck, for ``neck``.
 

@@ -41,7 +41,7 @@ SINGLE = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL"
 BARE = """
 import sys, cv2
 from pathlib import Path
-from anglecam.measure import measure_clip
+from anglecam.measurement import measure_clip
 from anglecam.clip_results import write_measurement
 from anglecam.session import rig_beside
 cv2.setNumThreads(1)

@@ -34,7 +34,7 @@ from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.record import Record
 from anglecam.estimate.roots import poles_and_zeros
 from anglecam.estimate.smoothing import smooth
-from anglecam.identify import identify_records
+from anglecam.identification import identify_records
 from anglecam.rig import Rig
 from anglecam.session import Command
 from anglecam.simulate.plant import Plant

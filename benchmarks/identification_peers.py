@@ -39,7 +39,7 @@ from scipy.linalg import logm
 import anglecam
 from anglecam.estimate.ekf import fit_ekf, settings_for
 from anglecam.estimate.record import Record
-from anglecam.identify import identify_records
+from anglecam.identification import identify_records
 from anglecam.rig import Rig
 from anglecam.session import Command
 from support.transfer import SYS2_DENOMINATOR, SYS2_NUMERATOR, respond

@@ -22,7 +22,7 @@ import numpy as np
 import yaml
 
 from anglecam.calibration import Calibration, write_calibration
-from anglecam.measure import measure_clip
+from anglecam.measurement import measure_clip
 from anglecam.rig import read_rig
 from anglecam.session import read_command
 from anglecam.video.frames import read_frames

@@ -28,7 +28,7 @@ from typing import Any
 import av
 import yaml
 
-from anglecam.measure import measure_clip
+from anglecam.measurement import measure_clip
 from anglecam.rig import Rig
 from anglecam.video.frames import read_frames
 from synth.render import workers

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from anglecam.error_sources import error_sources
-from anglecam.measure import measure_clip
+from anglecam.measurement import measure_clip
 from anglecam.registration import Registered, register_clip
 from anglecam.rig import read_rig
 from anglecam.session import read_command
@@ -55,7 +55,7 @@ def test_a_measured_clips_terms_join_to_its_sigma(clip, registered, monkeypatch,
         "always": registered,
         "now and then": lambda *arguments: _now_and_then(registered(*arguments)),
     }
-    monkeypatch.setattr(import_module("anglecam.measure"), "register_clip", readings[head])
+    monkeypatch.setattr(import_module("anglecam.measurement"), "register_clip", readings[head])
     if neutral == "declared":
         rig = rig.model_copy(update={"neutral": -12.0})
     measured = measure_clip(path, rig, command if neutral == "rest" else None)

@@ -23,7 +23,7 @@ from anglecam.export import (
     write_mat,
 )
 from anglecam.files import write_json
-from anglecam.identify import identify_records
+from anglecam.identification import identify_records
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.rig import Rig
 from anglecam.series import AngleSeries, write_series

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from anglecam.calibration import Calibration, write_calibration
-from anglecam.measure import Measurement, measure_clip
+from anglecam.measurement import Measurement, measure_clip
 from anglecam.rig import read_rig
 from anglecam.session import read_command
 from synth.motion import move

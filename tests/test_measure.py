@@ -10,7 +10,7 @@ import pytest
 
 from anglecam.budget import angle_sigma, place_errors, worst_case, worst_case_both_ends
 from anglecam.errors import InputError
-from anglecam.measure import measure_clip
+from anglecam.measurement import measure_clip
 from anglecam.rig import Mouth, Pivot, Rig, read_rig
 from anglecam.session import Command, read_command
 from support import broken

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anglecam.measure import measure_clip
+from anglecam.measurement import measure_clip
 from anglecam.rig import Mouth, Pivot, Rig
 
 FOLDER = Path(__file__).parents[2] / "shared" / "real" / "pendulum-red-ball"

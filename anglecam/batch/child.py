@@ -23,7 +23,7 @@ from anglecam.batch.kept import keep_series, read_kept
 from anglecam.batch.row import cannot_write
 from anglecam.clip_results import write_measurement
 from anglecam.errors import AnglecamError, InputError, RigError, blame
-from anglecam.measure import Measurement, measure_clip
+from anglecam.measurement import Measurement, measure_clip
 from anglecam.recordings import gather_session, measure_recording, shown_to_loop
 from anglecam.rig import read_rig
 from anglecam.series import AngleSeries

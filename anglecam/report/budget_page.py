@@ -17,7 +17,7 @@ from anglecam.clip_budget import PAPER, Budget, FrameBudget, budget_as_dict, bud
 from anglecam.error_sources import error_sources
 from anglecam.files import write_atomically, write_json
 from anglecam.gum import Propagated
-from anglecam.measure import Measurement
+from anglecam.measurement import Measurement
 from anglecam.report.figure8 import Scene, figure8
 from anglecam.report.figures import AFTER, BEFORE, FAINT, MEASURED, STYLE, _svg
 from anglecam.rig import Rig

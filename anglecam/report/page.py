@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from anglecam import __version__
 from anglecam.effects import effect
 from anglecam.files import write_atomically
-from anglecam.identify import Identified
+from anglecam.identification import Identified
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.gate import Test

@@ -8,12 +8,12 @@ import numpy as np
 from rich.table import Table
 
 from anglecam.errors import printable
-from anglecam.identify import Identified
+from anglecam.identification import Identified
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.result import NEXT_COMMAND, describe, sentence
 from anglecam.marks.angle import MeasuredTracks
-from anglecam.measure import Measurement
+from anglecam.measurement import Measurement
 from anglecam.response import Figure, Response
 
 

@@ -3,7 +3,7 @@
     PYTHONPATH=.:tests .venv/bin/python -m benchmarks.fuzz.clips [2000] [--seed 1] [--first 0] [--keep build/fuzz]
 
 A head nods for ten frames of 160 × 120 px; it is filmed as FFV1 in Matroska, MJPEG in AVI, H.264 in MP4 and MJPEG in
-MOV, and each film is damaged in ways that follow from seed and number alone. `anglecam.measure.measure_clip` reads what
+MOV, and each film is damaged in ways that follow from seed and number alone. `measure_clip` reads what
 is left of it, in a process of its own with limits on time and memory.
 """
 
@@ -203,7 +203,7 @@ def _parts(ending: str, film: bytes) -> list[tuple[int, int]]:
 
 def readers() -> dict[str, Reader]:
     """Return the one reader of clips."""
-    from anglecam.measure import measure_clip
+    from anglecam.measurement import measure_clip
     from anglecam.rig import Rig
 
     cv2.setNumThreads(1)

@@ -10,7 +10,7 @@ import pytest
 from anglecam.errors import RigError
 from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error
 from anglecam.estimate.start import start_parameters
-from anglecam.identify import identify_records
+from anglecam.identification import identify_records
 from anglecam.neck.parameters import PAPER
 from anglecam.rig import Rig
 from anglecam.simulate.large_angle import LargeAngle

@@ -7,7 +7,7 @@ import pytest
 
 from anglecam.estimate.output_error import fit_output_error, predict_output_error
 from anglecam.estimate.start import start_parameters
-from anglecam.identify import identify_records
+from anglecam.identification import identify_records
 from anglecam.rig import Rig
 from anglecam.simulate.plant import Plant
 from support.motion import Plant as TruePlant

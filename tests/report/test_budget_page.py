@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from anglecam.measure import measure_clip
+from anglecam.measurement import measure_clip
 from anglecam.report.budget_page import budget_table, write_budget
 from anglecam.report.figure8 import touching_point
 from anglecam.rig import read_rig

@@ -10,7 +10,7 @@ import pytest
 
 from anglecam.effects import effect
 from anglecam.estimate.output_error import fit_output_error
-from anglecam.identify import identify_records
+from anglecam.identification import identify_records
 from anglecam.loop.close import Accepted, close_records
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.result import next_experiment, sentence, split_unit, verdict_as_dict, write_next_command

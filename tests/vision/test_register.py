@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import yaml
 
-from anglecam.measure import measure_clip
+from anglecam.measurement import measure_clip
 from anglecam.rig import Rig
 from synth.session import render
 
