@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import io, signal
+from scipy import io
 
 from anglecam.errors import InputError
 from anglecam.files import read_json
@@ -25,6 +25,7 @@ from anglecam.simulate.large_angle import QUANTITIES, LargeAngle
 
 if TYPE_CHECKING:
     import control
+    from scipy import signal
 
 Floats = NDArray[np.float64]
 
@@ -170,6 +171,8 @@ def transfer_function(model: FittedModel) -> control.TransferFunction:
 
 def scipy_system(model: FittedModel) -> signal.TransferFunction:
     """Return a model as scipy.signal has it; raises `ValueError` where nothing was commanded."""
+    from scipy import signal
+
     return signal.TransferFunction(*_driven(model))
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import RigError
-from anglecam.estimate.ekf import fit_ekf, settings_for
 from anglecam.estimate.noise import autoregression, noise_floor
 from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error
 from anglecam.estimate.record import Record
@@ -168,6 +167,8 @@ def declared_start(rig: Rig) -> Floats:
 
 
 def _by_filter(fit: Fit, records: Sequence[Record], start: Floats) -> tuple[Fit, Floats, Floats]:
+    from anglecam.estimate.ekf import fit_ekf, settings_for  # filterpy takes a second to load, which others are spared
+
     noise = noise_floor(records)
     sigma = max(noise.sigma if noise else 0.0, fit.rmse)
     initial = start if len(start) == 3 else np.append(start, 0.0)

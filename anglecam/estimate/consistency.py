@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy import special
 
 from anglecam.estimate.ekf import EkfEstimate
 
@@ -54,7 +54,7 @@ def consistency(total: float, degrees_of_freedom: int) -> Consistency:
     Consistency
         Everything per degree of freedom.
     """
-    lower, upper = chi2.ppf([0.025, 0.975], degrees_of_freedom) / degrees_of_freedom
+    lower, upper = special.chdtri(degrees_of_freedom, [0.975, 0.025]) / degrees_of_freedom
     return Consistency(total / degrees_of_freedom, float(lower), float(upper), degrees_of_freedom)
 
 
@@ -131,4 +131,4 @@ def innovation_whiteness(normalised: Sequence[Floats], *, lags: int = 12) -> Whi
         [sum(float(part[lag:] @ part[:-lag]) for part in normalised) / energy for lag in range(1, lags + 1)]
     )
     statistic = float(count * (count + 2) * np.sum(correlation**2 / (count - np.arange(1, lags + 1))))
-    return Whiteness(statistic, lags, float(chi2.sf(statistic, lags)), correlation)
+    return Whiteness(statistic, lags, float(special.chdtrc(lags, statistic)), correlation)

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
+from scipy import special
 
 from anglecam.effects import Effect
 from anglecam.estimate.output_error import Fit, fit_output_error
@@ -146,7 +146,7 @@ def _with_late(plant: Plant, effect: Effect, fit: Fit, records: Sequence[Record]
         richer = plant.with_effect(replace(effect, parameters=effect.parameters[:count]))
         starts = [np.append(fit.parameters, value) for value in effect.parameters[count - 1].starts]
         fit, spent = fit_output_error(richer, records, starts, own=fit.own, phi=fit.phi), spent + 1
-        if 2.0 * log_likelihood_gain(best.cost, fit.cost, len(fit.white)) > chi2.isf(ASKED_FOR, spent):
+        if 2.0 * log_likelihood_gain(best.cost, fit.cost, len(fit.white)) > special.chdtri(spent, ASKED_FOR):
             best, spent = fit, 0
     return best
 
@@ -179,7 +179,7 @@ def rivals(
         Id of each that stays → the same plant with it in place of ``effect``.
     """
     fits = side_by_side(lambda other: fit_with(base, records, other), others)
-    widest = 0.5 * norm.isf(ALIAS_LEVEL) ** 2
+    widest = 0.5 * special.ndtri(ALIAS_LEVEL) ** 2
     gaps = [log_likelihood_gain(fit.cost, best.cost, len(best.white)) for fit in fits]
     return {
         other.effect.id: fit

@@ -17,7 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import beta, chi2, norm
+from scipy import special
 
 from anglecam.estimate.output_error import Fit, whiten
 from anglecam.estimate.record import Record
@@ -90,13 +90,13 @@ def test_residual(fit: Fit, records: Sequence[Record], ways: Sequence[Direction]
     for name, basis in shapes.items():
         left = basis - absorbed @ (absorbed.T @ basis)
         p_each[name], gains[name] = _p_of_space(left, basis, both, energy, free)
-    p_each["autocorrelation"], gains["autocorrelation"] = chi2.sf(_portmanteau(both, energy, records), LAGS), 0.0
+    p_each["autocorrelation"], gains["autocorrelation"] = special.chdtrc(LAGS, _portmanteau(both, energy, records)), 0.0
 
     # under the null the data are one more draw: the smallest of its p-values is ranked among all draws'
     smallest = np.min(list(p_each.values()), axis=0)
     p_value = np.mean(smallest <= smallest[0])
     critical = float(np.quantile(smallest[1:], LEVEL))
-    needed = float((norm.isf(critical) + norm.isf(0.05)) * np.sqrt(fit.cost / free))
+    needed = float(-(special.ndtri(critical) + special.ndtri(0.05)) * np.sqrt(fit.cost / free))
     tests = tuple(Test(name, float(p[0]), gains[name]) for name, p in p_each.items())
     return Gate(float(p_value), tests, _detectable(ways, needed))
 
@@ -112,7 +112,7 @@ def _p_of_effects(
         return {}, {}
     along = np.stack([way.change / way.size for way in ways]) @ residuals
     share = np.minimum(along**2 / energy, 1.0)
-    p = beta.sf(share, 0.5, 0.5 * (free - 1))
+    p = special.betaincc(0.5, 0.5 * (free - 1), share)
     gain = np.array([_gain(s, 1, free) for s in share[:, 0]])
     for i, way in enumerate(ways):
         if way.one_sided:
@@ -179,7 +179,7 @@ def _p_of_space(left: Floats, basis: Floats, residuals: Floats, energy: Floats, 
     if k == 0:
         return np.ones(residuals.shape[1]), 0.0
     share = np.minimum(np.sum((u.T @ residuals) ** 2, axis=0) / energy, 1.0)
-    return beta.sf(share, 0.5 * k, 0.5 * (free - k)), _gain(share[0], k, free)
+    return special.betaincc(0.5 * k, 0.5 * (free - k), share), _gain(share[0], k, free)
 
 
 def _portmanteau(residuals: Floats, energy: Floats, records: Sequence[Record]) -> Floats:

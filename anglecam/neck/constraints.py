@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.stats import qmc
 
 Floats = NDArray[np.float64]
 
@@ -110,6 +109,8 @@ def least(evaluate: Evaluate, lower: Floats, upper: Floats, starts: Sequence[Flo
     Optimum
         Of the starts that end with every constraint met the cheapest; where none does, the nearest miss.
     """
+    from scipy.stats import qmc  # takes most of a second to load, which who asks for nothing of a wish is spared
+
     problem = _Problem(evaluate, lower, upper)
     drawn = qmc.scale(qmc.Sobol(len(lower), rng=seed).random(_DRAWN_STARTS), lower, upper)
     begins = [np.clip(s, lower, upper) for s in starts] + list(drawn)

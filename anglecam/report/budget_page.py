@@ -10,7 +10,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from rich.table import Table
-from scipy import stats
 
 from anglecam import __version__
 from anglecam.clip_budget import PAPER, Budget, FrameBudget, budget_as_dict, budget_of, implied_lever, pixel_bound
@@ -245,6 +244,8 @@ def _drawn_figure(budget: Budget) -> str:
 
 
 def _draw_density(ax: Any, one: FrameBudget, drawn: Propagated) -> None:
+    from scipy import stats  # takes most of a second to load, which other pages are spared
+
     c = one.combined
     ax.stairs(drawn.density, drawn.edges - one.angle_deg, fill=True, color=FAINT, label="drawn")
     x = np.linspace(drawn.edges[0], drawn.edges[-1], 400) - one.angle_deg

@@ -14,9 +14,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyBboxPatch
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from anglecam.effects import Effect, Knots
+from anglecam.effects import effect as entry
 from anglecam.estimate.output_error import Fit
 from anglecam.estimate.record import Record
 from anglecam.loop.close import Verdict
@@ -97,7 +97,8 @@ def curve_of(effect: Effect, fit: Fit, records: Sequence[Record]) -> Curve:
     Curve
         In degrees, seconds and milliseconds.
     """
-    own = np.array([fit.parameters[fit.model.names.index(p.name)] for p in effect.parameters])
+    own = entry(effect.id).null  # late parameters that the data did not ask for stay at it
+    own[: len(effect.parameters)] = [fit.parameters[fit.model.names.index(p.name)] for p in effect.parameters]
     if effect.port in ("command", "lag"):
         return _command_curve(effect, own, records)
     angles = [r.angle - e for r, e in zip(records, fit.residuals, strict=True)]
@@ -158,6 +159,8 @@ def _arriving(effect: Effect, own: Floats, command: Command, time: Floats) -> Fl
     """Return the command that arrives, every `TICK`."""
     asked = command.at(time)
     if effect.lag is not None:
+        from scipy.signal import lfilter  # takes most of a second to load, which other figures are spared
+
         kept = float(np.exp(-TICK / max(effect.lag(own), 1e-9)))
         return asked[0] + lfilter([0.0, 1.0 - kept], [1.0, -kept], asked - asked[0])  # from rest at the first level
     if effect.command is None:

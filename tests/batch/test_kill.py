@@ -104,7 +104,7 @@ def test_a_second_batch_on_the_same_folder_is_told_so_and_a_killed_one_is_in_nob
 
 def test_interrupted_it_ends_at_once_and_nothing_in_flight_counts_as_failed(lab, unbroken, tmp_path):
     out = tmp_path / "out"
-    batch = start(lab, "--out", out, "--jobs", 2, "--quiet")
+    batch = start(lab, "--out", out, "--jobs", 1, "--quiet")
     wait_until(lambda: list(out.glob("*/*.angles.csv")))
     batch.send_signal(signal.SIGINT)
     _, told = batch.communicate(timeout=30)

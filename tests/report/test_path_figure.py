@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,8 +21,9 @@ def records():
 
 
 def _curve(records, effect_id, *own):
-    """Return the curve of an effect in a plant that leaves nothing over."""
-    plant = Plant().with_effect(effect(effect_id))
+    """Return the curve of an effect, with as many of its parameters as given, in a plant that leaves nothing over."""
+    entry = effect(effect_id)
+    plant = Plant().with_effect(replace(entry, parameters=entry.parameters[: len(own)]))
     fit = SimpleNamespace(
         model=plant,
         parameters=np.array([26.0, 524.0, 508.0, *own]),
@@ -44,9 +46,11 @@ def test_a_dead_time_is_drawn_as_long_as_it_is_and_large_enough_to_see(records, 
 
 
 def test_friction_is_drawn_against_motion(records):
-    curve = _curve(records, "coulomb_friction", np.radians(100.0), 0.0, 0.0)
+    curve = _curve(records, "coulomb_friction", np.radians(100.0))
     assert np.all(curve.y[curve.x > 1.0] == pytest.approx(-100.0))
     assert np.all(curve.y[curve.x < -1.0] == pytest.approx(100.0))
+    stribeck = _curve(records, "coulomb_friction", *np.radians([100.0, 0.0, 50.0, 1.0]))
+    assert stribeck.y == pytest.approx(-np.sign(stribeck.x) * (100.0 + 50.0 * np.exp(-(stribeck.x**2))), abs=1e-6)
 
 
 def test_drag_is_drawn_over_velocity_and_a_spring_over_angle(records):
