@@ -5,6 +5,7 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.ready
 LIBRARIES := libegl1 libgl1 libgl1-mesa-dri
 DEMO := build/demo
+SMALL := tests/blind/0029/spec.yaml
 
 .DEFAULT_GOAL := help
 .PHONY: help setup system demo test check lock clean
@@ -35,6 +36,10 @@ $(STAMP): pyproject.toml requirements/build.lock requirements/anglecam.lock
 	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes -r requirements/build.lock
 	$(BIN)/python -m pip install -q --disable-pip-version-check --require-hashes --no-build-isolation -r requirements/anglecam.lock
 	$(BIN)/python -m pip install -q --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@echo "setup: compiling the numerical kernels, once, on a small session; this takes another minute"
+	@first=$$(mktemp -d); trap 'rm -rf '$$first EXIT; \
+	{ $(BIN)/synth render $(SMALL) --out $$first/session --truth $$first/truth && \
+	  $(BIN)/anglecam close $$first/session --out $$first/result; } > $$first/log 2>&1 || { cat $$first/log; exit 1; }
 	@touch $@
 
 demo: setup ## render a rig with a hidden effect, measure it, find the effect, write the report

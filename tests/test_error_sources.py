@@ -46,8 +46,10 @@ def _now_and_then(found: Registered) -> Registered:
     return replace(found, turn=turn, noise=noise, pose=pose, pull=pull)
 
 
-@pytest.mark.parametrize("neutral", ["rest", "median", "declared"])
-@pytest.mark.parametrize("head", ["never", "always", "now and then"])
+@pytest.mark.parametrize(
+    ("head", "neutral"),
+    [("never", "rest"), ("never", "declared"), ("always", "rest"), ("always", "median"), ("now and then", "declared")],
+)
 def test_a_measured_clips_terms_join_to_its_sigma(clip, registered, monkeypatch, head, neutral):
     path, rig, command = clip
     readings = {
