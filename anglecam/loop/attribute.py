@@ -30,8 +30,8 @@ HOPEFUL = 0.2
 """Share of the best forecast below which an effect is not fitted, and of the best fit below which it is not tried on
 what was not fitted."""
 FULFILLED = 0.7
-"""Share of its forecast that a fit must reach, or else it begins again from the effect's own start; and if it then
-reaches less than `HOPEFUL`, from half and twice the forecast's."""
+"""Share of its forecast that a fit must reach, or else it begins again from where the screen tried the effect and from
+the effect's own start; and if it then reaches less than `HOPEFUL`, from half and twice the forecast's."""
 ASKED_FOR = 0.01
 """Late parameters of an effect are left out unless without them so good a fit of them would be this improbable."""
 ALIAS_LEVEL = 0.05
@@ -114,7 +114,6 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
     if not isinstance(base.model, Plant):
         raise TypeError("only a Plant takes effects")
     plant, effect = base.model, forecast.effect
-
     early = [p for p in effect.parameters if not p.late]
 
     def fit_from(start: NDArray[np.float64]) -> Fit:
@@ -125,14 +124,15 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
     first = effect.null
     first[0] = effect.parameters[0].starts[0]
     near = [effect.null + share * (forecast.start - effect.null) for share in (0.5, 2.0)]
-    enough = [FULFILLED if len(early) == 1 else math.inf, HOPEFUL, HOPEFUL, HOPEFUL]
-    best = base
-    # several parameters may have several valleys, and dry friction has them beside whatever has a kink
-    for start, share in zip([forecast.start, first, *near], enough, strict=True):
-        fit = fit_from(start)
-        best = fit if best is base or fit.cost < best.cost else best
+    enough = FULFILLED if len(early) == 1 else math.inf
+    best = fit_from(forecast.start)
+    # several parameters may have several valleys, and dry friction has them beside whatever has a kink; and what a
+    # limit does is not in proportion: scaled down it may do nothing, where nothing tells which way to go
+    for start, share in ((forecast.tried, enough), (first, enough), (near[0], HOPEFUL), (near[1], HOPEFUL)):
         if log_likelihood_gain(base.cost, best.cost, len(base.white)) >= share * forecast.gain:
             break
+        fit = fit_from(start)
+        best = fit if fit.cost < best.cost else best
     return _with_late(plant, effect, best, records)
 
 

@@ -69,6 +69,8 @@ class Forecast:
     effect: Effect
     start: Floats
     """Its parameters, SI, scaled to what the residual asks for where they can be scaled."""
+    tried: Floats
+    """The same as they were tried."""
     gain: float
     """Log-likelihood that the fit would gain."""
 
@@ -201,4 +203,4 @@ def _forecast(way: Direction, left: Floats, energy: float) -> Forecast:
     gain = 0.5 * len(left) * math.log(energy / max(lowered, 1e-6 * energy)) if energy > 0.0 else 0.0
     scaled = way.start.copy()
     scaled[0] = wanted if wanted != null[0] else way.start[0]
-    return Forecast(way.effect, scaled, gain)
+    return Forecast(way.effect, scaled, way.start, gain)

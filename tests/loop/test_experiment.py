@@ -79,7 +79,7 @@ def fit_each(records: list[Record], ids: list[str], phi: float = 0.0) -> list[Fi
     def fit(name: str) -> Fit:
         own = effect(name).null
         own[0] = effect(name).parameters[0].starts[0]
-        return fit_with(base, records, Forecast(effect(name), own, 0.0))
+        return fit_with(base, records, Forecast(effect(name), own, own, 0.0))
 
     return [fit(name) for name in ids]
 
