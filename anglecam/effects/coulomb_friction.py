@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 from anglecam.effects.effect import Effect, Parameter
 
+SI_TO_FILE = math.degrees(1.0)
+
 
 @njit
 def _dry(parameters: NDArray) -> tuple[float, float, float, float]:
@@ -32,10 +34,18 @@ EFFECT = Effect(
     equation="θ̈ = c·u − a·θ̇ − b·θ − (F ± D)·sgn θ̇, F + B near rest; θ̇ = 0 while |c·u − b·θ| ≤ max(F + B, F ± D)",
     relaxes="Eq. (22): damping is viscous only",
     parameters=(
-        Parameter("friction_deg_per_s2", 0.0, 0.0, 500.0, (0.3, 3.0, 15.0), math.degrees(1.0)),
-        Parameter("asymmetry_deg_per_s2", 0.0, -250.0, 250.0, (0.0,), math.degrees(1.0), late=True),
-        Parameter("breakaway_excess_deg_per_s2", 0.0, 0.0, 500.0, (0.3, 3.0), math.degrees(1.0), late=True),
-        Parameter("stribeck_speed_deg_per_s", 0.0, 0.0, 10.0, (0.05, 0.3), math.degrees(1.0), late=True),
+        Parameter("friction_deg_per_s2", 0.0, 0.0, 500.0, (0.3, 3.0, 15.0), SI_TO_FILE),
+        Parameter("asymmetry_deg_per_s2", 0.0, -250.0, 250.0, (0.0,), SI_TO_FILE, late=True),
+        Parameter(
+            "breakaway_excess_deg_per_s2",
+            0.0,
+            0.0,
+            500.0,
+            (0.03, 0.1, 0.3, 0.6, 1.0, 1.7, 3.0, 5.0),
+            SI_TO_FILE,
+            late=True,
+        ),
+        Parameter("stribeck_speed_deg_per_s", 0.0, 0.0, 10.0, (0.01, 0.03, 0.1, 0.3, 1.0), SI_TO_FILE, late=True),
     ),
     aliases=("quadratic_drag", "backlash", "dead_zone"),
     separating_experiment="a slow triangle of small amplitude, on which dry friction shows as a constant lag in angle",

@@ -233,6 +233,16 @@ def predicted_angle(model: Model, parameters: Floats, record: Record, own: Float
     return zero + model.predict(parameters, record.time, record.command, own[: model.states], record.view)
 
 
+def output_error(
+    model: Model, parameters: Floats, records: Sequence[Record], own: Sequence[Floats], phi: float
+) -> float:
+    """Return the sum of squared whitened residuals, rad², of a model as it stands; not finite where it runs away."""
+    left = [
+        whiten(r, phi, r.angle - predicted_angle(model, parameters, r, o)) for r, o in zip(records, own, strict=True)
+    ]
+    return float(sum(one @ one for one in left))
+
+
 def _fit_once(
     model: Model, records: Sequence[Record], start: Floats, own: Sequence[Floats], phi: float, fixed: bool
 ) -> Fit:

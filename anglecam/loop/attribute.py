@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 from scipy import special
 
 from anglecam.effects import Effect
-from anglecam.estimate.output_error import Fit, fit_output_error
+from anglecam.estimate.output_error import Fit, fit_output_error, output_error
 from anglecam.estimate.record import Record
 from anglecam.loop.holdout import Prediction, predict_unseen
-from anglecam.loop.refit import effects_of
+from anglecam.loop.refit import effects_of, plant_of
 from anglecam.loop.screen import Forecast
-from anglecam.simulate.plant import Plant
 from anglecam.threads import native_threads
 
 T = TypeVar("T")
@@ -34,6 +33,8 @@ FULFILLED = 0.7
 the effect's own start; and if it then reaches less than `HOPEFUL`, from half and twice the forecast's."""
 ASKED_FOR = 0.01
 """Late parameters of an effect are left out unless without them so good a fit of them would be this improbable."""
+NEAREST = 2
+"""Starts of a late parameter that are fitted from, of those that come nearest."""
 ALIAS_LEVEL = 0.05
 
 
@@ -111,9 +112,7 @@ def fit_candidates(
 
 def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
     """Fit the plant of ``base`` with one more effect, from where the screen would start, or else the effect itself."""
-    if not isinstance(base.model, Plant):
-        raise TypeError("only a Plant takes effects")
-    plant, effect = base.model, forecast.effect
+    plant, effect = plant_of(base), forecast.effect
     early = [p for p in effect.parameters if not p.late]
 
     def fit_from(start: NDArray[np.float64]) -> Fit:
@@ -133,19 +132,24 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
             break
         fit = fit_from(start)
         best = fit if fit.cost < best.cost else best
-    return _with_late(plant, effect, best, records)
+    return _with_late(base, effect, best, records)
 
 
-def _with_late(plant: Plant, effect: Effect, fit: Fit, records: Sequence[Record]) -> Fit:
+def _with_late(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record]) -> Fit:
     """Let in the late parameters of a fit's last effect, one after another, as far as the data ask for them.
 
-    At once, they would stand in for the size; one alone may show nothing that it and the next do show.
+    At once, they would stand in for the size; one alone may show nothing that it and the next do show. When a head sets
+    off is all or nothing, so there are valleys everywhere: of many starts, each with the late parameters before it as
+    they are and without them, the fit begins from those that come nearest.
     """
-    best, spent = fit, 0
+    plant, best, spent = plant_of(base), fit, 0
+    first = len(base.parameters) + sum(not p.late for p in effect.parameters)
     for count in range(len(effects_of(fit)[-1].parameters) + 1, len(effect.parameters) + 1):
         richer = plant.with_effect(replace(effect, parameters=effect.parameters[:count]))
-        starts = [np.append(fit.parameters, value) for value in effect.parameters[count - 1].starts]
-        fit, spent = fit_output_error(richer, records, starts, own=fit.own, phi=fit.phi), spent + 1
+        bare = np.append(fit.parameters[:first], np.zeros(len(fit.parameters) - first))
+        values = [np.append(x, v) for v in effect.parameters[count - 1].starts for x in (fit.parameters, bare)]
+        values.sort(key=lambda one: output_error(richer, one, records, fit.own, fit.phi))
+        fit, spent = fit_output_error(richer, records, values[:NEAREST], own=fit.own, phi=fit.phi), spent + 1
         if 2.0 * log_likelihood_gain(best.cost, fit.cost, len(fit.white)) > special.chdtri(spent, ASKED_FOR):
             best, spent = fit, 0
     return best

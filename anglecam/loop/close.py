@@ -166,7 +166,8 @@ def _conclude(task: Task, first: Round, last: Round, candidates: Sequence[Candid
 def _remains(task: Task, first: Round, last: Round, before: Fit, noise: Noise) -> bool:
     """Say whether the best model leaves structure that no candidate explains."""
     named, least = bool(effects_of(last.fit)), smallest(task, first)
-    if last.told.rmse > CONTRADICTED * max(last.fit.rmse, least):
+    # typically: whether dry friction lets go at an instant is all or nothing, and one wrong guess is no contradiction
+    if last.told.typical > CONTRADICTED * max(last.fit.rmse, least):
         return True
     if last.gate.p_value >= (SURE if named else LEVEL) or last.fit.rmse**2 <= task.camera**2 + least**2:
         return False

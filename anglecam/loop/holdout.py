@@ -32,6 +32,8 @@ LEFT_OUT = 1.0
 FIRST_FRAMES = 8
 """Frames that are never left out: without them nothing tells the rate that a recording starts with."""
 KEPT = -1
+MAD = 1.4826
+"""Standard deviation of normal noise over its median absolute value."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,11 @@ class Prediction:
     def rmse(self) -> float:
         """Root mean square residual, rad."""
         return float(np.sqrt(np.mean(np.concatenate(self.residuals) ** 2)))
+
+    @property
+    def typical(self) -> float:
+        """Standard deviation that the median absolute residual speaks of, rad: a few frames far off do not count."""
+        return float(MAD * np.median(np.abs(np.concatenate(self.residuals))))
 
 
 @dataclass(frozen=True)

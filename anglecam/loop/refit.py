@@ -13,7 +13,7 @@ from anglecam.simulate.plant import Plant
 
 def effects_of(fit: Fit) -> tuple[Effect, ...]:
     """Return the effects that a fitted plant has, in the order in which they were added."""
-    return _plant(fit).effects
+    return plant_of(fit).effects
 
 
 def left_of(ledger: Sequence[Effect], fit: Fit) -> list[Effect]:
@@ -31,7 +31,7 @@ def without(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
     """Fit again without one of the plant's effects."""
     own = [p.name for p in effect.parameters]
     keep = [i for i, name in enumerate(fit.model.names) if name not in own]
-    smaller = replace(_plant(fit), effects=tuple(e for e in effects_of(fit) if e is not effect))
+    smaller = replace(plant_of(fit), effects=tuple(e for e in effects_of(fit) if e is not effect))
     return fit_output_error(smaller, records, [fit.parameters[keep]], own=fit.own, phi=fit.phi)
 
 
@@ -39,11 +39,12 @@ def with_last(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
     """Return the same fit with one of its effects after all others, where a candidate's parameters are."""
     own = [p.name for p in effect.parameters]
     order = sorted(range(len(fit.model.names)), key=lambda i: fit.model.names[i] in own)
-    moved = replace(_plant(fit), effects=tuple(sorted(effects_of(fit), key=lambda e: e is effect)))
+    moved = replace(plant_of(fit), effects=tuple(sorted(effects_of(fit), key=lambda e: e is effect)))
     return fit_output_error(moved, records, [fit.parameters[order]], own=fit.own, phi=fit.phi)
 
 
-def _plant(fit: Fit) -> Plant:
+def plant_of(fit: Fit) -> Plant:
+    """Return the fitted plant; raises `TypeError` where another model was fitted."""
     if not isinstance(fit.model, Plant):
         raise TypeError("only a Plant has effects")
     return fit.model
