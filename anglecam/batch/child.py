@@ -82,7 +82,8 @@ def fit(request: dict[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``verdict`` and ``problems``, or the ``cause`` why there is no model and whether the ``call_is_wrong``.
+        ``verdict``, ``effects`` and ``problems``, or the ``cause`` why there is no model and whether the
+        ``call_is_wrong``.
     """
     from anglecam.session_results import close_session, identify_session  # a second of imports, which no clip needs
 
@@ -104,16 +105,17 @@ def fit(request: dict[str, Any]) -> dict[str, Any]:
             measured = gather_session(opened, series_of)
             if not measured.records:
                 raise InputError(f"{folder}: no recording can be used")
-            verdict = None
+            verdict = effects = None
             if request["close"]:
                 names = [name for name in opened.rig.held_out if name in {r.name for r in opened.recordings}]
                 shown = shown_to_loop(opened, measured)
-                verdict = close_session(opened, measured, shown, into, held_out=names).verdict.verdict
+                found = close_session(opened, measured, shown, into, held_out=names).verdict
+                verdict, effects = found.verdict, " + ".join(a.effect.id for a in found.accepted) or None
             else:
                 identify_session(opened, measured, into)
     except AnglecamError as problem:
         return {"cause": str(problem), "call_is_wrong": isinstance(problem, RigError), "problems": []}
-    return {"verdict": verdict, "problems": [str(problem) for problem in measured.problems]}
+    return {"verdict": verdict, "effects": effects, "problems": [str(problem) for problem in measured.problems]}
 
 
 def _figures(measurement: Measurement) -> dict[str, Any]:

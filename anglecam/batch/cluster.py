@@ -7,6 +7,7 @@ job whose worker is lost is done by another.
 from __future__ import annotations
 
 import logging
+import re
 import threading
 from collections.abc import Callable
 from concurrent.futures import CancelledError
@@ -51,6 +52,8 @@ class DaskTeam(Generic[Job, Done]):
         self._size = size
 
     def __enter__(self) -> DaskTeam[Job, Done]:
+        if self._address != "local" and not re.search(r":\d+/?$", self._address):
+            raise RigError(f"--dask {self._address}: neither local nor an address with a port, as tcp://HOST:8786")
         for logger in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
             logging.getLogger(logger).setLevel(logging.CRITICAL + 1)  # what is wrong is said here, in one line
         self._cluster = None

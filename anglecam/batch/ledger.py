@@ -99,7 +99,7 @@ class Ledger:
         if session is None or note.row.status == FAILED:
             return note.row
         cause = note.row.cause or (None if session.cause is None else f"no model: {session.cause}")
-        return replace(note.row, model=session.model, verdict=session.verdict, cause=cause)
+        return replace(note.row, model=session.model, verdict=session.verdict, effects=session.effects, cause=cause)
 
 
 def _light(note: Note) -> Note:

@@ -54,6 +54,8 @@ class SessionNote:
     """The folder of its results, relative to the output folder."""
     model: str | None = None
     verdict: str | None = None
+    effects: str | None = None
+    """Ids of what the loop added, `` + `` between."""
     cause: str | None = None
     """Why there is no model."""
     problems: tuple[str, ...] = ()

@@ -56,7 +56,14 @@ class Watch:
         """Count a session."""
         self._bars.update(self._sessions, advance=1, said="")
         if self._plain and self._clips <= _FEW:
-            errors.print(f"session {note.address}: {'failed' if note.cause else note.verdict or 'identified'}")
+            errors.print(f"session {note.address}: {_concluded(note)}")
+
+
+def _concluded(note: SessionNote) -> str:
+    if note.cause:
+        return "failed"
+    told = f"{note.verdict or 'identified'}{f' to {note.effects}' if note.effects else ''}"
+    return f"{told}, as before" if note.unchanged else told
 
 
 @contextmanager

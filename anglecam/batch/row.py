@@ -31,6 +31,8 @@ class Row:
     """``model.json`` of the clip's session, relative to the output folder."""
     verdict: str | None = None
     """Of the clip's session, where the loop was closed."""
+    effects: str | None = None
+    """What the loop added to the model, `` + `` between."""
     wall_time_s: float | None = None
     version: str | None = None
     configuration: str | None = None

@@ -97,7 +97,9 @@ def do_session(job: SessionJob, settings: Settings, process: MeasuringProcess) -
                 if not measured and not any(file.endswith(SERIES_ENDING) for file in names_in(job.address)):
                     return note  # what is wrong has been told of every clip
                 note = replace(note, configuration=_configuration(job, settings, measured))
-                if before is not None and _is_done(before, note, settings, store):
+                # who went the whole way has the model too, and keeps what it found
+                further = replace(note, configuration=_configuration(replace(job, close=True), settings, measured))
+                if before is not None and any(_is_done(before, one, settings, store) for one in (note, further)):
                     return replace(before, unchanged=True)
                 note, made = _fitted(note, job, settings, process, measured, work)
         except AnglecamError as problem:
@@ -105,12 +107,14 @@ def do_session(job: SessionJob, settings: Settings, process: MeasuringProcess) -
             note = replace(note, cause=cause, call_is_wrong=isinstance(problem, RigError))
         note = replace(note, wall_time_s=round(time.monotonic() - began, 3))
         if not is_current(store.lock, settings.run):
-            return replace(note, model=None, verdict=None, cause="the batch had ended before this was done")
+            return replace(
+                note, model=None, verdict=None, effects=None, cause="the batch had ended before this was done"
+            )
         stale = before.files if before is not None and before.place == note.place else {}
         try:
             published: SessionNote = store.publish(note, made, stale, settings.run)
         except OSError as problem:
-            return replace(note, model=None, verdict=None, cause=cannot_write(problem))
+            return replace(note, model=None, verdict=None, effects=None, cause=cannot_write(problem))
         return published
 
 
@@ -165,7 +169,9 @@ def _fitted(
         return replace(note, cause=cause, call_is_wrong=answer["call_is_wrong"]), {}
     before = f"{job.place}/" if job.place else ""
     made = {before + path.relative_to(into).as_posix(): path for path in sorted(into.rglob("*")) if path.is_file()}
-    return replace(note, model=printable(f"{before}model.json"), verdict=answer["verdict"]), made
+    return replace(
+        note, model=printable(f"{before}model.json"), verdict=answer["verdict"], effects=answer["effects"]
+    ), made
 
 
 def _command(clip: str) -> str:

@@ -129,7 +129,7 @@ def _gain(share: float, dimensions: int, free: int) -> float:
 
 
 def _detectable(ways: Sequence[Direction], needed: float) -> dict[str, float]:
-    """Interpolate each effect's magnitude at which its change is as long as needed, on logarithmic scales."""
+    """Find each effect's magnitude at which its change is as long as needed, on logarithmic scales."""
     found: dict[str, float] = {}
     for name in dict.fromkeys(way.effect.id for way in ways):
         own = [way for way in ways if way.effect.id == name]
@@ -138,7 +138,10 @@ def _detectable(ways: Sequence[Direction], needed: float) -> dict[str, float]:
         magnitude = np.log(sorted(sizes))
         length = np.log([sizes[m] for m in sorted(sizes)])
         wanted = np.log(needed)
-        if len(magnitude) > 1 and wanted < length[0]:  # below the smallest that was tried: in proportion
+        if own[0].effect.parameters[0].inverse:  # a limit does nothing until it is reached: no line leads there
+            seen = magnitude[length >= wanted]
+            found |= {name: float(np.exp(seen[0]))} if len(seen) else {}
+        elif len(magnitude) > 1 and wanted < length[0]:  # below the smallest that was tried: in proportion
             found[name] = float(np.exp(magnitude[0] + wanted - length[0]))
         elif wanted <= length.max():
             found[name] = float(np.exp(np.interp(wanted, np.maximum.accumulate(length), magnitude)))

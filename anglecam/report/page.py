@@ -16,6 +16,7 @@ from anglecam.identification import Identified
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.gate import Test
+from anglecam.loop.refit import plant_of
 from anglecam.loop.remainder import leftover_torque
 from anglecam.loop.result import NEXT_COMMAND, plain, sentence, size_of, split_unit, with_uncertainty
 from anglecam.loop.rounds import applicable
@@ -108,6 +109,7 @@ def write_report(
         candidates=_candidate_rows(verdict, result),
         drawn=figures.MOST,
         effects=_effect_rows(verdict, result),
+        final=_final_rows(verdict, result),
         corrected=CORRECTED if any(a.effect.station == "camera" for a in verdict.accepted) else "",
         experiment=experiment,
         next_command=NEXT_COMMAND,
@@ -242,6 +244,15 @@ def _effect_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any
             "experiment": a.effect.separating_experiment,
         }
         for a, shown in zip(verdict.accepted, result["effects"], strict=True)
+    ]
+
+
+def _final_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, str]]:
+    """List the final model's own a, b, c."""
+    count = plant_of(verdict.after).base_count
+    return [
+        {"name": split_unit(name)[0], "value": with_uncertainty(told["value"], told["sigma"]), "unit": _unit(name)}
+        for name, told in list(result["model"].items())[:count]
     ]
 
 

@@ -74,7 +74,7 @@ def path_figure(verdict: Verdict) -> str:
         for i, (station, what) in enumerate(STATIONS.items()):
             _draw_station(path, i, station, what, bool(here[station]))
             for line, effect in enumerate(lists[station]):
-                _draw_name(path, i, line, effect, effect in found, effect.id in instead)
+                _draw_name(path, i, line, effect, effect.id in [e.id for e in found], effect.id in instead)
             for row, effect in enumerate(here[station]):
                 _draw_curve(figure.add_subplot(grid[1 + row, i]), effect, verdict)
         return _svg(figure)

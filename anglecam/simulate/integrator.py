@@ -36,6 +36,8 @@ ROUNDING = 1e-17
 """rad; what a term of the series may leave out."""
 NOTHING = 1e-13
 """rad; a lag that is nearer to its course than this has settled."""
+FADED = 12.0
+"""Time constants after which 6e-6 of a lag is left."""
 WIDTH = max(len(e.parameters) for e in LEDGER)
 """Parameters an effect may have: the rows of the integrator's parameter tables are this long."""
 
@@ -238,10 +240,15 @@ def _run(time, theta, omega, knots, lag, abc, servos, loads, dries, max_step):  
             if max_step == 0.0:
                 theta, omega = _glide(theta, omega, stop - now, line, lag, abc)
             else:
-                steps = max(1, int(np.ceil((stop - now) / max_step)))
-                h = (stop - now) / steps
-                for step in range(steps):
-                    theta, omega = _advance(theta, omega, step * h, h, line, lag, abc, servos, loads, dry)
+                # a short lag fades within a step: while it does, steps are no longer than half of it
+                fading = min(FADED * lag, stop - now) if abs(line[2]) > NOTHING else 0.0
+                for leg in range(2):
+                    begin, end = (0.0, fading) if leg == 0 else (fading, stop - now)
+                    longest = min(max_step, 0.5 * lag) if leg == 0 else max_step
+                    steps = int(np.ceil((end - begin) / longest)) if end > begin else 0
+                    for step in range(steps):
+                        h = (end - begin) / steps
+                        theta, omega = _advance(theta, omega, begin + step * h, h, line, lag, abc, servos, loads, dry)
             v = _asked(stop - now, line, lag)
             now = stop
             while k + 1 < m and knots[0, k + 1] <= now:

@@ -73,7 +73,12 @@ def test_close_goes_the_whole_way_and_the_index_tells_the_verdict(lab, tmp_path)
     assert [effect["id"] for effect in loop["effects"]] == ["dead_time"]
     assert (out / "neck" / "report.html").exists()
     rows = list(csv.DictReader((out / "index.csv").open()))
-    assert [(row["verdict"], row["model"]) for row in rows] == [("attributed", "neck/model.json"), ("", "")]
+    told = [(row["verdict"], row["effects"], row["model"]) for row in rows]
+    assert told == [("attributed", "dead_time", "neck/model.json"), ("", "", "")]
+    # who then asks for less keeps what was found
+    again = run_batch([str(lab)], out, QUIET)
+    assert (out / "neck" / "report.html").exists()
+    assert again.rows[0].verdict == "attributed"
 
 
 def test_a_session_that_cannot_be_fitted_is_told_once_and_its_clips_are_measured(tmp_path):

@@ -132,3 +132,13 @@ def test_the_ledger_is_the_contracts():
         assert set(e.aliases) < {other.id for other in LEDGER} - {e.id}
         assert e.needs(VIEW)
     assert not effect("rolling_shutter").needs(UNSEEN)
+
+
+@pytest.mark.parametrize("lag", [1e-6, 1e-4, 1e-3, 1e-2])
+def test_a_lag_is_as_exact_beside_what_is_nonlinear_as_alone_however_short_it_is(lag):
+    time = np.arange(0.0, 4.0, 1.0 / 30.0)
+    command = Command(np.array([0.0, 0.5, 1.5, 2.7]), np.radians([0.0, 10.0, -8.0, 12.0]))
+    alone, beside = Plant((effect("actuator_lag"),)), Plant((effect("actuator_lag"), effect("quadratic_drag")))
+    exact = alone.predict(np.array([26.0, 524.0, 508.0, lag]), time, command, np.zeros(2))
+    near = beside.predict(np.array([26.0, 524.0, 508.0, lag, 0.0]), time, command, np.zeros(2))
+    assert np.degrees(np.abs(near - exact)).max() < 1e-4
