@@ -41,20 +41,24 @@ def batch(
 
     if dask is not None and dask != "local" and jobs is not None:
         raise RigError("--jobs: a Dask scheduler's workers say how many clips are measured at a time; leave it out")
-    result = run_batch(
-        folders,
-        out,
-        Options(
-            jobs=jobs or cores(),
-            dask=dask,
-            close=close,
-            retry_failed=retry_failed,
-            quiet=quiet,
-            log=log,
-            time_limit=time_limit,
-            rig=rig,
-        ),
-    )
+    try:
+        result = run_batch(
+            folders,
+            out,
+            Options(
+                jobs=jobs or cores(),
+                dask=dask,
+                close=close,
+                retry_failed=retry_failed,
+                quiet=quiet,
+                log=log,
+                time_limit=time_limit,
+                rig=rig,
+            ),
+        )
+    except KeyboardInterrupt:
+        errors.print("stopped; the same call goes on from here")
+        raise typer.Exit(130) from None
     if not quiet:
         counts = Counter(row.status for row in result.rows)
         told = ", ".join(f"{counts[status]} {status}" for status in ("ok", "truncated", "failed") if counts[status])

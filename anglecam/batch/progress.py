@@ -143,4 +143,5 @@ def log_to(path: Path | None) -> Iterator[Log]:
 
 def _became(note: Note) -> str:
     status = note.row.status + (", as before" if note.unchanged else "")
-    return f"{status}: {note.row.cause}" if note.row.cause else status
+    cause = (note.row.cause or "").removeprefix(f"{note.row.status}: ")
+    return f"{status}: {cause}" if cause else status

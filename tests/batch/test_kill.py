@@ -20,7 +20,13 @@ NAMES = [f"{folder}/{k}.avi" for folder in ("mon", "tue") for k in range(3)]
 
 
 def start(*arguments):
-    return subprocess.Popen(batch_command(*arguments), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(
+        batch_command(*arguments),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # tests in the background may ignore Ctrl-C
+    )
 
 
 def wait_until(true, timeout=60.0):
@@ -109,6 +115,7 @@ def test_interrupted_it_ends_at_once_and_nothing_in_flight_counts_as_failed(lab,
     batch.send_signal(signal.SIGINT)
     _, told = batch.communicate(timeout=30)
     assert batch.returncode not in (0, 2)
+    assert told.splitlines()[-1] == "stopped; the same call goes on from here"
     assert "Traceback" not in told
     assert not run_here([str(lab)], out, TWO).problems
     assert results(out) == unbroken
