@@ -29,6 +29,8 @@ Floats = NDArray[np.float64]
 DRAWS = 999
 LAGS = 15
 LEVEL = 0.05
+TORQUE = "torque against"
+"""How the tests are called that look along torques of any curve."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ def test_residual(fit: Fit, records: Sequence[Record], ways: Sequence[Direction]
 
     p_each, gains = _p_of_effects(ways, both, energy, free)
     shapes = {f"residual against {name}": basis for name, basis in _shapes(fit, records).items()}
-    shapes |= {f"torque against {name}": basis for name, basis in torque_responses(fit, records).items()}
+    shapes |= {f"{TORQUE} {name}": basis for name, basis in torque_responses(fit, records).items()}
     for name, basis in shapes.items():
         left = basis - absorbed @ (absorbed.T @ basis)
         p_each[name], gains[name] = _p_of_space(left, basis, both, energy, free)

@@ -30,9 +30,9 @@ LIKELIEST = 2
 NEGLIGIBLE = 2.0
 """In a film, structure smaller than this many times the angle's stated uncertainty is neither traced nor called
 unexplained: it may be the measurement's own."""
-SURE = 0.002
-"""After an effect has proven itself, what remains must be less probable as noise than this to be traced further, or to
-take the verdict back: not one of the gate's draws may be as striking."""
+SURE = 0.01
+"""After an effect has proven itself, what remains must be this improbable as noise to be traced further, or to take the
+verdict back."""
 FAITHFUL = 0.01
 """No structure smaller than this share of what the base model leaves is traced: no model of an effect is truer."""
 FINEST = math.radians(1e-3)
