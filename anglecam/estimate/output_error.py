@@ -236,11 +236,14 @@ def predicted_angle(model: Model, parameters: Floats, record: Record, own: Float
 def output_error(
     model: Model, parameters: Floats, records: Sequence[Record], own: Sequence[Floats], phi: float
 ) -> float:
-    """Return the sum of squared whitened residuals, rad², of a model as it stands; not finite where it runs away."""
-    left = [
-        whiten(r, phi, r.angle - predicted_angle(model, parameters, r, o)) for r, o in zip(records, own, strict=True)
-    ]
-    return float(sum(one @ one for one in left))
+    """Return the sum of squared whitened residuals, rad², of a model as it stands; infinite where it runs away."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        left = [
+            whiten(r, phi, r.angle - predicted_angle(model, parameters, r, o))
+            for r, o in zip(records, own, strict=True)
+        ]
+        cost = float(sum(one @ one for one in left))
+    return cost if np.isfinite(cost) else np.inf
 
 
 def _fit_once(

@@ -21,7 +21,7 @@ from anglecam.estimate.record import Record
 from anglecam.estimate.shooting import drifts, goes_astray, windows
 from anglecam.estimate.start import start_parameters
 from anglecam.loop.attribute import Candidate, log_likelihood_gain, promising, rivals
-from anglecam.loop.gate import LEVEL, TORQUE, Gate
+from anglecam.loop.gate import LEVEL, Gate
 from anglecam.loop.holdout import Gain, Prediction, compare, predict_unseen, split_records
 from anglecam.loop.refit import effects_of, left_of, recoloured, with_last, without
 from anglecam.loop.rounds import SURE, Round, Task, applicable, candidates_of, look, smallest, trace
@@ -192,7 +192,7 @@ def _could_still_gain(now: Round, before: Fit) -> float:
     As a share of that and all that was explained since before. What only follows the measured angle about, such as a
     codec that is late where the head moves, is no cause.
     """
-    more = max([f.gain for f in now.forecasts[:1]] + [t.gain for t in now.gate.tests if t.name.startswith(TORQUE)])
+    more = max(now.gate.torque_gain, *(forecast.gain for forecast in now.forecasts[:1]), 0.0)
     if more <= 0.0:
         return 0.0
     return more / (more + max(log_likelihood_gain(before.cost, now.fit.cost, len(before.white)), 0.0))

@@ -38,6 +38,7 @@ from anglecam.loop.commands import (
     candidate_commands,
     candidate_releases,
 )
+from anglecam.loop.refit import plant_of
 from anglecam.session import Command
 from anglecam.simulate.plant import Plant
 
@@ -204,15 +205,9 @@ def _hardest(separations: dict[Pair, float], pairs: Sequence[Pair]) -> float:
 
 def _names(fits: Sequence[Fit]) -> list[str]:
     """Name each model after the effects that it does not share with all."""
-    effects = [[e.id for e in _plant(fit).effects] for fit in fits]
+    effects = [[e.id for e in plant_of(fit).effects] for fit in fits]
     shared = set.intersection(*(set(ids) for ids in effects))
     return [" + ".join(i for i in ids if i not in shared) or "no further effect" for ids in effects]
-
-
-def _plant(fit: Fit) -> Plant:
-    if not isinstance(fit.model, Plant):
-        raise TypeError("only a Plant takes effects")
-    return fit.model
 
 
 def _candidates(fits: Sequence[Fit], records: Sequence[Record]) -> list[Candidate]:
@@ -244,7 +239,7 @@ def _foresee_all(candidate: Candidate, fits: Sequence[Fit], records: Sequence[Re
 
 
 def _foresee(candidate: Candidate, fit: Fit, records: Sequence[Record]) -> _Foreseen:
-    plant = _plant(fit)
+    plant = plant_of(fit)
     time = np.arange(0.0, LONGEST, np.median([r.interval for r in records]))
     if candidate.command is None:
         state = np.array([candidate.released, 0.0])
@@ -301,7 +296,7 @@ def _linear(target: Record, model: _Foreseen, known: Floats, duration: float, ph
 
 def _fitted(target: Record, model: _Foreseen, fit: Fit, known: Floats, duration: float, phi: float) -> float:
     """Return the same distance with the model as it is, within the bounds of its parameters."""
-    plant, p, part = _plant(fit), len(known), target.between(0.0, duration)
+    plant, p, part = plant_of(fit), len(known), target.between(0.0, duration)
 
     def errors(unknowns: Floats) -> Floats:
         off = whiten(part, phi, _predict(plant, unknowns, part) - part.angle)

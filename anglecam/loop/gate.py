@@ -29,8 +29,6 @@ Floats = NDArray[np.float64]
 DRAWS = 999
 LAGS = 15
 LEVEL = 0.05
-TORQUE = "torque against"
-"""How the tests are called that look along torques of any curve."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +37,6 @@ class Test:
 
     name: str
     p_value: float
-    gain: float
-    """Log-likelihood that what it looks for would gain, less what noise would give it; 0 for an autocorrelation."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +46,8 @@ class Gate:
     p_value: float
     """That noise alone leaves a residual at least as striking in any of the tests."""
     tests: tuple[Test, ...]
+    torque_gain: float
+    """Log-likelihood that a torque over angle or speed of any curve would gain, less what noise would give it."""
     detectable: dict[str, float]
     """Effect id → smallest magnitude of its first parameter, SI, that would have been seen with probability 0.95."""
 
@@ -86,48 +84,39 @@ def test_residual(fit: Fit, records: Sequence[Record], ways: Sequence[Direction]
     energy = np.sum(both**2, axis=0)
     energy[energy == 0.0] = 1.0
 
-    p_each, gains = _p_of_effects(ways, both, energy, free)
-    shapes = {f"residual against {name}": basis for name, basis in _shapes(fit, records).items()}
-    shapes |= {f"{TORQUE} {name}": basis for name, basis in torque_responses(fit, records).items()}
-    for name, basis in shapes.items():
-        left = basis - absorbed @ (absorbed.T @ basis)
-        p_each[name], gains[name] = _p_of_space(left, basis, both, energy, free)
-    p_each["autocorrelation"], gains["autocorrelation"] = special.chdtrc(LAGS, _portmanteau(both, energy, records)), 0.0
+    p_each = _p_of_effects(ways, both, energy, free)
+    torque_gain = 0.0
+    for name, basis in _shapes(fit, records).items():
+        p_each[f"residual against {name}"], _, _ = _p_of_space(basis, absorbed, both, energy, free)
+    for name, basis in torque_responses(fit, records).items():
+        p_each[f"torque against {name}"], share, k = _p_of_space(basis, absorbed, both, energy, free)
+        torque_gain = max(torque_gain, -0.5 * free * float(np.log(max(1.0 - share, 1e-6))) - 0.5 * k)
+    p_each["autocorrelation"] = special.chdtrc(LAGS, _portmanteau(both, energy, records))
 
     # under the null the data are one more draw: the smallest of its p-values is ranked among all draws'
     smallest = np.min(list(p_each.values()), axis=0)
     p_value = np.mean(smallest <= smallest[0])
     critical = float(np.quantile(smallest[1:], LEVEL))
     needed = float(-(special.ndtri(critical) + special.ndtri(0.05)) * np.sqrt(fit.cost / free))
-    tests = tuple(Test(name, float(p[0]), gains[name]) for name, p in p_each.items())
-    return Gate(float(p_value), tests, _detectable(ways, needed))
+    tests = tuple(Test(name, float(p[0])) for name, p in p_each.items())
+    return Gate(float(p_value), tests, torque_gain, _detectable(ways, needed))
 
 
-def _p_of_effects(
-    ways: Sequence[Direction], residuals: Floats, energy: Floats, free: int
-) -> tuple[dict[str, Floats], dict[str, float]]:
-    """Return, for each effect, the least p-value of its directions for every residual (columns), and the first's gain.
+def _p_of_effects(ways: Sequence[Direction], residuals: Floats, energy: Floats, free: int) -> dict[str, Floats]:
+    """Return, for each effect and residual (columns), the least p-value of its directions.
 
     Of white noise in n dimensions the share of the energy that falls into one of them is Beta(1/2, (n − 1)/2).
     """
     if not ways:
-        return {}, {}
+        return {}
     along = np.stack([way.change / way.size for way in ways]) @ residuals
     share = np.minimum(along**2 / energy, 1.0)
     p = special.betaincc(0.5, 0.5 * (free - 1), share)
-    gain = np.array([_gain(s, 1, free) for s in share[:, 0]])
     for i, way in enumerate(ways):
         if way.one_sided:
             p[i] = np.where(along[i] > 0.0, 0.5 * p[i], 1.0 - 0.5 * p[i])
-            gain[i] = gain[i] if along[i, 0] > 0.0 else 0.0
     ids = np.array([way.effect.id for way in ways])
-    own = {f"effect {name}": ids == name for name in dict.fromkeys(ids)}
-    return {n: p[i].min(axis=0) for n, i in own.items()}, {n: float(gain[i].max()) for n, i in own.items()}
-
-
-def _gain(share: float, dimensions: int, free: int) -> float:
-    """Return what the log-likelihood gains where a share of the energy is explained, less what it does of noise."""
-    return float(-0.5 * free * np.log(max(1.0 - share, 1e-6)) - 0.5 * dimensions)
+    return {f"effect {name}": p[ids == name].min(axis=0) for name in dict.fromkeys(ids)}
 
 
 def _detectable(ways: Sequence[Direction], needed: float) -> dict[str, float]:
@@ -173,18 +162,21 @@ def _shapes(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
     return {name: np.concatenate(blocks) for name, blocks in groups.items()}
 
 
-def _p_of_space(left: Floats, basis: Floats, residuals: Floats, energy: Floats, free: int) -> tuple[Floats, float]:
-    """Return the p-value of every residual's (columns) share of energy in the space of ``left``, and the first's gain.
+def _p_of_space(
+    basis: Floats, absorbed: Floats, residuals: Floats, energy: Floats, free: int
+) -> tuple[Floats, float, int]:
+    """Return the p-value of each residual's (columns) share of energy in a space that the fit cannot follow.
 
-    Of white noise in n dimensions the share that falls into k of them is Beta(k/2, (n − k)/2).
+    Of white noise in n dimensions the share that falls into k of them is Beta(k/2, (n − k)/2). The first residual's
+    share and k come with it.
     """
-    u, size, _ = np.linalg.svd(left, full_matrices=False)
+    u, size, _ = np.linalg.svd(basis - absorbed @ (absorbed.T @ basis), full_matrices=False)
     u = u[:, size > 1e-6 * max(float(np.linalg.norm(basis)), 1e-300)]
     k = u.shape[1]
     if k == 0:
-        return np.ones(residuals.shape[1]), 0.0
+        return np.ones(residuals.shape[1]), 0.0, 0
     share = np.minimum(np.sum((u.T @ residuals) ** 2, axis=0) / energy, 1.0)
-    return special.betaincc(0.5 * k, 0.5 * (free - k), share), _gain(share[0], k, free)
+    return special.betaincc(0.5 * k, 0.5 * (free - k), share), float(share[0]), k
 
 
 def _portmanteau(residuals: Floats, energy: Floats, records: Sequence[Record]) -> Floats:

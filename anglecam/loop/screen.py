@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from anglecam.effects import Effect
 from anglecam.estimate.output_error import Fit, whiten
 from anglecam.estimate.record import Record
+from anglecam.loop.refit import plant_of
 from anglecam.simulate.plant import Plant
 
 Floats = NDArray[np.float64]
@@ -99,9 +100,8 @@ def changes(fit: Fit, records: Sequence[Record], effects: Sequence[Effect]) -> l
     list of Change
         Grouped by effect; those with which the plant runs away left out.
     """
-    if not isinstance(fit.model, Plant):
-        raise TypeError("only a Plant takes effects")
-    plant, found = fit.model, []
+    plant = plant_of(fit)
+    found = []
     for effect in effects:
         richer = plant.with_effect(effect)
 

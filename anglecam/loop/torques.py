@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from anglecam.estimate.output_error import Fit, whiten
 from anglecam.estimate.record import Record
+from anglecam.loop.refit import plant_of
 from anglecam.session import Command
 from anglecam.simulate.plant import Plant
 
@@ -44,9 +45,7 @@ def torque_responses(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
     dict
         ``angle`` and ``velocity`` → (N, k) changes of the whitened residual, a column a knot.
     """
-    if not isinstance(fit.model, Plant):
-        raise TypeError("only a Plant takes torques")
-    plant = fit.model
+    plant = plant_of(fit)
     times = [_between(record.time) for record in records]
     paths = [
         plant.run(fit.parameters, time, record.command, own[: plant.states])

@@ -10,7 +10,7 @@ import pytest
 from anglecam.errors import RigError
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.loop.close import close_records
-from anglecam.loop.holdout import predict_unseen, split_records
+from anglecam.loop.holdout import Prediction, predict_unseen, split_records
 from anglecam.loop.result import sentence, verdict_as_dict
 from anglecam.simulate.plant import Plant
 from support.motion import Plant as TruePlant
@@ -107,6 +107,23 @@ def test_what_is_held_out_by_declaration_is_predicted_by_the_fit_of_all_others()
     told, unseen = predict_unseen(fit, fitted, held_out)
     assert [r.name for r in told.records] == HELD_OUT
     assert len(unseen.records) == len(fitted) + 1
+
+
+def test_one_wrong_guess_does_not_change_the_typical_error_and_a_wrong_model_does():
+    record = session(TruePlant(), 20)[0]
+    noise = np.random.default_rng(0).normal(0.0, 0.001, len(record.time))
+    stuck, wrong = noise.copy(), noise + 0.005
+    stuck[40:50] += 0.05
+    assert Prediction((record,), (stuck,), 0.0).typical == pytest.approx(0.001, rel=0.15)
+    assert Prediction((record,), (wrong,), 0.0).typical > 0.005
+
+
+def test_a_limit_is_said_to_be_seen_only_where_it_acts():
+    verdict = close_records(session(TruePlant(), 0), held_out=HELD_OUT)
+    (limit,) = [d for d in verdict_as_dict(verdict)["detectable"] if d["id"] == "torque_saturation"]
+    # at most c·u + b·θ is ever asked of the servo
+    asked = max(508.0 * np.abs(r.command.angle).max() + 524.0 * np.abs(r.angle).max() for r in verdict.fitted)
+    assert 0.0 < limit["smallest"] < np.degrees(asked)
 
 
 def test_holding_out_everything_is_refused():
