@@ -69,6 +69,14 @@ def test_a_worker_killed_in_the_middle_loses_nothing(cluster, tmp_path):
     assert results(out) == results(tmp_path / "here")
 
 
+def test_what_is_no_address_is_told_at_once(tmp_path):
+    lab = tiny_lab(tmp_path / "lab", ["a.avi"])
+    with pytest.raises(
+        RigError, match=r"^--dask nonsense: neither local nor an address with a port, as tcp://HOST:8786$"
+    ):
+        run_batch([str(lab)], tmp_path / "out", Options(jobs=1, quiet=True, dask="nonsense"))
+
+
 def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path, monkeypatch):
     monkeypatch.setattr("anglecam.batch.cluster._WAIT_S", 1.0)
     lab = tiny_lab(tmp_path / "lab", ["a.avi"])
