@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from anglecam.effects import Effect
-from anglecam.estimate.output_error import Fit, fit_output_error, output_error
+from anglecam.estimate.output_error import Fit, first_state, fit_output_error, output_error
 from anglecam.estimate.record import Record
 from anglecam.loop.holdout import Prediction, predict_unseen
 from anglecam.loop.refit import effects_of, plant_of
@@ -112,27 +112,42 @@ def fit_candidates(
 
 def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
     """Fit the plant of ``base`` with one more effect, from where the screen would start, or else the effect itself."""
-    plant, effect = plant_of(base), forecast.effect
+    effect = forecast.effect
     early = [p for p in effect.parameters if not p.late]
+    plant = plant_of(base).with_effect(replace(effect, parameters=tuple(early)))
+    own = base.own if effect.dry is None else _held(base, records)
 
     def fit_from(start: NDArray[np.float64]) -> Fit:
         values = np.append(base.parameters, start[: len(early)])
-        some = replace(effect, parameters=tuple(early))
-        return fit_output_error(plant.with_effect(some), records, [values], own=base.own, phi=base.phi)
+        return fit_output_error(plant, records, [values], own=own, phi=base.phi)
 
     first = effect.null
     first[0] = effect.parameters[0].starts[0]
     near = [effect.null + share * (forecast.start - effect.null) for share in (0.5, 2.0)]
-    enough = FULFILLED if len(early) == 1 else math.inf
+    several = len(early) > 1 or effect.dry is not None
+    enough = math.inf if several else FULFILLED
     best = fit_from(forecast.start)
-    # several parameters may have several valleys, and dry friction has them beside whatever has a kink; and what a
-    # limit does is not in proportion: scaled down it may do nothing, where nothing tells which way to go
+    # several parameters may have several valleys, and dry friction has them whenever a head is held or sets off; and
+    # what a limit does is not in proportion: scaled down it may do nothing, where nothing tells which way to go
     for start, share in ((forecast.tried, enough), (first, enough), (near[0], HOPEFUL), (near[1], HOPEFUL)):
         if log_likelihood_gain(base.cost, best.cost, len(base.white)) >= share * forecast.gain:
             break
         fit = fit_from(start)
         best = fit if fit.cost < best.cost else best
+    if effect.dry is not None:  # on the way here initial states may have got into a valley of their own
+        again = fit_output_error(plant, records, [best.parameters], own=own, phi=base.phi)
+        best = again if again.cost < best.cost else best
     return _with_late(base, effect, best, records)
+
+
+def _held(base: Fit, records: Sequence[Record]) -> list[NDArray[np.float64]]:
+    """Return each recording's own unknowns at rest where no command has moved the head yet.
+
+    Dry friction stops a small initial rate within a frame, so that rate and angle there can hardly be told apart, and
+    a fit that starts with the base model's rate stays with it.
+    """
+    pairs = zip(base.own, (first_state(base.model, record) for record in records), strict=True)
+    return [np.concatenate([own[:1], first[1:]]) if first[1] == 0.0 else own for own, first in pairs]
 
 
 def _with_late(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record]) -> Fit:
