@@ -129,6 +129,7 @@ def _figures(measurement: Measurement) -> dict[str, Any]:
         "duration_s": None if rate is None else _rounded(n / rate),
         "share_measured": _rounded(float(series.ok.mean())),
         "median_sigma_deg": _rounded(float(np.median(sigma))) if len(sigma) else None,
+        "notes": "; ".join(measurement.notes) or None,
     }
 
 

@@ -42,6 +42,8 @@ class Row:
     cause: str | None = None
     series: str | None = None
     """``NAME.angles.csv``, relative to the output folder."""
+    notes: str | None = None
+    """What `anglecam measure` says beside the angles, ``; `` between: that only the mouth could be followed, say."""
 
 
 def cannot_write(problem: OSError) -> str:

@@ -43,10 +43,13 @@ def test_each_clip_has_what_measure_writes_in_the_folder_it_has_below_the_one_as
     lab, out, _ = done
     for name, rig in (("b.avi", Rig()), ("mon/a.avi", Rig()), ("tue/a.avi", Rig(facing="left"))):
         clip = lab / name
-        write_measurement(measure_clip(clip, rig), None, tmp_path / clip.parent.name)
+        measured = measure_clip(clip, rig)
+        write_measurement(measured, None, tmp_path / clip.parent.name)
         for ending in (".angles.csv", ".png"):
             alone = (tmp_path / clip.parent.name / f"{clip.stem}{ending}").read_bytes()
             assert (out / name).with_name(clip.stem + ending).read_bytes() == alone
+        assert measured.notes
+        assert rows(out)[str(clip)]["notes"] == "; ".join(measured.notes)
 
 
 def test_the_index_has_a_row_a_clip_and_says_what_became_of_it(done):

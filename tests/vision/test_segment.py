@@ -1,0 +1,35 @@
+"""Regions of the mouth's colour: each at its place, and none made of nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anglecam.vision.colour import ColourModel
+from anglecam.vision.segment import find_regions
+
+RED = ColourModel(np.array([0.0, 0.0, 1 / 255]), 0.0, 0.01, np.array([0.0, 0.0, 255.0]), np.zeros(2))
+"""The fraction of mouth is the red channel."""
+
+
+def _picture(red: np.ndarray) -> np.ndarray:
+    return np.dstack([np.zeros_like(red), np.zeros_like(red), red]).astype(np.uint8)
+
+
+def test_a_square_is_where_it_is_and_as_large_as_it_is():
+    red = np.zeros((60, 80))
+    red[20:40, 30:60] = 255
+    (region,) = find_regions(_picture(red), RED, 10.0)
+    assert region.whole
+    assert region.centre_px == pytest.approx([44.5, 29.5], abs=1e-6)
+    assert region.area_px2 == pytest.approx(600.0, rel=0.02)
+
+
+def test_a_thread_between_two_larger_patches_is_no_region_of_its_own():
+    red = np.zeros((60, 80))
+    red[10:50, 10:37] = red[10:50, 43:70] = 255
+    red[12:48, 39:41] = 255
+    regions = find_regions(_picture(red), RED, 10.0)
+    assert len(regions) == 2
+    assert all(np.isfinite(region.centre_px).all() and region.area_px2 > 500.0 for region in regions)
+    assert not any(region.whole for region in regions)
