@@ -27,7 +27,7 @@ EFFECT = Effect(
     summary="The measured angle creeps at a steady rate that no torque explains.",
     equation="y = θ + d·t",
     relaxes="Fig. 7: the camera stands still",
-    parameters=(Parameter("drift_deg_per_s", 0.0, -0.1, 0.1, (0.002, -0.002), math.degrees(1.0)),),
+    parameters=(Parameter("drift_deg_per_s", "d", 0.0, -0.1, 0.1, (0.002, -0.002), math.degrees(1.0)),),
     aliases=("constant_torque",),
     separating_experiment="a minute of rest, with something in the picture that is fixed to the ground",
     source="JCGM 100:2008, F.2.4",

@@ -49,7 +49,9 @@ EFFECT = Effect(
     summary="Between servo and head there is play, so that the head stays behind whenever the command turns round.",
     equation="θ̈ = c·P_w[u] − a·θ̇ − b·θ with the play operator P_w",
     relaxes="Eqs. (3), (9): gears and joints are exact",
-    parameters=(Parameter("half_width_deg", 0.0, 0.0, math.radians(15.0), (0.003, 0.01, 0.03), math.degrees(1.0)),),
+    parameters=(
+        Parameter("half_width_deg", "w", 0.0, 0.0, math.radians(15.0), (0.003, 0.01, 0.03), math.degrees(1.0)),
+    ),
     aliases=("dead_zone", "coulomb_friction"),
     separating_experiment=(
         "a slow triangle, then steps up only and steps down only to the same levels: with play the head stands at two"

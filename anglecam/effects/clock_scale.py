@@ -27,7 +27,7 @@ EFFECT = Effect(
     summary="The camera's clock and the command's run at different rates, so that they drift apart.",
     equation="u(t/(1 + ε))",
     relaxes="the camera is said to give 15 frames a second, and that is taken as exact",
-    parameters=(Parameter("scale_excess", null=0.0, lower=-0.3, upper=0.3, starts=(0.002, -0.002, 0.02, -0.02)),),
+    parameters=(Parameter("scale_excess", "ε", null=0.0, lower=-0.3, upper=0.3, starts=(0.002, -0.002, 0.02, -0.02)),),
     aliases=("dead_time",),
     separating_experiment="a recording of a minute or more with a command change at its beginning and at its end",
     source="the paper, Dynamic Model Parameter Estimation: a measurement interval of 1/15 s",

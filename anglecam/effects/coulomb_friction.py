@@ -31,13 +31,17 @@ EFFECT = Effect(
     id="coulomb_friction",
     station="load",
     summary="Dry friction opposes motion with a torque that does not depend on speed, and holds the head near rest.",
-    equation="θ̈ = c·u − a·θ̇ − b·θ − (F ± D)·sgn θ̇, F + B near rest; θ̇ = 0 while |c·u − b·θ| ≤ max(F + B, F ± D)",
+    equation=(
+        "θ̈ = c·u − a·θ̇ − b·θ − (F ± D)·sgn θ̇, F + B below speeds of about ω_s; "
+        "θ̇ = 0 while |c·u − b·θ| ≤ max(F + B, F ± D)"
+    ),
     relaxes="Eq. (22): damping is viscous only",
     parameters=(
-        Parameter("friction_deg_per_s2", 0.0, 0.0, 500.0, (0.3, 3.0, 15.0), SI_TO_FILE),
-        Parameter("asymmetry_deg_per_s2", 0.0, -250.0, 250.0, (0.0,), SI_TO_FILE, late=True),
+        Parameter("friction_deg_per_s2", "F", 0.0, 0.0, 500.0, (0.3, 3.0, 15.0), SI_TO_FILE),
+        Parameter("asymmetry_deg_per_s2", "D", 0.0, -250.0, 250.0, (0.0,), SI_TO_FILE, late=True),
         Parameter(
             "breakaway_excess_deg_per_s2",
+            "B",
             0.0,
             0.0,
             500.0,
@@ -45,7 +49,9 @@ EFFECT = Effect(
             SI_TO_FILE,
             late=True,
         ),
-        Parameter("stribeck_speed_deg_per_s", 0.0, 0.0, 10.0, (0.01, 0.03, 0.1, 0.3, 1.0), SI_TO_FILE, late=True),
+        Parameter(
+            "stribeck_speed_deg_per_s", "ω_s", 0.0, 0.0, 10.0, (0.01, 0.03, 0.1, 0.3, 1.0), SI_TO_FILE, late=True
+        ),
     ),
     aliases=("quadratic_drag", "backlash", "dead_zone"),
     separating_experiment="a slow triangle of small amplitude, on which dry friction shows as a constant lag in angle",

@@ -30,7 +30,7 @@ EFFECT = Effect(
     summary="The head answers the command a fixed time late.",
     equation="θ̈ = c·u(t − τ) − a·θ̇ − b·θ",
     relaxes="Eqs. (5), (29): the command acts at once",
-    parameters=(Parameter("tau_s", null=0.0, lower=-0.5, upper=0.5, starts=(0.01, 0.05, 0.15, -0.03)),),
+    parameters=(Parameter("tau_s", "τ", null=0.0, lower=-0.5, upper=0.5, starts=(0.01, 0.05, 0.15, -0.03)),),
     aliases=("actuator_lag", "clock_scale"),
     separating_experiment=(
         "a lamp in the picture that lights at the first command change separates delay from clock offset (without "

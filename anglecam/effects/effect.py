@@ -66,6 +66,8 @@ class Parameter:
 
     name: str
     """As in result files, with its unit there (``tau_s``)."""
+    symbol: str
+    """As in the effect's equation."""
     null: float
     """The value at which the effect is absent, SI."""
     lower: float

@@ -33,9 +33,16 @@ EFFECT = Effect(
     relaxes="Eq. (25): small angles about neutral",
     parameters=(
         # a weight pulls down: G below zero at θ0 would be G above zero at θ0 + 180°
-        Parameter("gravity_deg_per_s2", 0.0, 0.0, 2000.0, (30.0, 150.0), math.degrees(1.0)),
+        Parameter("gravity_deg_per_s2", "G", 0.0, 0.0, 2000.0, (30.0, 150.0), math.degrees(1.0)),
         Parameter(
-            "gravity_deg", 0.25 * math.pi, -math.tau, math.tau, (-0.8, 2.4, -2.4), math.degrees(1.0), circular=True
+            "gravity_deg",
+            "θ0",
+            0.25 * math.pi,
+            -math.tau,
+            math.tau,
+            (-0.8, 2.4, -2.4),
+            math.degrees(1.0),
+            circular=True,
         ),
     ),
     aliases=("stiffening_spring", "linkage_geometry"),

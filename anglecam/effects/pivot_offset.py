@@ -1,9 +1,9 @@
 """Pivot offset: the mark that was taken for the pivot is not where the mechanism turns.
 
-    y = ∠(R·(cos λ, sin λ) − e) − the same at θ = 0,   λ = λ0 + θ
+    y = ∠(cos λ − e1, sin λ − e2) − the same at θ = 0,   λ = λ0 + θ
 
-The angle is then that of the line from a wrong point. The paper takes the centroid of the shaft, Fig. 7. e is counted
-ahead and up, as a share of the lever arm R.
+The angle is then that of the line from a wrong point. The paper takes the centroid of the shaft, Fig. 7. e1 and e2 are
+how far ahead and up it lies of the right one, as shares of the lever arm.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ EFFECT = Effect(
     id="pivot_offset",
     station="camera",
     summary="The angle was measured about a point beside the axis of rotation.",
-    equation="y = ∠(R·e^{iλ} − e), λ = λ0 + θ",
+    equation="y = ∠(cos λ − e1, sin λ − e2), λ = λ0 + θ",
     relaxes="Fig. 7: O is the centre of rotation",
     parameters=(
-        Parameter("ahead_share_of_lever", null=0.0, lower=-0.5, upper=0.5, starts=(0.02, -0.02)),
-        Parameter("up_share_of_lever", null=0.0, lower=-0.5, upper=0.5, starts=(0.02, -0.02)),
+        Parameter("ahead_share_of_lever", "e1", null=0.0, lower=-0.5, upper=0.5, starts=(0.02, -0.02)),
+        Parameter("up_share_of_lever", "e2", null=0.0, lower=-0.5, upper=0.5, starts=(0.02, -0.02)),
     ),
     aliases=("camera_tilt", "lens_distortion", "linkage_geometry"),
     separating_experiment="slow motion over the whole range, marker: none: the path of the mouth has its own centre",

@@ -30,7 +30,7 @@ EFFECT = Effect(
     summary="Each row of the picture is taken later than the one above, so that a mouth farther down is seen later.",
     equation="y(t) = θ(t + s·(row − middle))",
     relaxes="a frame is one instant",
-    parameters=(Parameter("row_time_s", null=0.0, lower=-2e-4, upper=2e-4, starts=(1e-5, -1e-5, 6e-5)),),
+    parameters=(Parameter("row_time_s", "s", null=0.0, lower=-2e-4, upper=2e-4, starts=(1e-5, -1e-5, 6e-5)),),
     aliases=("dead_time", "quadratic_drag"),
     separating_experiment="the same motion filmed with the camera upside down",
     source="Meingast, Geyer, Sastry, OMNIVIS 2005",

@@ -31,8 +31,8 @@ EFFECT = Effect(
     equation="|c·u − s·b·θ| ≤ T",
     relaxes="Eq. (6), Fig. 12: an ideal amplifier gives any voltage",
     parameters=(
-        Parameter("limit_deg_per_s2", 0.0, 0.0, 1.0, (0.005, 0.01, 0.02, 0.05), math.degrees(1.0), inverse=True),
-        Parameter("servo_share", 1.0, 0.0, 1.0, (0.3,)),
+        Parameter("limit_deg_per_s2", "T", 0.0, 0.0, 1.0, (0.005, 0.01, 0.02, 0.05), math.degrees(1.0), inverse=True),
+        Parameter("servo_share", "s", 1.0, 0.0, 1.0, (0.3,)),
     ),
     aliases=("rate_limit", "quadratic_drag"),
     separating_experiment="steps of two heights, one at least three times the other: a limit slows the larger only",

@@ -228,12 +228,14 @@ def _effect_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any
             "equation": a.effect.equation,
             "fitted": [
                 {
-                    "name": split_unit(name)[0],
+                    "symbol": parameter.symbol,
+                    "name": split_unit(parameter.name)[0],
                     "value": with_uncertainty(told["value"], told["sigma"]),
-                    "unit": _unit(name),
+                    "unit": _unit(parameter.name),
                 }
-                for name, told in shown["parameters"].items()
+                for parameter, told in zip(a.effect.parameters, shown["parameters"].values(), strict=True)
             ],
+            "left_out": [p.symbol for p in effect(a.effect.id).parameters[len(a.effect.parameters) :]],
             "relaxes": a.effect.relaxes,
             "whose": WHOSE[a.effect.station],
             "rivals": [

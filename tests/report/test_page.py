@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from html import unescape
 
@@ -52,6 +53,7 @@ def test_the_page_tells_the_verdict(write, dragged, verdict, svgs):
     assert page.count("<svg") == svgs
     assert f"{np.degrees(found.before_held_out.rmse):.4f}" in page
     assert sentence(found) in page
+    assert "Nothing more needs to be filmed" not in page
     assert ("What would have been seen" in page) == (verdict == "nothing_missing")
     assert "a <b> & c" in page
     assert "a <b>" not in text  # a session's name is text, not markup
@@ -68,6 +70,8 @@ def test_without_a_declaration_the_page_says_that_blocks_were_predicted_in_turn(
     assert "a block of a second in five was predicted at a time" in page
     assert page.count("<svg") == 7
     assert "swing.avi: no mouth" in page
+    assert re.search(r"− q·θ̇·\|θ̇\|</i> with q = [\d.]+ ± [\d.]+", page)
+    assert "Nothing more needs to be filmed to say what it is." in page
     for record in dragged.fitted:
         assert f"{record.name}</text>" in page
 

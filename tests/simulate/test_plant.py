@@ -98,5 +98,6 @@ def test_every_entry_of_the_ledger_says_what_a_reader_needs():
         assert sum(getattr(entry, port) is not None for port in PORTS) == 1
         assert entry.parameters[0].starts
         for p in entry.parameters:
+            assert p.symbol in entry.equation
             assert p.lower <= p.null <= p.upper
             assert all(p.lower <= start <= p.upper for start in p.starts)
