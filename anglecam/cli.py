@@ -1,7 +1,8 @@
 """The command line: one thin command a verb.
 
 What goes wrong with one clip is one line on standard error and exit status 1, and the rest is done; what is wrong
-with the call or a rig file is one line and exit status 2. Progress is shown on a terminal only.
+with the call or a rig file is one line and exit status 2. Progress is shown on a terminal only. What a verb needs is
+imported where it is needed: to load all of it takes longer than many a call.
 """
 
 from __future__ import annotations
@@ -11,32 +12,25 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from anglecam import __version__
 from anglecam.batch.cli import batch
-from anglecam.calibrate import calibrate_clip
-from anglecam.calibration import write_calibration
-from anglecam.clip_results import write_measurement
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.exchange import Also, write_also
-from anglecam.identification import ESTIMATORS, Estimator
-from anglecam.marks.angle import MeasuredTracks
-from anglecam.measurement import Measurement
-from anglecam.neck.file import read_neck
 from anglecam.neck_cli import app as neck
-from anglecam.recordings import Measured, measure_recording, measure_session, shown_to_loop
-from anglecam.report.budget_page import budget_table, write_budget
-from anglecam.report.calibration_figure import plot_calibration
-from anglecam.report.summary import loop_table, model_table, response_table, series_table
 from anglecam.rig import Rig, read_rig
 from anglecam.session import Session, command_beside, find_clips, read_session, recording_name, rig_beside
-from anglecam.session_results import close_session, identify_session
 from anglecam.terminal import errors, make_folder, screen
-from anglecam.video.overlay import write_overlay
+
+if TYPE_CHECKING:
+    from anglecam.identification import Estimator
+    from anglecam.marks.angle import MeasuredTracks
+    from anglecam.measurement import Measurement
+    from anglecam.recordings import Measured
 
 app = typer.Typer(
     name="anglecam",
@@ -85,6 +79,10 @@ def measure(
     ] = None,
 ) -> None:
     """Measure the angle in every frame: NAME.angles.csv and a plot for each clip, and how it answers every change."""
+    from anglecam.clip_results import write_measurement
+    from anglecam.report.summary import response_table, series_table
+    from anglecam.video.overlay import write_overlay
+
     declared = read_rig(rig) if rig else None
     make_folder(out)
     problems: list[AnglecamError] = []
@@ -125,6 +123,9 @@ def budget(
     rig: RigFile = None,
 ) -> None:
     """Say what the angle's uncertainty is made of: NAME.budget.json and a page for each clip."""
+    from anglecam.marks.angle import MeasuredTracks
+    from anglecam.report.budget_page import budget_table, write_budget
+
     declared = read_rig(rig) if rig else None
     make_folder(out)
     problems: list[AnglecamError] = []
@@ -152,6 +153,10 @@ def calibrate(
     board: Annotated[str, typer.Option("--board", help="Inner corners, COLUMNSxROWS.")] = "9x6",
 ) -> None:
     """Find camera matrix and lens distortion from a chessboard: NAME.calibration.yaml and a figure."""
+    from anglecam.calibrate import calibrate_clip
+    from anglecam.calibration import write_calibration
+    from anglecam.report.calibration_figure import plot_calibration
+
     try:
         columns, rows = (int(side) for side in board.lower().split("x"))
     except ValueError:
@@ -171,12 +176,17 @@ def calibrate(
 def identify(
     session: SessionFolder,
     out: Out,
-    estimator: Annotated[str, typer.Option("--estimator", help=f"One of {', '.join(ESTIMATORS)}.")] = "oe2",
+    estimator: Annotated[str, typer.Option("--estimator", help="One of ekf, oe2, oe3, neck.")] = "oe2",
     neck: Annotated[
         Path | None, typer.Option("--neck", help="What is known of the neck, for --estimator neck; else the paper's.")
     ] = None,
 ) -> None:
     """Fit a model to a session: model.json, and model.mat for MATLAB."""
+    from anglecam.identification import ESTIMATORS
+    from anglecam.neck.file import read_neck
+    from anglecam.report.summary import model_table
+    from anglecam.session_results import identify_session
+
     if estimator not in ESTIMATORS:  # before any clip is measured
         raise RigError(f"--estimator {estimator}: choose one of {', '.join(ESTIMATORS)}")
     chosen: Estimator = estimator  # type: ignore[assignment]
@@ -202,6 +212,10 @@ def close(
     ] = None,
 ) -> None:
     """Find what the model lacks: loop.json, report.html and, where it helps, the command to play next."""
+    from anglecam.recordings import shown_to_loop
+    from anglecam.report.summary import loop_table, model_table
+    from anglecam.session_results import close_session
+
     opened, measured = _open(session, out)
     names = [*opened.rig.held_out, *(hold_out or ())]
     unknown = sorted(set(names) - {r.name for r in opened.recordings})
@@ -245,6 +259,8 @@ def main() -> None:
 
 def _open(session: Path, out: Path) -> tuple[Session, Measured]:
     """Read a session and measure its clips, writing their series to ``out``."""
+    from anglecam.recordings import measure_session
+
     opened = read_session(session)
     make_folder(out)
     _say_what_is_not_applied(opened.rig, session / "rig.yaml")
@@ -277,6 +293,8 @@ def _expand(paths: list[Path], problems: list[AnglecamError]) -> Iterator[Path]:
 
 def _film(source: Path, measurement: Measurement | MeasuredTracks) -> Path:
     """Return the film to draw an overlay on."""
+    from anglecam.marks.angle import MeasuredTracks
+
     if not isinstance(measurement, MeasuredTracks):
         return source
     if measurement.film is None:
@@ -285,6 +303,8 @@ def _film(source: Path, measurement: Measurement | MeasuredTracks) -> Path:
 
 
 def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement | MeasuredTracks:
+    from anglecam.recordings import measure_recording
+
     bar = bars.add_task(clip.name, total=None)
     _say_what_is_not_applied(rig, clip)
     with blame(clip):

@@ -1,7 +1,7 @@
 """`anglecam neck`: the paper's design calculations, a verb each.
 
 Every verb prints tables, or with ``--json`` one object and nothing else; with ``--out`` it writes both the numbers and
-figures. What control needs is imported where it is needed: python-control takes long to load.
+figures. What a verb needs is imported where it is needed: python-control, for one, takes long to load.
 """
 
 from __future__ import annotations
@@ -10,16 +10,17 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
 from anglecam.errors import RigError
 from anglecam.files import json_text, write_json
-from anglecam.neck.file import read_neck
-from anglecam.report.neck_numbers import Numbers, without_dust
 from anglecam.terminal import make_folder, screen
+
+if TYPE_CHECKING:
+    from anglecam.report.neck_numbers import Numbers
 
 app = typer.Typer(
     help="The paper's design calculations: linkage, statics, responses, design, control, sensitivities, power.",
@@ -47,6 +48,7 @@ def kinematics(
     as_json: Json = False,
 ) -> None:
     """Work out four-bar and turning mechanism: Table 3, limits, commands of wanted nods."""
+    from anglecam.neck.file import read_neck
     from anglecam.report.neck_figures import kinematics_figure, turning_figure
     from anglecam.report.neck_numbers import kinematics_numbers
     from anglecam.report.neck_tables import kinematics_tables
@@ -73,6 +75,7 @@ def statics(
     as_json: Json = False,
 ) -> None:
     """Hold spring against weight: balance, pretension, the servo's torque."""
+    from anglecam.neck.file import read_neck
     from anglecam.report.neck_figures import statics_figure
     from anglecam.report.neck_numbers import statics_numbers
     from anglecam.report.neck_tables import statics_tables
@@ -100,6 +103,7 @@ def response(
     Eqs. (28) and (31), SYS1 and SYS2, as in Figs. 10, 11, 14 and 15.
     """
     from anglecam.export import read_model
+    from anglecam.neck.file import read_neck
     from anglecam.neck_systems import driven_record, first_step, fitted_system, paper_systems, side_by_side
     from anglecam.report.neck_loop_figures import series_figure, step_figure
     from anglecam.report.neck_loop_numbers import response_numbers
@@ -152,6 +156,7 @@ def design(
 
     From a, b, c to what the neck is made of, and from a wish to another neck.
     """
+    from anglecam.neck.file import read_neck
     from anglecam.neck.linear import linear_neck
     from anglecam.neck.pd_tuning import ADULT
     from anglecam.neck.synthesis import Wish, synthesise
@@ -199,6 +204,7 @@ def pd(
 
     Eq. (37) and Fig. 16: of SYS2, of a fitted model, or with --neck of that neck.
     """
+    from anglecam.neck.file import read_neck
     from anglecam.neck.pd import PdGains, close_loop, gains_table
     from anglecam.neck.pd_tuning import tune_pd
     from anglecam.neck_procedure import chosen_plant, default_gains, simulated_loop, wanted_nod
@@ -243,6 +249,7 @@ def sensitivity(neck: NeckFile = None, out: Out = None, as_json: Json = False) -
 
     Fig. 9 a-f and normalised sensitivities.
     """
+    from anglecam.neck.file import read_neck
     from anglecam.neck.sensitivity import figure_9, sensitivities
     from anglecam.report.neck_figures import sensitivity_figure
     from anglecam.report.neck_numbers import sensitivity_numbers
@@ -291,6 +298,8 @@ def _tell(
     notes: Sequence[str] = (),
 ) -> None:
     """Print what was worked out and, where asked for, write it with its figures."""
+    from anglecam.report.neck_numbers import without_dust
+
     numbers = without_dust(numbers)
     if out is not None:
         make_folder(out)

@@ -30,9 +30,9 @@ def film(tmp_path_factory):
     """Three clips drawn by another program, of a plant that answers 40 ms late, and what is true of them."""
     folder = tmp_path_factory.mktemp("film")
     recordings = [
-        Recording("a-steps", "steps", duration_s=4.5),
-        Recording("b-chirp", "chirp", duration_s=5.0),
-        Recording("c-random", "random", duration_s=5.0, held_out=True),
+        Recording("a-steps", "steps", duration_s=3.0),
+        Recording("b-chirp", "chirp", duration_s=3.0),
+        Recording("c-random", "random", duration_s=3.0, held_out=True),
     ]
     truth = draw_session(folder, look=Look(marker="ring"), plant=Plant(dead_time_s=0.04), recordings=recordings, seed=5)
     return folder, truth

@@ -1,6 +1,6 @@
 """Clips that make trouble: every row is right within its sigma, or says why it is not there.
 
-`benchmarks/metrology.py` films more of them: codecs, lenses, flicker, vignetting, distractors.
+`benchmarks/metrology.py` films more of them: codecs, lenses, flicker, vignetting, distractors, occluders.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from synth.motion import move
 from synth.session import render
 from synth.spec import read_spec
 
-SWING = {"kind": "triangle", "amplitude_deg": 18, "period_s": 1.6}
-STAIRS = {"kind": "stairs", "levels_deg": [12, -10, 15, 0], "tread_s": 0.5}
+SWING = {"kind": "triangle", "amplitude_deg": 18, "period_s": 1.2}
+STAIRS = {"kind": "stairs", "levels_deg": [12, -10, 15], "tread_s": 0.4}
 
 
-def _measure(folder: Path, seconds: float = 2.0, command: dict = SWING, **spec) -> tuple[Measurement, np.ndarray]:
+def _measure(folder: Path, seconds: float = 1.6, command: dict = SWING, **spec) -> tuple[Measurement, np.ndarray]:
     """Film a clip, measure it, and return what is true at the times that it states, in degrees."""
     path = folder / "spec.yaml"
     recordings = [{"name": "clip", "duration_s": seconds, "command": command}]
@@ -87,16 +87,6 @@ def test_one_step_beside_a_larger_swaying_mug_of_the_lips_colour_is_measured_fro
     assert np.std(error / sigma) < 2.0
 
 
-def test_only_what_is_hidden_is_occluded_and_no_wrong_row_is_ok(tmp_path):
-    measured, truth = _measure(tmp_path, seconds=3.0, scene={"occluders": [{"from_s": 1.2, "for_s": 0.5}]})
-    status = np.array(measured.series.status)
-    assert set(status) == {"ok", "occluded"}
-    assert 8 <= (status == "occluded").sum() <= 16
-    assert np.ptp(np.flatnonzero(status == "occluded")) < 18
-    error, _ = _errors(measured, truth)
-    assert np.abs(error).max() < 0.01
-
-
 def test_a_declared_exposure_of_60_percent_of_the_interval_costs_no_row_and_is_in_sigma(tmp_path):
     measured, truth = _measure(tmp_path, camera={"exposure_s": 0.02}, declare={"camera": {"exposure_s": 0.02}})
     _all_right(measured, truth, 0.02)
@@ -105,7 +95,7 @@ def test_a_declared_exposure_of_60_percent_of_the_interval_costs_no_row_and_is_i
 def test_a_declared_tilt_is_undone_for_parts_at_every_height(tmp_path):
     measured, truth = _measure(
         tmp_path,
-        seconds=2.4,
+        seconds=1.7,
         command=STAIRS,
         camera={"codec": "ffv1"},
         effects={"camera_tilt": {"tilt_deg": 15.0}},
@@ -120,7 +110,6 @@ def test_a_declared_tilt_is_undone_for_parts_at_every_height(tmp_path):
 def test_a_declared_rolling_shutter_moves_the_time_of_each_row(tmp_path):
     measured, truth = _measure(
         tmp_path,
-        seconds=1.9,
         camera={"codec": "ffv1"},
         effects={"rolling_shutter": {"row_time_s": 3e-5}},
         declare={"camera": {"row_time_s": 3e-5}},

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,15 +14,21 @@ from anglecam.rig import Rig
 from anglecam.simulate.plant import Plant
 from support.motion import Plant as TruePlant
 from support.motion import Recording
-from support.series import record, session
+from support.series import noise, record, session
 
 TRUE = np.array([26.0, 524.0, 508.0])
+EXACT = session(TruePlant(), 0, sigma_deg=0.0)
+
+
+def noisy(seed, phi=0.0):
+    rng = np.random.default_rng(seed)
+    return [replace(r, angle=r.angle + noise(rng, len(r.time), np.radians(0.2), phi)) for r in EXACT]
 
 
 def test_a_b_c_lie_within_their_stated_uncertainty():
     normalised = []
     for seed in range(20):
-        records = session(TruePlant(), seed, sigma_deg=0.2)
+        records = noisy(seed)
         fit = fit_output_error(Plant(), records, start_parameters(records))
         normalised.append((fit.parameters - TRUE) / fit.sigma)
     spread = np.std(normalised, axis=0)
@@ -39,7 +47,7 @@ def test_no_guess_is_needed_to_find_another_plant(plant):
 def test_coloured_noise_is_counted_as_fewer_observations():
     normalised = []
     for seed in range(20):
-        records = session(TruePlant(), seed, sigma_deg=0.2, phi=0.6)
+        records = noisy(seed, phi=0.6)
         model = identify_records(records, Rig(), "oe2")
         normalised.append((model.values - TRUE) / model.sigmas)
     spread = np.std(normalised, axis=0)
