@@ -115,7 +115,7 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
     effect = forecast.effect
     early = [p for p in effect.parameters if not p.late]
     plant = plant_of(base).with_effect(replace(effect, parameters=tuple(early)))
-    own = base.own if effect.dry is None else _held(base, records)
+    own = _held(base, records)
 
     def fit_from(start: NDArray[np.float64]) -> Fit:
         values = np.append(base.parameters, start[: len(early)])
@@ -134,20 +134,21 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
             break
         fit = fit_from(start)
         best = fit if fit.cost < best.cost else best
-    if effect.dry is not None:  # on the way here initial states may have got into a valley of their own
-        again = fit_output_error(plant, records, [best.parameters], own=own, phi=base.phi)
-        best = again if again.cost < best.cost else best
+    # on the way here initial states may have got into a valley of their own
+    again = fit_output_error(plant, records, [best.parameters], own=own, phi=base.phi)
+    best = again if again.cost < best.cost else best
     return _with_late(base, effect, best, records)
 
 
 def _held(base: Fit, records: Sequence[Record]) -> list[NDArray[np.float64]]:
     """Return each recording's own unknowns at rest where no command has moved the head yet.
 
-    Dry friction stops a small initial rate within a frame, so that rate and angle there can hardly be told apart, and
-    a fit that starts with the base model's rate stays with it.
+    What holds a head or makes it answer late has kinks: dry friction, say, stops a small initial rate within a frame,
+    so that rate and angle there can hardly be told apart, and a fit that starts with the base model's rate keeps it.
     """
-    pairs = zip(base.own, (first_state(base.model, record) for record in records), strict=True)
-    return [np.concatenate([own[:1], first[1:]]) if first[1] == 0.0 else own for own, first in pairs]
+    first, states = [first_state(base.model, record) for record in records], base.model.states
+    at_rest = [np.concatenate([own[:1], np.zeros(states - 1), own[states:]]) for own in base.own]
+    return [rest if one[1] == 0.0 else own for own, rest, one in zip(base.own, at_rest, first, strict=True)]
 
 
 def _with_late(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record]) -> Fit:
