@@ -140,6 +140,20 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
     return _with_late(base, effect, best, records)
 
 
+def fit_beneath(base: Fit, candidates: Sequence[Candidate], records: Sequence[Record]) -> Fit:
+    """Fit a plant again from where it stands in the candidates, if one of them is better there even without its effect.
+
+    Beside another effect, whatever its size, a fit with kinks may have come out of the valley that it was in.
+    """
+    count = len(base.parameters)
+    starts = [(c.fit.parameters[:count], c.fit.own) for c in candidates]
+    costs = [output_error(base.model, values, records, own, base.phi) for values, own in starts]
+    if not costs or min(costs) >= base.cost:
+        return base
+    values, own = starts[int(np.argmin(costs))]
+    return fit_output_error(base.model, records, [values], own=own, phi=base.phi)
+
+
 def _held(base: Fit, records: Sequence[Record]) -> list[NDArray[np.float64]]:
     """Return each recording's own unknowns at rest where no command has moved the head yet.
 

@@ -18,7 +18,15 @@ from anglecam.effects import LEDGER, Effect
 from anglecam.estimate.noise import Noise, autoregression
 from anglecam.estimate.output_error import Fit
 from anglecam.estimate.record import Record
-from anglecam.loop.attribute import Candidate, fit_candidates, fit_with, promising, side_by_side
+from anglecam.loop.attribute import (
+    Candidate,
+    fit_beneath,
+    fit_candidates,
+    fit_with,
+    log_likelihood_gain,
+    promising,
+    side_by_side,
+)
 from anglecam.loop.gate import Gate, test_residual
 from anglecam.loop.holdout import Prediction, compare, predict_unseen
 from anglecam.loop.refit import effects_of, left_of, recoloured, without
@@ -33,6 +41,8 @@ unexplained: it may be the measurement's own."""
 SURE = 0.01
 """After an effect has proven itself, what remains must be this improbable as noise to be traced further, or to take the
 verdict back."""
+WORTH_A_LOOK = 1.0
+"""Log-likelihood by which a better fit of the same model makes its residual worth testing anew."""
 FAITHFUL = 0.01
 """No structure smaller than this share of what the base model leaves is traced: no model of an effect is truer."""
 FINEST = math.radians(1e-3)
@@ -112,17 +122,15 @@ def trace(task: Task, first: Round, candidates: Sequence[Candidate]) -> Round:
     now, negligible = first, smallest(task, first)
     while candidates:
         if _convincing(task, now, candidates[0], negligible):
-            now = _added(task, candidates[0])
-            candidates = _next(task, now)
+            now, candidates = _next(task, _added(task, candidates[0]))
             continue
         # one effect may mask another: neither helps alone, and both do together
         if len(effects_of(now.fit)) + 2 > MOST_EFFECTS:
             break
-        more = _next(task, _added(task, candidates[0]))
+        _, more = _next(task, _added(task, candidates[0]))
         if not more or not _convincing(task, now, more[0], negligible):
             break
-        now = _added(task, more[0])
-        candidates = _next(task, now)
+        now, candidates = _next(task, _added(task, more[0]))
     return now
 
 
@@ -151,10 +159,15 @@ def _added(task: Task, best: Candidate) -> Round:
     return look(task, fit)
 
 
-def _next(task: Task, now: Round) -> list[Candidate]:
+def _next(task: Task, now: Round) -> tuple[Round, list[Candidate]]:
+    """Look for what to add next, and on the way for a better fit of what there is."""
     if now.gate.p_value >= SURE or len(effects_of(now.fit)) == MOST_EFFECTS:
-        return []
-    return candidates_of(task, now)
+        return now, []
+    candidates = candidates_of(task, now)
+    deeper = fit_beneath(now.fit, candidates, task.fitted)
+    if log_likelihood_gain(now.fit.cost, deeper.cost, len(deeper.white)) > WORTH_A_LOOK:
+        return _next(task, look(task, deeper))
+    return now, candidates
 
 
 def _colour(task: Task, fit: Fit, moved: Sequence[Change]) -> float:
