@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import special
 
 from anglecam.effects import LEDGER, Effect
 from anglecam.estimate.noise import Noise, autoregression
@@ -39,8 +40,8 @@ NEGLIGIBLE = 2.0
 """In a film, structure smaller than this many times the angle's stated uncertainty is neither traced nor called
 unexplained: it may be the measurement's own."""
 SURE = 0.01
-"""After an effect has proven itself, what remains must be this improbable as noise to be traced further, or to take the
-verdict back."""
+"""What an effect explains must be this improbable as noise; and so must what remains once one has proven itself, to be
+traced further or to take the verdict back."""
 WORTH_A_LOOK = 1.0
 """Log-likelihood by which a better fit of the same model makes its residual worth testing anew."""
 FAITHFUL = 0.01
@@ -119,22 +120,32 @@ def trace(task: Task, first: Round, candidates: Sequence[Candidate]) -> Round:
     Round
         The best model's.
     """
-    now, negligible = first, smallest(task, first)
+    now, negligible, been = first, smallest(task, first), [_names(first)]
     while candidates:
-        if _convincing(task, now, candidates[0], negligible):
-            now, candidates = _next(task, _added(task, candidates[0]))
-            continue
-        # one effect may mask another: neither helps alone, and both do together
-        if len(effects_of(now.fit)) + 2 > MOST_EFFECTS:
+        best = candidates[0]
+        if not _convincing(task, now, best, negligible):
+            # one effect may mask another: neither helps alone, and both do together
+            if len(effects_of(now.fit)) + 2 > MOST_EFFECTS:
+                break
+            _, more = _next(task, _added(task, best))
+            if not more or not _convincing(task, now, more[0], negligible):
+                break
+            best = more[0]
+        added = _added(task, best)
+        if _names(added) in been:  # what is taken out for it would be put in again without end
             break
-        _, more = _next(task, _added(task, candidates[0]))
-        if not more or not _convincing(task, now, more[0], negligible):
-            break
-        now, candidates = _next(task, _added(task, more[0]))
+        been.append(_names(added))
+        now, candidates = _next(task, added)
     return now
 
 
+def _names(one: Round) -> set[str]:
+    return {effect.id for effect in effects_of(one.fit)}
+
+
 def _convincing(task: Task, now: Round, best: Candidate, negligible: float) -> bool:
+    if 2.0 * best.log_likelihood_gain <= special.chdtri(len(best.effect.parameters), SURE):
+        return False  # noise would fit as well; and of two intervals one is easily above zero
     # a second left out may hold all that tells of a limit, which what was declared then does
     pairs = ((now.told, best.told), (now.unseen, best.unseen))
     return any(
