@@ -24,6 +24,8 @@ TOLD_APART = 4.0
 """Two ways of measuring differ where they do so by this many times what no course explains …"""
 COURSE = 0.9
 """… and this share of the difference follows angle and rate, as what a camera does to an angle must."""
+DOUBT = 0.5
+"""Share of `TOLD_APART` from which on they may differ."""
 
 
 def uncorrected(series: Sequence[AngleSeries]) -> tuple[list[AngleSeries], bool]:
@@ -45,7 +47,10 @@ def uncorrected(series: Sequence[AngleSeries]) -> tuple[list[AngleSeries], bool]
     marked = [(one, other) for one, other in zip(series, plain, strict=True) if other is not None]
     if not any(_apart(one, other, one.angle) for one, other in marked):
         return list(series), False
-    only_pivot = not any(_apart(one, other, _about_mark(one)) for one, other in marked)
+    beside = [(one, other, _about_mark(one)) for one, other in marked]
+    only_pivot: bool | None = not any(_apart(*three) for three in beside)
+    if only_pivot and any(_apart(*three, clearly=DOUBT) for three in beside):
+        only_pivot = None
     return [
         one if other is None else replace(other, only_pivot_differs=only_pivot)
         for one, other in zip(series, plain, strict=True)
@@ -89,14 +94,14 @@ def _side(series: AngleSeries) -> float:
     return -1.0 if np.nanmedian((series.mouth_px - series.pivot_px)[:, 0] * np.cos(series.line)) < 0.0 else 1.0
 
 
-def _apart(measured: AngleSeries, plain: AngleSeries, angle: Floats) -> bool:
+def _apart(measured: AngleSeries, plain: AngleSeries, angle: Floats, clearly: float = 1.0) -> bool:
     """Tell whether the plain line parts from ``angle``, which is what was measured or comes of it, on a course."""
     ok = measured.ok
     off = np.unwrap((plain.angle - angle)[ok])
     found = np.unwrap((plain.angle - measured.angle)[ok])
     rough = float(np.std(found - _course(found, measured)))
-    on_course = np.std(off - _course(off, measured)) ** 2 <= (1.0 - COURSE) * np.var(off)
-    return bool(on_course and np.std(off) > max(FINEST, TOLD_APART * rough))
+    on_course = np.std(off - _course(off, measured)) ** 2 <= (1.0 - clearly * COURSE) * np.var(off)
+    return bool(on_course and np.std(off) > max(FINEST, clearly * TOLD_APART * rough))
 
 
 def _course(off: Floats, series: AngleSeries) -> Floats:

@@ -51,6 +51,13 @@ def test_a_bent_view_is_not_taken_for_a_mark_beside_the_axis():
     assert series[0].only_pivot_differs is False
 
 
+def test_where_it_cannot_be_said_whether_more_than_the_mark_is_beside_nothing_is_said():
+    barely = filmed((6.0, -4.0), shown=lambda line: line + 0.0075 * line**2)
+    series, differs = uncorrected([barely])
+    assert differs
+    assert series[0].only_pivot_differs is None
+
+
 def test_noise_however_large_is_no_difference():
     one = filmed((0.0, 0.0), noise_px=0.5)
     series, differs = uncorrected([one])

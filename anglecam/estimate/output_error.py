@@ -121,19 +121,35 @@ class Fit:
         product = [np.outer(self.white[part], self.white[part] @ jacobian[part]) for part in parts]
         return np.concatenate(product) / variance * len(parts) / max(1, len(parts) - 1)
 
-    def _covariance(self, correlate: Callable[[Floats], Floats]) -> Floats:
+    def pulled_by_offset(self, records: Sequence[Record]) -> Floats:
+        """Return (p,) by how much each parameter changes with an offset that all angles share, SI per rad.
+
+        Nothing where zeros are fitted, which take it up; NaN for a parameter that its bound holds.
+        """
+        free, jacobian, norm = self._free_columns()
+        ones = np.concatenate([whiten(r, self.phi, np.ones(len(r.time))) for r in records])
+        change = np.linalg.lstsq(jacobian, ones, rcond=None)[0] / norm
+        told = np.full(len(self.parameters), np.nan)
+        told[free] = change[: int(free.sum())]
+        return told
+
+    def _free_columns(self) -> tuple[NDArray[np.bool_], Floats, Floats]:
+        """Return which parameters no bound holds, and theirs and all own columns of the Jacobian over their norms."""
         p = len(self.parameters)
         margin = 1e-6 * self.model.scales
         free = (self.parameters > self.model.lower + margin) & (self.parameters < self.model.upper - margin)
         columns = np.concatenate([free, np.ones(self.jacobian.shape[1] - p, bool)])
         norm = np.linalg.norm(self.jacobian[:, columns], axis=0)
         norm[norm == 0.0] = 1.0
-        jacobian = self.jacobian[:, columns] / norm
+        return free, self.jacobian[:, columns] / norm, norm
+
+    def _covariance(self, correlate: Callable[[Floats], Floats]) -> Floats:
+        free, jacobian, norm = self._free_columns()
+        p, n = len(free), int(free.sum())
         variance = self.cost / max(1, len(self.white) - jacobian.shape[1])
         bread = np.linalg.pinv(jacobian.T @ jacobian)
         covariance = variance * bread @ (jacobian.T @ correlate(jacobian)) @ bread
         covariance /= np.outer(norm, norm)
-        n = int(free.sum())
         told = np.full((p, p), np.nan)  # a parameter held by its bound has none
         told[np.ix_(free, free)] = covariance[:n, :n]
         return told

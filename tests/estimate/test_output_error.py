@@ -80,3 +80,12 @@ def test_prediction_of_a_held_out_recording_leaves_the_noise():
     *fitted, held_out = session(TruePlant(), 3, sigma_deg=0.1)
     fit = fit_output_error(Plant(), fitted, start_parameters(fitted))
     assert np.degrees(predict_output_error(fit, [held_out]).rmse) == pytest.approx(0.1, rel=0.1)
+
+
+def test_an_offset_of_all_angles_changes_parameters_as_foretold_and_nothing_where_zeros_are_fitted():
+    known = [replace(r, zero_known=True) for r in EXACT]
+    fit = fit_output_error(Plant(), known, [TRUE])
+    off = fit_output_error(Plant(), [replace(r, angle=r.angle + 1e-4) for r in known], [TRUE])
+    assert (off.parameters - fit.parameters) / 1e-4 == pytest.approx(fit.pulled_by_offset(known), rel=0.005)
+    free = noisy(0)
+    assert np.all(np.abs(fit_output_error(Plant(), free, [TRUE]).pulled_by_offset(free)) < 1e-6 * TRUE)
