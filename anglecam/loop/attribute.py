@@ -110,8 +110,11 @@ def fit_candidates(
     return sorted(candidates, key=lambda c: (-c.evidence, -c.log_likelihood_gain))
 
 
-def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
-    """Fit the plant of ``base`` with one more effect, from where the screen would start, or else the effect itself."""
+def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast, *, late: bool = True) -> Fit:
+    """Fit the plant of ``base`` with one more effect, from where the screen would start, or else the effect itself.
+
+    Its ``late`` parameters, which take most of the time, are let in as far as the data ask for them, or not at all.
+    """
     effect = forecast.effect
     early = [p for p in effect.parameters if not p.late]
     plant = plant_of(base).with_effect(replace(effect, parameters=tuple(early)))
@@ -137,7 +140,7 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast) -> Fit:
     # on the way here initial states may have got into a valley of their own
     again = fit_output_error(plant, records, [best.parameters], own=own, phi=base.phi)
     best = again if again.cost < best.cost else best
-    return _with_late(base, effect, best, records)
+    return _with_late(base, effect, best, records) if late else best
 
 
 def fit_beneath(base: Fit, candidates: Sequence[Candidate], records: Sequence[Record]) -> Fit:

@@ -188,7 +188,7 @@ def _colour(task: Task, fit: Fit, moved: Sequence[Change]) -> float:
     the distance from the pivot, which no model enters, says where colour ends and structure begins.
     """
     likely = forecasts(fit, directions(fit, task.fitted, moved))[:LIKELIEST]
-    fits = [fit, *side_by_side(lambda one: fit_with(fit, task.fitted, one), likely)]
+    fits = [fit, *side_by_side(lambda one: fit_with(fit, task.fitted, one, late=False), likely)]
     best = min(fits, key=lambda one: one.cost)
     phi = autoregression(best.residuals, "residual").phi
     return phi if task.floor is None else min(phi, max(0.0, task.floor.phi + 1.645 * task.floor.phi_error))
