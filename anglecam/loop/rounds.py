@@ -170,14 +170,14 @@ def _added(task: Task, best: Candidate) -> Round:
     return look(task, fit)
 
 
-def _next(task: Task, now: Round, valleys: int = 3) -> tuple[Round, list[Candidate]]:
-    """Look for what to add next, and on the way, so many times at most, for a better fit of what there is."""
+def _next(task: Task, now: Round, *, again: bool = True) -> tuple[Round, list[Candidate]]:
+    """Look for what to add next, and on the way, once, for a better fit of what there is."""
     if now.gate.p_value >= SURE or len(effects_of(now.fit)) == MOST_EFFECTS:
         return now, []
     candidates = candidates_of(task, now)
     deeper = fit_beneath(now.fit, candidates, task.fitted)
-    if valleys > 0 and log_likelihood_gain(now.fit.cost, deeper.cost, len(deeper.white)) > WORTH_A_LOOK:
-        return _next(task, look(task, deeper), valleys - 1)
+    if again and log_likelihood_gain(now.fit.cost, deeper.cost, len(deeper.white)) > WORTH_A_LOOK:
+        return _next(task, look(task, deeper), again=False)
     return now, candidates
 
 
