@@ -25,7 +25,7 @@ TOLD_APART = 4.0
 COURSE = 0.9
 """… and this share of the difference follows angle and rate, as what a camera does to an angle must."""
 DOUBT = 0.5
-"""Share of `TOLD_APART` from which on they may differ."""
+"""Share of `TOLD_APART` and `COURSE` from which on they may differ."""
 
 
 def uncorrected(series: Sequence[AngleSeries]) -> tuple[list[AngleSeries], bool]:

@@ -1,6 +1,6 @@
 """Clips that make trouble: every row is right within its sigma, or says why it is not there.
 
-`benchmarks/metrology.py` films more of them: codecs, lenses, flicker, vignetting, distractors, occluders.
+`benchmarks/metrology.py` films more of them: codecs, lenses, flicker, vignetting, distractors.
 """
 
 from __future__ import annotations
@@ -85,6 +85,17 @@ def test_one_step_beside_a_larger_swaying_mug_of_the_lips_colour_is_measured_fro
     assert measured.series.ok.mean() > 0.95
     assert np.abs(error).max() < 0.1
     assert np.std(error / sigma) < 2.0
+
+
+def test_only_what_is_hidden_is_occluded_and_no_wrong_row_is_ok(tmp_path):
+    scene = {"occluders": [{"from_s": 1.2, "for_s": 0.5}]}
+    measured, truth = _measure(tmp_path, seconds=3.0, command=SWING | {"period_s": 1.6}, scene=scene)
+    status = np.array(measured.series.status)
+    assert set(status) == {"ok", "occluded"}
+    assert 8 <= (status == "occluded").sum() <= 16
+    assert np.ptp(np.flatnonzero(status == "occluded")) < 18
+    error, _ = _errors(measured, truth)
+    assert np.abs(error).max() < 0.01
 
 
 def test_a_declared_exposure_of_60_percent_of_the_interval_costs_no_row_and_is_in_sigma(tmp_path):
