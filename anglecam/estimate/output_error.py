@@ -9,6 +9,7 @@ Ljung, System Identification, 2nd ed., 1999, sec. 7.5.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -17,7 +18,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 from threadpoolctl import ThreadpoolController
 
 from anglecam.effects import UNSEEN, View
@@ -30,6 +31,10 @@ STEP = 1e-6
 """Of the difference quotients, as a share of a parameter."""
 CLUSTER = 15
 """Frames; errors further apart than this count as independent."""
+SETTLED = 1e-3
+"""Log-likelihood; a fit that has gained no more by its last `PATIENCE` steps is as good as it will be. Along a ridge it
+would crawl for many more, and where the angle has kinks one small step may come before a large one."""
+PATIENCE = 3
 _BLAS = ThreadpoolController()
 """The matrices here have some twenty columns: threads that wait for each other made a fit ten times slower."""
 
@@ -326,8 +331,15 @@ def _fit_once(
         return Fit(model, parameters, tuple(unknowns), left, slopes, phi, white)
 
     inside = np.clip(x0, np.nextafter(lower, np.inf), np.nextafter(upper, -np.inf))
-    if not np.all(np.isfinite(errors(inside))):
+    costs = [0.5 * float(np.sum(errors(inside) ** 2))]
+    if not math.isfinite(costs[0]):
         return ended(x0, np.full(rows[-1], np.inf), np.zeros((rows[-1], len(x0))))
+
+    def settled(intermediate_result: OptimizeResult) -> None:
+        costs.append(intermediate_result.cost)
+        if len(costs) > PATIENCE and costs[-1 - PATIENCE] - costs[-1] <= 2.0 * SETTLED / rows[-1] * costs[-1]:
+            raise StopIteration
+
     found = least_squares(
         lambda x: errors(whole(x)),
         inside[free],
@@ -338,9 +350,11 @@ def _fit_once(
         ftol=1e-9,
         gtol=1e-12,
         max_nfev=60,
+        callback=settled,
     )
-    x = whole(found.x)
-    return ended(x, errors(x), -jacobian(x))
+    slopes = np.zeros((rows[-1], len(x0)))
+    slopes[:, free] = -found.jac
+    return ended(whole(found.x), found.fun, slopes)
 
 
 def first_state(model: Model, record: Record) -> Floats:

@@ -127,7 +127,7 @@ def trace(task: Task, first: Round, candidates: Sequence[Candidate]) -> Round:
             # one effect may mask another: neither helps alone, and both do together
             if len(effects_of(now.fit)) + 2 > MOST_EFFECTS:
                 break
-            _, more = _next(task, _added(task, best))
+            _, more = _next(task, _added(task, best), negligible)
             if not more or not _convincing(task, now, more[0], negligible):
                 break
             best = more[0]
@@ -135,7 +135,7 @@ def trace(task: Task, first: Round, candidates: Sequence[Candidate]) -> Round:
         if _names(added) in been:  # what is taken out for it would be put in again without end
             break
         been.append(_names(added))
-        now, candidates = _next(task, added)
+        now, candidates = _next(task, added, negligible)
     return now
 
 
@@ -170,14 +170,14 @@ def _added(task: Task, best: Candidate) -> Round:
     return look(task, fit)
 
 
-def _next(task: Task, now: Round, *, again: bool = True) -> tuple[Round, list[Candidate]]:
+def _next(task: Task, now: Round, negligible: float, *, again: bool = True) -> tuple[Round, list[Candidate]]:
     """Look for what to add next, and on the way, once, for a better fit of what there is."""
-    if now.gate.p_value >= SURE or len(effects_of(now.fit)) == MOST_EFFECTS:
+    if now.gate.p_value >= SURE or now.fit.rmse <= negligible or len(effects_of(now.fit)) == MOST_EFFECTS:
         return now, []
     candidates = candidates_of(task, now)
     deeper = fit_beneath(now.fit, candidates, task.fitted)
     if again and log_likelihood_gain(now.fit.cost, deeper.cost, len(deeper.white)) > WORTH_A_LOOK:
-        return _next(task, look(task, deeper), again=False)
+        return _next(task, look(task, deeper), negligible, again=False)
     return now, candidates
 
 
