@@ -35,6 +35,8 @@ SETTLED = 1e-3
 """Log-likelihood; a fit that has gained no more by its last `PATIENCE` steps is as good as it will be. Along a ridge it
 would crawl for many more, and where the angle has kinks one small step may come before a large one."""
 PATIENCE = 3
+HEAT, MOST = 8, 60
+"""Evaluations that each of several starts is given before the best of them goes on, and that a fit may take."""
 _BLAS = ThreadpoolController()
 """The matrices here have some twenty columns: threads that wait for each other made a fit ten times slower."""
 
@@ -214,7 +216,7 @@ def fit_output_error(
     records : sequence of Record
         All fitted at once.
     starts : sequence of (p,) ndarray
-        Shared parameters to start from, SI; the best end is kept.
+        Shared parameters to start from, SI; of several, only the one that is best after a few steps goes on.
     own : sequence of ndarray, optional
         Starts of each recording's own unknowns; from its first frames otherwise.
     phi : float
@@ -230,8 +232,12 @@ def fit_output_error(
     own = [first_state(model, record) for record in records] if own is None else list(own)
     # a trial step may let the plant run away; its cost is then not finite and the step is refused
     with _BLAS.limit(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
-        fits = [_fit_once(model, records, np.clip(s, model.lower, model.upper), own, phi, fixed) for s in starts]
-    return min(fits, key=lambda fit: fit.cost)
+        start = starts[0]
+        if len(starts) > 1:
+            heats = [_fit_once(model, records, one, own, phi, fixed, HEAT) for one in starts]
+            best = min(heats, key=lambda fit: fit.cost)
+            start, own = best.parameters, list(best.own)
+        return _fit_once(model, records, start, own, phi, fixed, MOST)
 
 
 def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:
@@ -268,8 +274,9 @@ def output_error(
 
 
 def _fit_once(
-    model: Model, records: Sequence[Record], start: Floats, own: Sequence[Floats], phi: float, fixed: bool
+    model: Model, records: Sequence[Record], start: Floats, own: Sequence[Floats], phi: float, fixed: bool, most: int
 ) -> Fit:
+    start = np.clip(start, model.lower, model.upper)
     p = len(start)
     edges = np.cumsum([p, *(len(o) for o in own)])
     rows = np.cumsum([0, *(len(r.time) for r in records)])
@@ -349,7 +356,7 @@ def _fit_once(
         xtol=1e-9,
         ftol=1e-9,
         gtol=1e-12,
-        max_nfev=60,
+        max_nfev=most,
         callback=settled,
     )
     slopes = np.zeros((rows[-1], len(x0)))

@@ -120,26 +120,26 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast, *, late: 
     plant = plant_of(base).with_effect(replace(effect, parameters=tuple(early)))
     own = _held(base, records)
 
-    def fit_from(start: NDArray[np.float64]) -> Fit:
-        values = np.append(base.parameters, start[: len(early)])
-        return fit_output_error(plant, records, [values], own=own, phi=base.phi)
+    def fit_from(*starts: NDArray[np.float64]) -> Fit:
+        values = [np.append(base.parameters, start[: len(early)]) for start in starts]
+        return fit_output_error(plant, records, values, own=own, phi=base.phi)
 
     first = effect.null
     first[0] = effect.parameters[0].starts[0]
     near = [effect.null + share * (forecast.start - effect.null) for share in (0.5, 2.0)]
+    # several parameters may have several valleys, and dry friction has them whenever a head is held or sets off
     several = len(early) > 1 or effect.dry is not None
-    enough = math.inf if several else FULFILLED
-    best = fit_from(forecast.start)
-    # several parameters may have several valleys, and dry friction has them whenever a head is held or sets off; and
+    further = [(near, HOPEFUL)] if several else [([forecast.tried, first], FULFILLED), (near, HOPEFUL)]
+    best = fit_from(forecast.start, forecast.tried, first) if several else fit_from(forecast.start)
     # what a limit does is not in proportion: scaled down it may do nothing, where nothing tells which way to go
-    for start, share in ((forecast.tried, enough), (first, enough), (near[0], HOPEFUL), (near[1], HOPEFUL)):
-        if log_likelihood_gain(base.cost, best.cost, len(base.white)) >= share * forecast.gain:
-            break
-        fit = fit_from(start)
-        best = fit if fit.cost < best.cost else best
-    # on the way here initial states may have got into a valley of their own
-    again = fit_output_error(plant, records, [best.parameters], own=own, phi=base.phi)
-    best = again if again.cost < best.cost else best
+    for starts, share in further:
+        if log_likelihood_gain(base.cost, best.cost, len(base.white)) < share * forecast.gain:
+            fit = fit_from(*starts)
+            best = fit if fit.cost < best.cost else best
+    if plant.kinked:
+        # on the way here initial states may have got into a valley of their own
+        again = fit_output_error(plant, records, [best.parameters], own=own, phi=base.phi)
+        best = again if again.cost < best.cost else best
     return _with_late(base, effect, best, records) if late else best
 
 

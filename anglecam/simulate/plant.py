@@ -67,6 +67,11 @@ class Plant:
         """Factors from SI to the units in `names`."""
         return np.array([1.0] * self.base_count + [p.to_file for e in self.effects for p in e.parameters])
 
+    @property
+    def kinked(self) -> bool:
+        """Whether torque jumps or bends: something holds the head, limits what pulls at it or leaves it unanswered."""
+        return any(e.port in ("servo", "dry") for e in self.effects)
+
     def with_effect(self, effect: Effect) -> Plant:
         """Return the plant with one more effect."""
         return Plant((*self.effects, effect), self.driven)
