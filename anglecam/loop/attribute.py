@@ -189,13 +189,14 @@ def _with_late(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record]) -
 
 
 def rivals(
-    best: Fit, base: Fit, records: Sequence[Record], effect: Effect, others: Sequence[Forecast]
+    best: Fit, base: Fit, records: Sequence[Record], effect: Effect, others: Sequence[Forecast], camera: float = 0.0
 ) -> dict[str, Fit]:
     """Keep every effect that could have made the data in which ``effect`` explains this much more than it.
 
     If B were true, log L(A) − log L(B) would be normal with mean −d²/2 and variance d², d being the distance in
     standard deviations of the noise from B's prediction to the nearest that A can give (Cox, J. R. Statist. Soc. B
     24, 1962). Whatever d is, the gap is then larger than z²/2 no more often than a normal variable is larger than z.
+    In a film there are errors that follow the motion too: what is finer than the angle's uncertainty decides nothing.
 
     Parameters
     ----------
@@ -209,6 +210,8 @@ def rivals(
         A.
     others : sequence of Forecast
         Each a B.
+    camera : float
+        Stated uncertainty of a film's angle, rad; 0 for a series from elsewhere.
 
     Returns
     -------
@@ -221,7 +224,7 @@ def rivals(
     return {
         other.effect.id: fit
         for other, fit, gap in zip(others, fits, gaps, strict=True)
-        if gap <= widest and other.effect.id != effect.id
+        if (gap <= widest or fit.rmse**2 - best.rmse**2 <= camera**2) and other.effect.id != effect.id
     }
 
 

@@ -203,4 +203,4 @@ def _rivals(fit: Fit, effect: Effect, task: Task) -> dict[str, Fit]:
     base, best = without(fit, effect, task.fitted), with_last(fit, effect, task.fitted)
     moved = changes(base, task.fitted, left_of(task.ledger, fit))
     others = promising(forecasts(base, directions(base, task.fitted, moved)))
-    return rivals(best, base, task.fitted, effect, others)
+    return rivals(best, base, task.fitted, effect, others, task.camera)

@@ -99,8 +99,17 @@ def smallest(task: Task, first: Round) -> float:
 
 
 def candidates_of(task: Task, now: Round) -> list[Candidate]:
-    """Fit what is promising beside what the model has, strongest evidence first."""
-    return fit_candidates(now.fit, now.unseen, task.fitted, task.predicted, now.forecasts)
+    """Fit what is promising beside what the model has, strongest evidence first.
+
+    Of those that differ from the best by less than a film's angle is uncertain, the one with fewest parameters.
+    """
+    found = fit_candidates(now.fit, now.unseen, task.fitted, task.predicted, now.forecasts)
+    if not found or task.camera == 0.0:
+        return found
+    widest = found[0].fit.rmse ** 2 + task.camera**2
+    alike = [one for one in found if one.unseen is not None and one.fit.rmse**2 <= widest]
+    first = min(alike, key=lambda one: len(one.effect.parameters))
+    return [first, *(one for one in found if one is not first)]
 
 
 def trace(task: Task, first: Round, candidates: Sequence[Candidate]) -> Round:
