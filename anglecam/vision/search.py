@@ -284,9 +284,7 @@ def _follow(
     # what goes to and fro on a straight line turns about nothing that could be seen
     bent = 1.0 - np.exp(-((_off_a_line(place) / _BENT_PX) ** 2))
     return _Track(
-        score
-        * np.exp(-np.mean((off[members] / _TOLERANCE_PX) ** 2))
-        * (_STRAIGHT + (1.0 - _STRAIGHT) * bent),
+        score * np.exp(-np.mean((off[members] / _TOLERANCE_PX) ** 2)) * (_STRAIGHT + (1.0 - _STRAIGHT) * bent),
         level,
         members,
         patches,

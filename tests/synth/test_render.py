@@ -20,7 +20,7 @@ from support.oracle import border, centroid, coverage
 from synth.draw.engine import make_engine
 from synth.errors import SpecError
 from synth.mechanism import Part, build, poses
-from synth.render import Studio
+from synth.render import Solo, Studio
 from synth.session import render
 from synth.spec import Render, Spec
 from synth.take import marks, perform, view
@@ -169,7 +169,7 @@ def test_the_picture_is_the_analytic_oracles_and_the_truth_is_where_it_shows_the
             assert np.sqrt(np.mean((picture[..., 0] - drawn)[(drawn > 0) & (drawn < 1)] ** 2)) < 0.02
 
 
-def test_a_worker_that_dies_is_replaced_and_no_frame_is_lost():
+def test_a_worker_that_dies_is_replaced_and_no_frame_is_lost_and_without_workers_the_frames_are_the_same():
     spec = Spec.model_validate(SPEC)
     seen = view(spec)
     (take, _) = perform(spec, seen)
@@ -183,6 +183,8 @@ def test_a_worker_that_dies_is_replaced_and_no_frame_is_lost():
                 (worker,) = multiprocessing.active_children()
                 worker.kill()
     np.testing.assert_array_equal(disturbed, undisturbed)
+    with Solo(spec, seen) as solo:
+        np.testing.assert_array_equal(list(solo.film(take, frames[::7])), undisturbed[::7])
 
 
 def test_the_lips_are_as_red_as_declared(rendered):
