@@ -17,6 +17,7 @@ import pytest
 import yaml
 
 from support.oracle import border, centroid, coverage
+from synth.cli import main
 from synth.draw.engine import make_engine
 from synth.errors import SpecError
 from synth.mechanism import Part, build, poses
@@ -228,13 +229,17 @@ def test_a_session_does_not_mix_with_older_files(tmp_path):
         ({"rig": {"lever_px": 400}}, "recordings.0.command: the mouth would leave"),
     ],
 )  # fmt: skip
-def test_a_bad_spec_ends_with_status_2_and_one_line(tmp_path, changes, key):
+def test_a_bad_spec_ends_with_status_2_and_one_line(tmp_path, monkeypatch, capfd, changes, key):
     path = write_spec(tmp_path, **changes)
-    call = [str(Path(sys.executable).with_name("synth")), "render", str(path), "--out", "o", "--truth", "t"]
-    ended = subprocess.run(call, capture_output=True, text=True, cwd=tmp_path, check=False)
-    assert ended.returncode == 2
-    assert key in ended.stderr
-    assert len(ended.stderr.splitlines()) == 1
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["synth", "render", str(path), "--out", "o", "--truth", "t"])
+    monkeypatch.setattr(signal, "signal", lambda *_: None)  # the tests' own process stays as it is
+    with pytest.raises(SystemExit) as ended:
+        main()
+    told = capfd.readouterr().err
+    assert ended.value.code == 2
+    assert key in told
+    assert len(told.splitlines()) == 1
     assert {path.name for path in tmp_path.iterdir()} == {"spec.yaml"}
 
 
