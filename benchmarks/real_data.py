@@ -152,7 +152,9 @@ def force_error(found: dict[str, float], folder: Path, name: str = "DATA_EMPS") 
 
 
 def fit_emps(records: Sequence[Record]) -> list[tuple[str, Fit, Fit]]:
-    """Fit viscous friction, then Coulomb friction beside it, then one that differs in the two directions.
+    """Fit viscous friction, then Coulomb friction with an offset beside it, then viscous friction that is uneven too.
+
+    The models are those that were published: with Stribeck's curve, dry friction can stand in for the uneven viscous.
 
     Returns
     -------
@@ -163,7 +165,8 @@ def fit_emps(records: Sequence[Record]) -> list[tuple[str, Fit, Fit]]:
     base = fit_output_error(Plant(), fitted, start_parameters(fitted))
     fitted, held_out = (windows(part, base.parameters) for part in (fitted, held_out))
     viscous = fit_output_error(Plant(), fitted, [base.parameters])
-    dry = grow(viscous, fitted, effect("coulomb_friction"), 0.3)
+    coulomb = effect("coulomb_friction")
+    dry = grow(viscous, fitted, replace(coulomb, parameters=coulomb.parameters[:2]), 0.3)
     uneven = grow(dry, fitted, effect("damping_asymmetry"), 0.0)
     named = [("viscous", viscous), ("+ coulomb_friction", dry), ("+ damping_asymmetry", uneven)]
     return [(name, fit, predict_output_error(fit, held_out)) for name, fit in named]
