@@ -25,7 +25,8 @@ from scipy.io import loadmat
 from scipy.signal import butter, decimate, filtfilt
 
 from anglecam.effects import Effect, effect
-from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error
+from anglecam.estimate.fit import Fit
+from anglecam.estimate.output_error import fit_output_error, predict_output_error
 from anglecam.estimate.record import Record
 from anglecam.estimate.shooting import windows
 from anglecam.estimate.start import start_parameters

@@ -25,7 +25,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.estimate.output_error import Fit
+from anglecam.estimate.fit import Fit
 from anglecam.estimate.record import LEAST_FRAMES, Record
 
 Floats = NDArray[np.float64]

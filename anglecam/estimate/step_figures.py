@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.estimate.crossings import HIGH, LOW, first_crossing, settling
-from anglecam.estimate.output_error import Model
+from anglecam.estimate.fit import Model
 from anglecam.session import Command
 
 Floats = NDArray[np.float64]

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy import special
 
 from anglecam.effects import Effect
-from anglecam.estimate.output_error import Fit, first_state, fit_output_error, output_error
+from anglecam.estimate.fit import Fit
+from anglecam.estimate.output_error import first_state, fit_output_error, output_error
 from anglecam.estimate.record import Record
 from anglecam.loop.holdout import Prediction, predict_unseen
 from anglecam.loop.refit import effects_of, plant_of

@@ -15,8 +15,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from anglecam.effects import Effect
+from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise, autoregression, noise_floor
-from anglecam.estimate.output_error import Fit, fit_output_error
+from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.record import Record
 from anglecam.estimate.shooting import drifts, goes_astray, windows
 from anglecam.estimate.start import start_parameters

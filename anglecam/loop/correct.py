@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from anglecam.effects import Knots, View
-from anglecam.estimate.output_error import Fit
+from anglecam.estimate.fit import Fit
 from anglecam.series import AngleSeries
 from anglecam.simulate.plant import Plant
 

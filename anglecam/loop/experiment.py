@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from anglecam.effects import LEDGER
+from anglecam.estimate.fit import Fit, whiten
 from anglecam.estimate.noise import Noise
-from anglecam.estimate.output_error import Fit, whiten
 from anglecam.estimate.record import Record
 from anglecam.files import write_atomically
 from anglecam.loop.commands import (

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import RigError
-from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error, predicted_angle, whiten
+from anglecam.estimate.fit import Fit, whiten
+from anglecam.estimate.output_error import fit_output_error, predict_output_error, predicted_angle
 from anglecam.estimate.record import Record
 
 Floats = NDArray[np.float64]

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from anglecam.effects import Effect
-from anglecam.estimate.output_error import Fit, fit_output_error
+from anglecam.estimate.fit import Fit
+from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.record import Record
 from anglecam.simulate.plant import Plant
 

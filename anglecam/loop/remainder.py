@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise
-from anglecam.estimate.output_error import Fit
 from anglecam.estimate.record import Record
 
 Floats = NDArray[np.float64]

@@ -16,8 +16,8 @@ import numpy as np
 from scipy import special
 
 from anglecam.effects import LEDGER, Effect
+from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise, autoregression
-from anglecam.estimate.output_error import Fit
 from anglecam.estimate.record import Record
 from anglecam.loop.attribute import (
     Candidate,

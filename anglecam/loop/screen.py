@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.effects import Effect
-from anglecam.estimate.output_error import Fit, whiten
+from anglecam.estimate.fit import Fit, whiten
 from anglecam.estimate.record import Record
 from anglecam.loop.refit import plant_of
 from anglecam.simulate.plant import Plant

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.estimate.output_error import Fit, whiten
+from anglecam.estimate.fit import Fit, whiten
 from anglecam.estimate.record import Record
 from anglecam.loop.refit import plant_of
 from anglecam.session import Command

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from anglecam.errors import printable
-from anglecam.estimate.output_error import Fit
+from anglecam.estimate.fit import Fit
 from anglecam.estimate.record import Record
 from anglecam.loop.attribute import Candidate
 from anglecam.loop.close import Verdict

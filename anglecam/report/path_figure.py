@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from anglecam.effects import Effect, Knots
 from anglecam.effects import effect as entry
-from anglecam.estimate.output_error import Fit
+from anglecam.estimate.fit import Fit
 from anglecam.estimate.record import Record
 from anglecam.loop.close import Verdict
 from anglecam.loop.result import plain

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from anglecam.errors import RigError
-from anglecam.estimate.output_error import Fit, fit_output_error, predict_output_error
+from anglecam.estimate.fit import Fit
+from anglecam.estimate.output_error import fit_output_error, predict_output_error
 from anglecam.estimate.start import start_parameters
 from anglecam.identification import identify_records
 from anglecam.neck.parameters import PAPER

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anglecam.effects import View, effect
-from anglecam.estimate.output_error import Fit
+from anglecam.estimate.fit import Fit
 from anglecam.loop.correct import corrected
 from anglecam.series import AngleSeries
 from anglecam.simulate.plant import Plant

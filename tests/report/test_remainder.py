@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise
-from anglecam.estimate.output_error import Fit
 from anglecam.estimate.record import Record
 from anglecam.loop.remainder import leftover_torque
 from anglecam.simulate.plant import Plant
