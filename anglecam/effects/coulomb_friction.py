@@ -50,7 +50,15 @@ EFFECT = Effect(
             late=True,
         ),
         Parameter(
-            "stribeck_speed_deg_per_s", "ω_s", 0.0, 0.0, 10.0, (0.01, 0.03, 0.1, 0.3, 1.0), SI_TO_FILE, late=True
+            "stribeck_speed_deg_per_s",
+            "ω_s",
+            0.0,
+            0.0,
+            10.0,
+            (0.01, 0.03, 0.1, 0.3, 1.0),
+            SI_TO_FILE,
+            late=True,
+            is_speed=True,
         ),
     ),
     aliases=("quadratic_drag", "backlash", "dead_zone"),

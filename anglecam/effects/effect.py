@@ -82,6 +82,8 @@ class Parameter:
     """Whether it is a direction, which files state between −180° and 180°."""
     late: bool = False
     """Whether it is left out, which must be the same as 0, until the data ask for it; such parameters come last."""
+    is_speed: bool = False
+    """Whether it is a speed of the head, which recordings that are much slower cannot tell."""
 
     def told(self, value: float, sigma: float = 0.0) -> tuple[float, float]:
         """Return value and standard uncertainty in the unit in ``name``; infinite for a limit that is absent."""

@@ -52,7 +52,7 @@ def fit_output_error(
     records : sequence of Record
         All fitted at once.
     starts : sequence of (p,) ndarray
-        Shared parameters to start from, SI; of several, only the one that is best after a few steps goes on.
+        Shared parameters to start from, SI; the best end is kept.
     own : sequence of ndarray, optional
         Starts of each recording's own unknowns; from its first frames otherwise.
     phi : float
@@ -65,15 +65,34 @@ def fit_output_error(
     Fit
         The best of the starts.
     """
-    own = [first_state(model, record) for record in records] if own is None else list(own)
+    own = [first_state(model, record) for record in records] if own is None else own
+    return min(_fit_all(model, records, starts, own, phi, fixed, MOST), key=lambda fit: fit.cost)
+
+
+def fit_best_start(
+    model: Model, records: Sequence[Record], starts: Sequence[Floats], own: Sequence[Floats], phi: float
+) -> Fit:
+    """Fit as `fit_output_error` does, but go on from only one start: the best after a few steps from each.
+
+    For models whose fits are slow; which valley is the deepest is then known almost as well.
+    """
+    heats = _fit_all(model, records, starts, own, phi, False, HEAT)
+    best = min(heats, key=lambda fit: fit.cost)
+    return fit_output_error(model, records, [best.parameters], own=best.own, phi=phi)
+
+
+def _fit_all(
+    model: Model,
+    records: Sequence[Record],
+    starts: Sequence[Floats],
+    own: Sequence[Floats],
+    phi: float,
+    fixed: bool,
+    most: int,
+) -> list[Fit]:
     # a trial step may let the plant run away; its cost is then not finite and the step is refused
     with _BLAS.limit(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
-        start = starts[0]
-        if len(starts) > 1:
-            heats = [_fit_once(model, records, one, own, phi, fixed, HEAT) for one in starts]
-            best = min(heats, key=lambda fit: fit.cost)
-            start, own = best.parameters, list(best.own)
-        return _fit_once(model, records, start, own, phi, fixed, MOST)
+        return [_fit_once(model, records, start, own, phi, fixed, most) for start in starts]
 
 
 def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:

@@ -14,7 +14,7 @@ from scipy import special
 
 from anglecam.effects import Effect
 from anglecam.estimate.fit import Fit
-from anglecam.estimate.output_error import first_state, fit_output_error, output_error
+from anglecam.estimate.output_error import first_state, fit_best_start, fit_output_error, output_error
 from anglecam.estimate.record import Record
 from anglecam.loop.holdout import Prediction, predict_unseen
 from anglecam.loop.refit import effects_of, plant_of
@@ -36,6 +36,8 @@ ASKED_FOR = 0.01
 """Late parameters of an effect are left out unless without them so good a fit of them would be this improbable."""
 NEAREST = 2
 """Starts of a late parameter that are fitted from, of those that come nearest."""
+SLOW = 0.2
+"""Share of the fastest speed in the recordings that counts as slow."""
 ALIAS_LEVEL = 0.05
 
 
@@ -123,7 +125,7 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast, *, late: 
 
     def fit_from(*starts: NDArray[np.float64]) -> Fit:
         values = [np.append(base.parameters, start[: len(early)]) for start in starts]
-        return fit_output_error(plant, records, values, own=own, phi=base.phi)
+        return fit_best_start(plant, records, values, own, base.phi)
 
     first = effect.null
     first[0] = effect.parameters[0].starts[0]
@@ -177,16 +179,27 @@ def _with_late(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record]) -
     they are and without them, the fit begins from those that come nearest.
     """
     plant, best, spent = plant_of(base), fit, 0
+    effect = _within(effect, fit, records)
     first = len(base.parameters) + sum(not p.late for p in effect.parameters)
     for count in range(len(effects_of(fit)[-1].parameters) + 1, len(effect.parameters) + 1):
         richer = plant.with_effect(replace(effect, parameters=effect.parameters[:count]))
         bare = np.append(fit.parameters[:first], np.zeros(len(fit.parameters) - first))
         values = [np.append(x, v) for v in effect.parameters[count - 1].starts for x in (fit.parameters, bare)]
         values.sort(key=lambda one: output_error(richer, one, records, fit.own, fit.phi))
-        fit, spent = fit_output_error(richer, records, values[:NEAREST], own=fit.own, phi=fit.phi), spent + 1
+        fit, spent = fit_best_start(richer, records, values[:NEAREST], fit.own, fit.phi), spent + 1
         if 2.0 * log_likelihood_gain(best.cost, fit.cost, len(fit.white)) > special.chdtri(spent, ASKED_FOR):
             best, spent = fit, 0
     return best
+
+
+def _within(effect: Effect, fit: Fit, records: Sequence[Record]) -> Effect:
+    """Bound an effect's speeds to the slow part of what the recordings show: a curve over all of it is any curve."""
+    predicted = [(r.time, r.angle - left) for r, left in zip(records, fit.residuals, strict=True)]
+    fastest = max(float(np.max(np.abs(np.gradient(angle, time)))) for time, angle in predicted)
+    return replace(
+        effect,
+        parameters=tuple(replace(p, upper=min(p.upper, SLOW * fastest)) if p.is_speed else p for p in effect.parameters),
+    )
 
 
 def rivals(
@@ -225,8 +238,13 @@ def rivals(
     return {
         other.effect.id: fit
         for other, fit, gap in zip(others, fits, gaps, strict=True)
-        if (gap <= widest or fit.rmse**2 - best.rmse**2 <= camera**2) and other.effect.id != effect.id
+        if (gap <= widest or apart(fit, best) <= camera) and other.effect.id != effect.id
     }
+
+
+def apart(one: Fit, other: Fit) -> float:
+    """Return by how much the predictions of two fits to the same recordings differ, rad RMS."""
+    return float(np.sqrt(np.mean((np.concatenate(one.residuals) - np.concatenate(other.residuals)) ** 2)))
 
 
 def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:

@@ -21,6 +21,7 @@ from anglecam.estimate.noise import Noise, autoregression
 from anglecam.estimate.record import Record
 from anglecam.loop.attribute import (
     Candidate,
+    apart,
     fit_beneath,
     fit_candidates,
     fit_with,
@@ -44,7 +45,7 @@ SURE = 0.01
 traced further or to take the verdict back."""
 WORTH_A_LOOK = 1.0
 """Log-likelihood by which a better fit of the same model makes its residual worth testing anew."""
-FAITHFUL = 0.01
+FAITHFUL = 0.005
 """No structure smaller than this share of what the base model leaves is traced: no model of an effect is truer."""
 FINEST = math.radians(1e-3)
 """No structure smaller than this is traced: forward models and files are not much finer."""
@@ -101,13 +102,13 @@ def smallest(task: Task, first: Round) -> float:
 def candidates_of(task: Task, now: Round) -> list[Candidate]:
     """Fit what is promising beside what the model has, strongest evidence first.
 
-    Of those that differ from the best by less than a film's angle is uncertain, the one with fewest parameters.
+    Of those whose predictions differ from the best's by less than a film's angle is uncertain, the one with fewest
+    parameters comes first.
     """
     found = fit_candidates(now.fit, now.unseen, task.fitted, task.predicted, now.forecasts)
     if not found or task.camera == 0.0:
         return found
-    widest = found[0].fit.rmse ** 2 + task.camera**2
-    alike = [one for one in found if one.unseen is not None and one.fit.rmse**2 <= widest]
+    alike = [one for one in found if apart(one.fit, found[0].fit) <= task.camera]
     first = min(alike, key=lambda one: len(one.effect.parameters))
     return [first, *(one for one in found if one is not first)]
 
