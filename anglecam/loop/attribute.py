@@ -196,10 +196,8 @@ def _within(effect: Effect, fit: Fit, records: Sequence[Record]) -> Effect:
     """Bound an effect's speeds to the slow part of what the recordings show: a curve over all of it is any curve."""
     predicted = [(r.time, r.angle - left) for r, left in zip(records, fit.residuals, strict=True)]
     fastest = max(float(np.max(np.abs(np.gradient(angle, time)))) for time, angle in predicted)
-    return replace(
-        effect,
-        parameters=tuple(replace(p, upper=min(p.upper, SLOW * fastest)) if p.is_speed else p for p in effect.parameters),
-    )
+    slow = [replace(p, upper=min(p.upper, SLOW * fastest)) if p.is_speed else p for p in effect.parameters]
+    return replace(effect, parameters=tuple(slow))
 
 
 def rivals(
