@@ -34,7 +34,7 @@ FULFILLED = 0.7
 the effect's own start; and if it then reaches less than `HOPEFUL`, from half and twice the forecast's."""
 ASKED_FOR = 0.01
 """Late parameters of an effect are left out unless without them so good a fit of them would be this improbable."""
-NEAREST = 2
+NEAREST = 8
 """Starts of a late parameter that are fitted from, of those that come nearest."""
 SLOW = 0.2
 """Share of the fastest speed in the recordings that counts as slow."""
