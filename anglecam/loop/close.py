@@ -32,7 +32,7 @@ from anglecam.simulate.plant import Plant
 CONTRADICTED = 3.0
 """A model that errs this many times more on what was held out than on what was fitted lacks something there."""
 PREDICTED = 0.03
-"""Or nothing, where that is no more than this share of what the base model errs by there: what holds a head at rest is
+"""Or nothing, where that is no more than this share of what the base model errs by: what holds a head at rest is
 told by few frames, and guessed wrongly in others."""
 REMAINDER, REMAINDER_UNDRIVEN = 0.1, 0.75
 """After an effect has proven itself, what remains must also be this share of what the base model left, or it does not
@@ -171,7 +171,7 @@ def _remains(task: Task, first: Round, last: Round, before: Fit, noise: Noise) -
     """Say whether the best model leaves structure that no candidate explains."""
     named, least = bool(effects_of(last.fit)), smallest(task, first)
     # typically: whether dry friction lets go at an instant is all or nothing, and one wrong guess is no contradiction
-    if last.told.typical > max(CONTRADICTED * max(last.fit.rmse, least), PREDICTED * first.told.rmse):
+    if last.told.typical > max(CONTRADICTED * max(last.fit.rmse, least), PREDICTED * first.unseen.rmse):
         return True
     if last.gate.p_value >= (SURE if named else LEVEL) or last.fit.rmse**2 <= task.camera**2 + least**2:
         return False
