@@ -23,6 +23,7 @@ from anglecam.rig import Rig
 from anglecam.series import OK
 from anglecam.video.frames import ClipInfo, Image, Sample, inspect_clip, read_frames, sample_frames
 from anglecam.vision.circle import Circle
+from anglecam.vision.median import median_picture
 from anglecam.vision.noise import pixel_noise
 from anglecam.vision.one_centre import RigidMotion
 from anglecam.vision.pivot import Marker, Pivot, choose_pivot, find_marker
@@ -355,7 +356,7 @@ def _find_pivot_marker(images: Sequence[Image], rig: Rig, circle: Circle | None,
     if rig.pivot.marker == "none":
         return None
     few = images[:: max(1, len(images) // _STILL)]
-    still = np.median(np.stack(few), axis=0).astype(np.uint8)
+    still = median_picture(np.stack(few)).astype(np.uint8)
     if rig.pivot.near is not None:
         hint = np.array(rig.pivot.near)
         near = find_marker(still, hint, _HINT_PX**2 * np.eye(2))

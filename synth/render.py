@@ -1,4 +1,4 @@
-"""Frames by the thousand: spawned workers, one a core, each with a stage of its own.
+"""Frames by the thousand: spawned workers, one a core, each with a stage of its own; a few frames without any.
 
 A forked renderer hangs, so the workers are spawned. They are given plans of a few frames at a time and answer with
 finished pictures, noise included, so that nothing depends on which worker drew a frame.
@@ -37,6 +37,8 @@ Frames = NDArray[np.uint8]
 
 CHUNK = 8
 """Frames a worker draws at a time."""
+WORTH_A_WORKER = 60
+"""Frames that take about as long as it takes another worker to start."""
 REPLACEMENTS = 2
 """How often dead workers are replaced before we give up."""
 
@@ -48,6 +50,38 @@ _EGL = "Mesa's EGL is needed: apt-get install libegl1 libgl1 libgl1-mesa-dri; or
 def workers() -> int:
     """Count the cores that this process may use."""
     return len(os.sched_getaffinity(0))
+
+
+def studio(spec: Spec, seen: View, frames: int) -> Studio | Solo:
+    """Choose who draws a session of so many frames: workers, or this process itself where one worker would do.
+
+    A renderer that needs a graphics library always works in a process of its own.
+    """
+    count = min(workers(), 1 + frames // WORTH_A_WORKER)
+    return Solo(spec, seen) if count == 1 and spec.render.engine == "raster" else Studio(spec, seen, count)
+
+
+class Solo:
+    """A single process at work, this one, with the methods of `Studio`; use it in a ``with`` block."""
+
+    def __init__(self, spec: Spec, seen: View) -> None:
+        self._spec, self._seen = spec, seen
+        self._painter = _Painter(spec, seen)
+
+    def __enter__(self) -> Solo:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._painter.strike()
+
+    def edge_error(self) -> EdgeError:
+        """Measure how far the engine's edges are from exact areas, at the quality that is rendered."""
+        return self._painter.measure_edges()
+
+    def film(self, take: Take, frames: Sequence[int]) -> Iterator[NDArray[np.uint8]]:
+        """Draw frames of one recording, in order."""
+        for frame in frames:
+            yield self._painter.draw(take.number, [plan(self._spec, self._seen, take, frame)])[0]
 
 
 class Studio:
@@ -138,15 +172,46 @@ class Studio:
             yield waiting.popleft().result()
 
 
-_spec: Spec
-_seen: View
-_stage: Stage | None = None
-"""What this worker draws with, once it has drawn."""
+class _Painter:
+    """A spec, the view of it, and what it is drawn with, once it has been drawn."""
+
+    def __init__(self, spec: Spec, seen: View) -> None:
+        self._spec, self._seen = spec, seen
+        self._stage: Stage | None = None
+
+    def measure_edges(self) -> EdgeError:
+        with _one_line(self._spec):
+            from synth.draw.edge_error import edge_error
+            from synth.draw.engine import make_engine
+
+            def make(parts: Sequence[Part], camera: Pinhole, quality: str, gamma: float) -> Engine:
+                return make_engine(self._spec.render, parts, camera, gamma)
+
+            self.strike()  # OpenGL has one live renderer a process
+            return edge_error(make, self._spec.render.quality)
+
+    def draw(self, recording: int, plans: Sequence[Exposure]) -> Frames:
+        with _one_line(self._spec):
+            if self._stage is None:
+                from synth.film import Stage  # renderers load only where they draw
+
+                self._stage = Stage(self._spec, self._seen)
+            return np.stack([self._stage.picture(recording, exposure) for exposure in plans])
+
+    def strike(self) -> None:
+        """Take the stage down."""
+        if self._stage is not None:
+            self._stage.close()
+        self._stage = None
+
+
+_painter: _Painter
+"""This worker's own."""
 
 
 def _set_up(spec: Spec, seen: View) -> None:
     """Prepare a worker; the renderer is given back when the process ends, whatever ends it."""
-    global _spec, _seen
+    global _painter
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
     if sys.platform == "linux":
         # nobody draws for a parent that was killed, be it before this worker was ready
@@ -154,46 +219,24 @@ def _set_up(spec: Spec, seen: View) -> None:
         parent = multiprocessing.parent_process()
         if parent is not None and os.getppid() != parent.pid:
             os._exit(1)
-    _spec, _seen = spec, seen
-    multiprocessing.util.Finalize(None, _strike, exitpriority=10)
+    _painter = _Painter(spec, seen)
+    multiprocessing.util.Finalize(None, _painter.strike, exitpriority=10)
 
 
 def _measure_edges() -> EdgeError:
-    with _one_line():
-        from synth.draw.edge_error import edge_error
-        from synth.draw.engine import make_engine
-
-        def make(parts: Sequence[Part], camera: Pinhole, quality: str, gamma: float) -> Engine:
-            return make_engine(_spec.render, parts, camera, gamma)
-
-        _strike()  # OpenGL has one live renderer a process
-        return edge_error(make, _spec.render.quality)
+    return _painter.measure_edges()
 
 
 def _draw(recording: int, plans: Sequence[Exposure]) -> Frames:
-    global _stage
-    with _one_line():
-        if _stage is None:
-            from synth.film import Stage  # renderers load in the workers only
-
-            _stage = Stage(_spec, _seen)
-        return np.stack([_stage.picture(recording, exposure) for exposure in plans])
-
-
-def _strike() -> None:
-    """Take the stage down."""
-    global _stage
-    if _stage is not None:
-        _stage.close()
-    _stage = None
+    return _painter.draw(recording, plans)
 
 
 @contextlib.contextmanager
-def _one_line() -> Iterator[None]:
-    """Say whatever goes wrong in a worker in one line; graphics libraries raise what cannot even be pickled."""
+def _one_line(spec: Spec) -> Iterator[None]:
+    """Say whatever goes wrong in drawing in one line; graphics libraries raise what cannot even be pickled."""
     try:
         yield
     except Exception as error:  # noqa: BLE001
-        advice = f"; {_EGL}" if _spec.render.engine == "pyrender" else ""
+        advice = f"; {_EGL}" if spec.render.engine == "pyrender" else ""
         said = " ".join(str(error).split())[:200]
         raise RenderError(f"no picture can be drawn off-screen ({type(error).__name__}: {said}){advice}") from None

@@ -14,13 +14,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from synth.clip import UNFINISHED, clip_writer, file_name
 from synth.errors import SpecError
-from synth.render import Studio, workers
+from synth.render import Solo, Studio, studio
 from synth.spec import read_spec
 from synth.take import Take, perform, view
 from synth.truth import fingerprint, write_facts, write_take
-
-WORTH_A_WORKER = 60
-"""Frames that take about as long as it takes another worker to start."""
 
 
 def render(path: Path, out: Path, truth: Path) -> None:
@@ -61,23 +58,23 @@ def render(path: Path, out: Path, truth: Path) -> None:
             _write_command(out / f"{take.recording.name}.command.csv", take)
 
     total = sum(len(take.table.stamps) for take in takes)
-    with progress_bar() as progress, Studio(spec, seen, min(workers(), 1 + total // WORTH_A_WORKER)) as studio:
+    with progress_bar() as progress, studio(spec, seen, total) as drawing:
         bar = progress.add_task("render", total=total)
-        write_facts(truth, spec, seen, asdict(studio.edge_error()))
+        write_facts(truth, spec, seen, asdict(drawing.edge_error()))
         for take in takes:
             progress.update(bar, description=f"render {take.recording.name}")
             fingerprints = []
             with clip_writer(out / file_name(take.recording.name, spec.camera), spec.camera, take.table) as write:
-                for frame in _with_duplicates(take, studio):
+                for frame in _with_duplicates(take, drawing):
                     write(frame)
                     fingerprints.append(fingerprint(frame))
                     progress.advance(bar)
             write_take(truth, seen, take, fingerprints)
 
 
-def _with_duplicates(take: Take, studio: Studio) -> Iterator[NDArray[np.uint8]]:
+def _with_duplicates(take: Take, drawing: Studio | Solo) -> Iterator[NDArray[np.uint8]]:
     """Give every frame of the file; a duplicate is the very picture before it, noise and all."""
-    drawn = studio.film(take, np.flatnonzero(~take.table.repeats).tolist())
+    drawn = drawing.film(take, np.flatnonzero(~take.table.repeats).tolist())
     frame = next(drawn)
     yield frame
     for repeats in take.table.repeats[1:]:

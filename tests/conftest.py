@@ -2,9 +2,20 @@
 
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+
+import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 # before NumPy is loaded: there are as many test processes as cores, and libraries whose threads wait in a loop for a
 # core that another process has are a thousand times slower
 os.environ |= {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _films_are_drawn_here() -> Iterator[None]:
+    """Let `synth` see the one core that is ours, so that it starts no workers; those have tests of their own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("synth.render.workers", lambda: 1)
+        yield

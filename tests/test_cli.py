@@ -54,6 +54,19 @@ def series_session(tmp_path):
     return folder
 
 
+@pytest.fixture
+def status(monkeypatch, capfd):
+    """Return what calls a command without a process of its own: its exit status and what it says on standard error."""
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["anglecam", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        return ended.value.code, capfd.readouterr().err
+
+    return call
+
+
 def test_from_film_to_verdict(film, tmp_path):
     folder, truth = film
     done = run("close", folder, "--out", tmp_path)
@@ -93,9 +106,9 @@ def _every_key_of_the_contract(loop):
 
 
 @pytest.mark.parametrize("estimator", ["ekf", "oe2", "oe3"])
-def test_identify_writes_a_model(series_session, tmp_path, estimator):
-    done = run("identify", series_session, "--estimator", estimator, "--out", tmp_path)
-    assert done.returncode == 0, done.stderr
+def test_identify_writes_a_model(series_session, tmp_path, status, estimator):
+    code, told = status("identify", series_session, "--estimator", estimator, "--out", tmp_path)
+    assert code == 0, told
     model = json.loads((tmp_path / "model.json").read_text())
     assert model["estimator"] == estimator
     assert model.keys() >= {"parameters", "rmse_deg", "step"}
@@ -129,26 +142,13 @@ def test_bad_clips_cost_themselves_one_line_each_and_the_good_one_is_measured(fi
     assert "Traceback" not in done.stderr
 
 
-def test_a_bad_command_file_costs_its_recording_only(series_session, tmp_path):
+def test_a_bad_command_file_costs_its_recording_only(series_session, tmp_path, status):
     broken.command_backwards(series_session, "steps")
-    done = run("identify", series_session, "--out", tmp_path)
-    assert done.returncode == 1
-    assert len(done.stderr.splitlines()) == 1
-    assert "steps.command.csv" in done.stderr
+    code, told = status("identify", series_session, "--out", tmp_path)
+    assert code == 1
+    assert len(told.splitlines()) == 1
+    assert "steps.command.csv" in told
     assert json.loads((tmp_path / "model.json").read_text())["parameters"]["b_per_s2"]["value"] > 0.0
-
-
-@pytest.fixture
-def status(monkeypatch, capfd):
-    """Return what calls a command without a process of its own: its exit status and what it says on standard error."""
-
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["anglecam", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        return ended.value.code, capfd.readouterr().err
-
-    return call
 
 
 @pytest.mark.parametrize("verb", ["measure", "identify", "close"])
@@ -172,9 +172,9 @@ def test_wrong_calls_are_exit_status_2(series_session, tmp_path, status):
     assert status("nonsense")[0] == 2
 
 
-def test_a_session_where_nothing_can_be_used_is_exit_status_1(tmp_path):
+def test_a_session_where_nothing_can_be_used_is_exit_status_1(tmp_path, status):
     broken.empty_clip(tmp_path)
-    done = run("close", tmp_path, "--out", tmp_path / "out")
-    assert done.returncode == 1
-    assert "empty" in done.stderr
-    assert "Traceback" not in done.stderr
+    code, told = status("close", tmp_path, "--out", tmp_path / "out")
+    assert code == 1
+    assert "empty" in told
+    assert "Traceback" not in told

@@ -13,6 +13,7 @@ from anglecam.measurement import measure_clip
 from anglecam.registration import Registered, register_clip
 from anglecam.rig import read_rig
 from anglecam.session import read_command
+from anglecam.sighting import sight_clip
 from anglecam.uncertainty import angle_draws, courses
 from support.drawn import Look, Recording, draw_session
 
@@ -27,16 +28,28 @@ def clip(tmp_path_factory):
     return path, read_rig(folder / "rig.yaml"), read_command(folder / "stairs.command.csv")
 
 
-@pytest.fixture(scope="module")
-def registered(clip):
-    """Register once for all tests of this file."""
+def _once(function):
+    """Return what calls a function the first time and gives the same answer ever after."""
     found = []
 
     def once(*arguments):
-        found.append(found[0] if found else register_clip(*arguments))
+        if not found:
+            found.append(function(*arguments))
         return found[0]
 
     return once
+
+
+@pytest.fixture(scope="module")
+def sighted():
+    """Go over the clip once for all tests of this file: what they change, command and neutral, is not looked at."""
+    return _once(sight_clip)
+
+
+@pytest.fixture(scope="module")
+def registered():
+    """Register once for all tests of this file."""
+    return _once(register_clip)
 
 
 def _now_and_then(found: Registered) -> Registered:
@@ -50,13 +63,14 @@ def _now_and_then(found: Registered) -> Registered:
     ("head", "neutral"),
     [("never", "rest"), ("never", "declared"), ("always", "rest"), ("always", "median"), ("now and then", "declared")],
 )
-def test_a_measured_clips_terms_join_to_its_sigma(clip, registered, monkeypatch, head, neutral):
+def test_a_measured_clips_terms_join_to_its_sigma(clip, sighted, registered, monkeypatch, head, neutral):
     path, rig, command = clip
     readings = {
         "never": lambda *_: "not asked for",
         "always": registered,
         "now and then": lambda *arguments: _now_and_then(registered(*arguments)),
     }
+    monkeypatch.setattr(import_module("anglecam.measurement"), "sight_clip", sighted)
     monkeypatch.setattr(import_module("anglecam.measurement"), "register_clip", readings[head])
     if neutral == "declared":
         rig = rig.model_copy(update={"neutral": -12.0})

@@ -212,12 +212,12 @@ def compare(patches: Patches, views: Views, turns: Floats, pivots: Floats) -> Fi
 
 
 def _as_lower_band(near: Floats, n: int) -> Floats:
-    """Put the products of neighbours, 7 × 7 about each coefficient, into LAPACK's lower band, column by column."""
+    """Put the products of neighbours into LAPACK's lower band, column by column."""
     lower = np.zeros((3 * n + 4, n * n))
-    for down in range(4):
-        for across in range(-3, 4):
-            if (shift := down * n + across) >= 0:
-                lower[shift, : n * n - shift] = near[: n * n - shift, (down + 3) * 7 + across + 3]
+    for k in range(25):  # rows of seven neighbours, from the coefficient itself on
+        down, across = (k + 3) // 7, (k + 3) % 7 - 3
+        shift = down * n + across
+        lower[shift, : n * n - shift] = near[: n * n - shift, k]
     return lower
 
 

@@ -199,7 +199,8 @@ def _moving_track(patches: _Patches, images: Sequence[Image], level: float, hint
         circle = _circle_of(patches.place[some], hint, longest)
         if circle is None:
             continue
-        track = _follow(patches, frames, level, *circle, float(np.median(size)), float(np.median(tint)))
+        least = 0.0 if best is None else best.score
+        track = _follow(patches, frames, level, *circle, float(np.median(size)), float(np.median(tint)), least)
         if track is None or (best is not None and track.score <= best.score):
             continue
         ends = _ends(track)
@@ -258,9 +259,12 @@ def _circle_of(p: Floats, hint: Floats | None, longest: float) -> tuple[Floats, 
 
 
 def _follow(
-    patches: _Patches, frames: int, level: float, centre: Floats, radius: float, size: float, tint: float
+    patches: _Patches, frames: int, level: float, centre: Floats, radius: float, size: float, tint: float, least: float
 ) -> _Track | None:
-    """Take from each frame the patch that lies on the circle and is most like the trio; score what comes out."""
+    """Take from each frame the patch that lies on the circle and is most like the trio; score what comes out.
+
+    ``None`` where it cannot be more than the least score that is asked for.
+    """
     off = np.abs(np.hypot(*(patches.place - centre).T) - radius)
     unlike = np.abs(np.log(patches.area / size)) + np.abs(np.log(np.maximum(patches.contrast, 1e-3) / tint))
     fit = np.flatnonzero((off < _TOLERANCE_PX) & (unlike < 0.6))
@@ -274,12 +278,13 @@ def _follow(
     extent = float(np.hypot(*np.ptp(place, axis=0)))
     if extent < _MOVED_PX or len(members) < 3:
         return None
+    score = _score(patches, members, frames, extent)
+    if score < least:  # what follows makes it no larger
+        return None
     # what goes to and fro on a straight line turns about nothing that could be seen
     bent = 1.0 - np.exp(-((_off_a_line(place) / _BENT_PX) ** 2))
     return _Track(
-        _score(patches, members, frames, extent)
-        * np.exp(-np.mean((off[members] / _TOLERANCE_PX) ** 2))
-        * (_STRAIGHT + (1.0 - _STRAIGHT) * bent),
+        score * np.exp(-np.mean((off[members] / _TOLERANCE_PX) ** 2)) * (_STRAIGHT + (1.0 - _STRAIGHT) * bent),
         level,
         members,
         patches,

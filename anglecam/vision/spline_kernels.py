@@ -66,10 +66,10 @@ def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gai
     Returns
     -------
     tuple of ndarray
-        (n², 49) products of each coefficient's spline with those of its 7 × 7 neighbours, and (planes, n²) with the
-        pixels' values.
+        (n², 25) products of each coefficient's spline with its own and with those of its 7 × 7 neighbours that come
+        after it, as the products are the same either way; and (planes, n²) with the pixels' values.
     """
-    band = np.zeros((n * n, 49))
+    band = np.zeros((n * n, 25))
     planes = values.shape[1]
     right = np.zeros((planes, n * n))
     wx, wy = np.zeros(4), np.zeros(4)
@@ -92,9 +92,11 @@ def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gai
                     p = (iy + j) * n + ix + i
                     for channel in range(planes):
                         right[channel, p] += w * values[m, channel]
-                    for jj in range(4):
+                    for ii in range(i, 4):
+                        band[p, ii - i] += w * g * wx[ii] * wy[j]
+                    for jj in range(j + 1, 4):
                         for ii in range(4):
-                            band[p, (jj - j + 3) * 7 + ii - i + 3] += w * g * wx[ii] * wy[jj]
+                            band[p, (jj - j) * 7 + ii - i] += w * g * wx[ii] * wy[jj]
     return band, right
 
 
@@ -116,7 +118,8 @@ def gain_equations(offsets, values, starts, turns, pivot, corner, side, coeffici
     """
     n = coefficients.shape[1]
     terms = 3 * 3
-    normal, gradient, basis = np.zeros((terms, terms)), np.zeros(terms), np.zeros(terms)
+    gradient, basis = np.zeros(terms), np.zeros(terms)
+    half, products = np.zeros(terms * (terms + 1) // 2), np.zeros(terms * (terms + 1) // 2)
     wx, wy = np.zeros(4), np.zeros(4)
     scale = (n - 3) / side
     for k in range(len(turns)):
@@ -136,6 +139,11 @@ def gain_equations(offsets, values, starts, turns, pivot, corner, side, coeffici
                 basis[3 * p] = power
                 basis[3 * p + 1] = power * (2 * x / side - 1)
                 basis[3 * p + 2] = power * (2 * y / side - 1)
+            entry = 0
+            for a in range(terms):
+                for b in range(a, terms):
+                    products[entry] = basis[a] * basis[b]
+                    entry += 1
             for channel in range(coefficients.shape[0]):
                 look = 0.0
                 for j in range(4):
@@ -144,8 +152,13 @@ def gain_equations(offsets, values, starts, turns, pivot, corner, side, coeffici
                 rest = values[m, channel] - look
                 for a in range(terms):
                     gradient[a] += basis[a] * look * rest
-                    for b in range(terms):
-                        normal[a, b] += basis[a] * basis[b] * look * look
+                for e in range(len(half)):
+                    half[e] += products[e] * look * look
+    normal, entry = np.zeros((terms, terms)), 0
+    for a in range(terms):
+        for b in range(a, terms):
+            normal[a, b] = normal[b, a] = half[entry]
+            entry += 1
     return normal, gradient
 
 

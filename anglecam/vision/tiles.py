@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from anglecam.lens import Lens
 from anglecam.video.frames import Image
+from anglecam.vision.median import median_picture
 from anglecam.vision.patch import Views
 from anglecam.vision.transforms import turned
 
@@ -236,8 +237,8 @@ def _by_pixel(heights: Floats, shape: tuple[int, int]) -> float | Floats:
 
 
 def _middle_and_spread(pile: Image) -> tuple[Image, Image]:
-    middle: Image = np.median(pile, axis=0)
-    spread: Image = 1.4826 * np.median(np.abs(pile - middle), axis=0)
+    middle: Image = median_picture(pile)
+    spread: Image = 1.4826 * median_picture(np.abs(pile - middle))
     return middle, spread
 
 

@@ -19,6 +19,8 @@ from anglecam.rig import Rig
 from support.tiny import FRAMES, SIZE, results, tiny_clip, tiny_lab
 from support.tiny import run_batch as run
 
+pytestmark = pytest.mark.usefixtures("kept_processes")
+
 QUIET = Options(jobs=1, quiet=True)
 
 

@@ -21,6 +21,8 @@ from support.motion import Plant
 from support.series import session as make_records
 from support.tiny import tiny_clip, tiny_lab
 
+pytestmark = pytest.mark.usefixtures("kept_processes")
+
 QUIET = Options(jobs=2, quiet=True)
 
 

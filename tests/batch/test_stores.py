@@ -11,6 +11,8 @@ from anglecam.calibration import Calibration, write_calibration
 from anglecam.errors import RigError
 from support.tiny import results, tiny_lab
 
+pytestmark = pytest.mark.usefixtures("kept_processes")
+
 QUIET = Options(jobs=2, quiet=True)
 
 

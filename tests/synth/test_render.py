@@ -17,10 +17,11 @@ import pytest
 import yaml
 
 from support.oracle import border, centroid, coverage
+from synth.cli import main
 from synth.draw.engine import make_engine
 from synth.errors import SpecError
 from synth.mechanism import Part, build, poses
-from synth.render import Studio
+from synth.render import Solo, Studio
 from synth.session import render
 from synth.spec import Render, Spec
 from synth.take import marks, perform, view
@@ -169,7 +170,7 @@ def test_the_picture_is_the_analytic_oracles_and_the_truth_is_where_it_shows_the
             assert np.sqrt(np.mean((picture[..., 0] - drawn)[(drawn > 0) & (drawn < 1)] ** 2)) < 0.02
 
 
-def test_a_worker_that_dies_is_replaced_and_no_frame_is_lost():
+def test_a_worker_that_dies_is_replaced_and_no_frame_is_lost_and_without_workers_the_frames_are_the_same():
     spec = Spec.model_validate(SPEC)
     seen = view(spec)
     (take, _) = perform(spec, seen)
@@ -183,6 +184,8 @@ def test_a_worker_that_dies_is_replaced_and_no_frame_is_lost():
                 (worker,) = multiprocessing.active_children()
                 worker.kill()
     np.testing.assert_array_equal(disturbed, undisturbed)
+    with Solo(spec, seen) as solo:
+        np.testing.assert_array_equal(list(solo.film(take, frames[::7])), undisturbed[::7])
 
 
 def test_the_lips_are_as_red_as_declared(rendered):
@@ -226,13 +229,17 @@ def test_a_session_does_not_mix_with_older_files(tmp_path):
         ({"rig": {"lever_px": 400}}, "recordings.0.command: the mouth would leave"),
     ],
 )  # fmt: skip
-def test_a_bad_spec_ends_with_status_2_and_one_line(tmp_path, changes, key):
+def test_a_bad_spec_ends_with_status_2_and_one_line(tmp_path, monkeypatch, capfd, changes, key):
     path = write_spec(tmp_path, **changes)
-    call = [str(Path(sys.executable).with_name("synth")), "render", str(path), "--out", "o", "--truth", "t"]
-    ended = subprocess.run(call, capture_output=True, text=True, cwd=tmp_path, check=False)
-    assert ended.returncode == 2
-    assert key in ended.stderr
-    assert len(ended.stderr.splitlines()) == 1
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["synth", "render", str(path), "--out", "o", "--truth", "t"])
+    monkeypatch.setattr(signal, "signal", lambda *_: None)  # the tests' own process stays as it is
+    with pytest.raises(SystemExit) as ended:
+        main()
+    told = capfd.readouterr().err
+    assert ended.value.code == 2
+    assert key in told
+    assert len(told.splitlines()) == 1
     assert {path.name for path in tmp_path.iterdir()} == {"spec.yaml"}
 
 

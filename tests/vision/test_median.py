@@ -1,0 +1,19 @@
+"""The median of few pictures is NumPy's, to the bit."""
+
+import numpy as np
+import pytest
+
+from anglecam.vision.median import median_picture
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.float32, np.float64])
+@pytest.mark.parametrize("count", [1, 2, 3, 6, 9, 16])
+def test_the_median_is_numpys_for_any_count_and_kind(count, kind):
+    # more pixels than are put in order at a time, and values that occur twice
+    pile = np.random.default_rng(count).uniform(0, 255, (count, 150, 160, 3)).astype(kind)
+    pile[:, :50] = np.round(pile[:, :50] / 16) * 16
+    before, expected = pile.copy(), np.median(pile, axis=0)
+    found = median_picture(pile)
+    assert found.dtype == expected.dtype
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(pile, before)
