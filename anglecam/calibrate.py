@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from anglecam.calibration import Calibration
 from anglecam.errors import InputError
 from anglecam.video.frames import inspect_clip, read_frames
+from anglecam.video.rereading import decoded_once
 from anglecam.vision.chessboard import find_corners
 
 Floats = NDArray[np.float64]
@@ -172,6 +173,7 @@ def calibrate_clip(clip: Path, board: tuple[int, int], square_m: float = 1.0) ->
     )
 
 
+@decoded_once()
 def _search(clip: Path, board: tuple[int, int]) -> tuple[list[_Seen], int]:
     """Find the board in the sharpest frame of each stretch of a clip; say how many frames were searched."""
     sharpness = [

@@ -20,6 +20,7 @@ from anglecam.series import OK, AngleSeries
 from anglecam.session import Command, recording_name
 from anglecam.shutter import measurement_time
 from anglecam.sighting import Sighting, sight_clip, sight_head
+from anglecam.video.rereading import decoded_once
 
 Floats = NDArray[np.float64]
 
@@ -72,6 +73,7 @@ class Measurement:
         return tuple(None if r is None else r.contour_px for r in self.sighting.regions)
 
 
+@decoded_once()
 def measure_clip(
     path: Path, rig: Rig, command: Command | None = None, *, progress: Callable[[int, int], None] | None = None
 ) -> Measurement:

@@ -1,7 +1,7 @@
 """The fine pass over a clip: how the head is turned in every frame, from all that is rigid on it.
 
 Two more readings of the file: one keeps the frames from which the head is learnt, the other finds its turn in every
-frame, one frame at a time, so that memory does not grow with the clip.
+frame, one frame at a time, so that memory does not grow with the clip beyond what `anglecam.video.rereading` keeps.
 """
 
 from __future__ import annotations

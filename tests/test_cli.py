@@ -118,7 +118,7 @@ def test_identify_writes_a_model(series_session, tmp_path, status, estimator):
     assert model["step"]["steady_state_deg"] == pytest.approx(508 / 524, rel=0.02)
 
 
-def test_bad_clips_cost_themselves_one_line_each_and_the_good_one_is_measured(film, tmp_path):
+def test_bad_clips_cost_themselves_one_line_each_and_the_good_one_is_measured(film, tmp_path, status):
     good, _ = film
     clip = good / "a-steps.avi"
     folder = tmp_path / "clips"
@@ -131,15 +131,15 @@ def test_bad_clips_cost_themselves_one_line_each_and_the_good_one_is_measured(fi
         broken.zero_frame_clip(folder),
         folder / "not_there.avi",
     ]
-    done = run("measure", *bad, clip, "--rig", good / "rig.yaml", "--out", tmp_path / "out")
-    assert done.returncode == 1
-    lines = done.stderr.splitlines()
-    assert len(lines) == len(bad), done.stderr
+    code, told = status("measure", *bad, clip, "--rig", good / "rig.yaml", "--out", tmp_path / "out")
+    assert code == 1
+    lines = told.splitlines()
+    assert len(lines) == len(bad), told
     for path in bad:
-        assert sum(path.name in line for line in lines) == 1, done.stderr
+        assert sum(path.name in line for line in lines) == 1, told
     assert (tmp_path / "out" / "a-steps.angles.csv").exists()
     assert (tmp_path / "out" / "truncated.angles.csv").exists()  # what could be read is measured
-    assert "Traceback" not in done.stderr
+    assert "Traceback" not in told
 
 
 def test_a_bad_command_file_costs_its_recording_only(series_session, tmp_path, status):

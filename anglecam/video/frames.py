@@ -21,6 +21,7 @@ from anglecam.errors import InputError
 from anglecam.threads import native_threads
 from anglecam.video.container import is_cut_short
 from anglecam.video.opening import LONGEST_S, MOST_FRAMES, open_film
+from anglecam.video.rereading import reread
 
 Image = NDArray[Any]
 """Bytes, but cv2's type hints do not know it."""
@@ -120,7 +121,7 @@ def read_frames(path: Path, *, brightness: bool = False) -> Iterator[Frame]:
         As `inspect_clip`, and where timestamps do not increase, pictures change their size, there is no frame at all,
         or more of them, or a longer time, than any film has.
     """
-    for index, (time, picture) in enumerate(_decode(path)):
+    for index, (time, picture) in enumerate(reread(path, _decode)):
         image = None if picture is None else _brightness(picture) if brightness else _colours(picture)
         predicted = picture is not None and picture.pict_type in _PREDICTED
         yield Frame(index, time, image, predicted)
@@ -151,7 +152,7 @@ def sample_frames(path: Path, most: int) -> Sample:
     """
     kept: list[Frame] = []
     stride, count, decoded = 1, 0, 0
-    for index, (time, picture) in enumerate(_decode(path)):
+    for index, (time, picture) in enumerate(reread(path, _decode)):
         count += 1
         decoded += picture is not None
         if index % stride or picture is None:
@@ -263,7 +264,7 @@ def _packets(
 
 
 def _colours(picture: av.VideoFrame) -> Image:
-    return picture.to_ndarray(format="bgr24")
+    return picture.to_ndarray(format="bgr24", threads=1)  # starting more takes longer than they save
 
 
 def _brightness(picture: av.VideoFrame) -> Image:

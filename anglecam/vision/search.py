@@ -87,6 +87,14 @@ class _Track:
     circle: tuple[Floats, float] | None
 
 
+@dataclass(frozen=True)
+class _Way:
+    score: float
+    """What the patches are worth if they lie on their circle and it is bent."""
+    bent: float
+    """How surely they do not lie on a straight line, 0 to 1."""
+
+
 def find_mouth(
     images: Sequence[Image],
     rgb: tuple[int, int, int] | None,
@@ -186,6 +194,7 @@ def _moving_track(patches: _Patches, images: Sequence[Image], level: float, hint
     best: _Track | None = None
     seen: set[tuple[int, ...]] = set()
     carried: dict[tuple[int, int], float] = {}
+    ways: dict[bytes, _Way | None] = {}
     for trial in range(_TRIALS):
         # In a clip that hardly moves there are but two poses to be had.
         some = rng.choice(poses, size=min(2 + (trial % 4 > 0), len(poses)), replace=False)
@@ -200,7 +209,7 @@ def _moving_track(patches: _Patches, images: Sequence[Image], level: float, hint
         if circle is None:
             continue
         least = 0.0 if best is None else best.score
-        track = _follow(patches, frames, level, *circle, float(np.median(size)), float(np.median(tint)), least)
+        track = _follow(patches, frames, level, *circle, float(np.median(size)), float(np.median(tint)), least, ways)
         if track is None or (best is not None and track.score <= best.score):
             continue
         ends = _ends(track)
@@ -259,11 +268,20 @@ def _circle_of(p: Floats, hint: Floats | None, longest: float) -> tuple[Floats, 
 
 
 def _follow(
-    patches: _Patches, frames: int, level: float, centre: Floats, radius: float, size: float, tint: float, least: float
+    patches: _Patches,
+    frames: int,
+    level: float,
+    centre: Floats,
+    radius: float,
+    size: float,
+    tint: float,
+    least: float,
+    ways: dict[bytes, _Way | None],
 ) -> _Track | None:
     """Take from each frame the patch that lies on the circle and is most like the trio; score what comes out.
 
-    ``None`` where it cannot be more than the least score that is asked for.
+    ``None`` where it cannot be more than the least score that is asked for. What was found of each choice of patches
+    is kept in ``ways``.
     """
     off = np.abs(np.hypot(*(patches.place - centre).T) - radius)
     unlike = np.abs(np.log(patches.area / size)) + np.abs(np.log(np.maximum(patches.contrast, 1e-3) / tint))
@@ -274,22 +292,26 @@ def _follow(
     fit = fit[np.argsort(unlike[fit] + off[fit] / _TOLERANCE_PX)]
     _, first = np.unique(patches.frame[fit], return_index=True)
     members = fit[first]
+    key = members.tobytes()
+    if key not in ways:  # many circles pick the same patches
+        ways[key] = _way(patches, members, frames)
+    way = ways[key]
+    if way is None or way.score < least:  # what follows makes it no larger
+        return None
+    off_px = off[members]
+    score = way.score * np.exp(-np.mean((off_px / _TOLERANCE_PX) ** 2)) * (_STRAIGHT + (1.0 - _STRAIGHT) * way.bent)
+    return _Track(score, level, members, patches, (centre, radius))
+
+
+def _way(patches: _Patches, members: NDArray[np.int64], frames: int) -> _Way | None:
+    """Tell what the patches of a track have to do with each other, whatever circle they lie on; ``None`` if nothing."""
     place = patches.place[members]
     extent = float(np.hypot(*np.ptp(place, axis=0)))
     if extent < _MOVED_PX or len(members) < 3:
         return None
-    score = _score(patches, members, frames, extent)
-    if score < least:  # what follows makes it no larger
-        return None
     # what goes to and fro on a straight line turns about nothing that could be seen
     bent = 1.0 - np.exp(-((_off_a_line(place) / _BENT_PX) ** 2))
-    return _Track(
-        score * np.exp(-np.mean((off[members] / _TOLERANCE_PX) ** 2)) * (_STRAIGHT + (1.0 - _STRAIGHT) * bent),
-        level,
-        members,
-        patches,
-        (centre, radius),
-    )
+    return _Way(_score(patches, members, frames, extent), float(bent))
 
 
 def _off_a_line(place: Floats) -> float:

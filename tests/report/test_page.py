@@ -23,26 +23,30 @@ from support.motion import Plant
 from support.series import session
 
 
+@pytest.fixture(scope="module")
+def dragged():
+    """Return the verdict on steps, a triangle and random steps of a head with drag, none of them held out."""
+    return close_records(session(Plant(quadratic_drag=2.0), 21)[::2])
+
+
+@pytest.fixture(scope="module")
+def model(dragged):
+    """Return the base model of the same recordings."""
+    return identify_records(dragged.fitted, Rig(), "oe2")
+
+
 @pytest.fixture
-def write(tmp_path):
-    """Return what writes the page of a verdict and reads it."""
+def write(model, tmp_path):
+    """Return what writes the page of a verdict on those recordings and reads it."""
 
     def page(found, experiment=None, problems=()):
-        records = [*found.fitted, *found.held_out]
-        series = [AngleSeries(r.name, r.time, r.angle, r.sigma, ("ok",) * len(r.time)) for r in records]
-        model = identify_records(found.fitted, Rig(), "oe2", held_out=found.held_out)
+        series = [AngleSeries(r.name, r.time, r.angle, r.sigma, ("ok",) * len(r.time)) for r in found.fitted]
         path = tmp_path / "report.html"
         result = verdict_as_dict(found, experiment)
         write_report(path, "a <b> & c", found, result, experiment, series, [model], problems)
         return path.read_text()
 
     return page
-
-
-@pytest.fixture(scope="module")
-def dragged():
-    """Return the verdict on recordings of a head with drag, none of them held out."""
-    return close_records(session(Plant(quadratic_drag=2.0), 21))
 
 
 @pytest.mark.parametrize(("verdict", "svgs"), [("nothing_missing", 7), ("unexplained", 8)])
