@@ -39,8 +39,6 @@ Floats = NDArray[np.float64]
 
 _UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
 """OpenCV's own default, five rounds, leaves 0.1 px in the corners of a wide lens."""
-_UNTILTED = 12
-"""Coefficients of a lens whose sensor stands square behind it; two more tilt it."""
 _STEP_PX = 0.5
 """Half the base of a difference quotient; lenses are smooth over many pixels."""
 _RETURNS_PX = 0.01
@@ -100,7 +98,11 @@ class Lens:
         if self.calibration is None or points.size == 0:
             return points
         square, centre = self._square()
-        return _seen((points - centre) / square, self.calibration)
+        rays = np.dstack([(points.reshape(-1, 1, 2) - centre) / square, np.ones(points.size // 2)[:, None]])
+        seen = cv2.projectPoints(
+            rays, np.zeros(3), np.zeros(3), self.calibration.camera_matrix, self.calibration.distortion
+        )[0]
+        return np.asarray(seen, dtype=float).reshape(points.shape)
 
     def jacobian(self, points_px: ArrayLike) -> Floats:
         """Return (…, 2, 2) how a rectified point moves when the point in the picture does: J·C·Jᵀ is its covariance."""
@@ -252,29 +254,6 @@ def _deviate(calibration: Calibration) -> list[Calibration]:
             dataclasses.replace(calibration, camera_matrix=matrix, distortion=calibration.distortion + step[4:])
         )
     return found
-
-
-def _seen(rays: Floats, calibration: Calibration) -> Floats:
-    """Return (…, 2) px where a lens shows rays (…, 2), by their tangents: OpenCV's model.
-
-    To the last bit what `cv2.projectPoints` gives, which from Python always computes the derivatives too, at ten times
-    the cost. A sensor that is tilted against its lens, of which rigs know nothing, is left to it.
-    """
-    matrix, distortion = calibration.camera_matrix, calibration.distortion.ravel()
-    if distortion.size > _UNTILTED:
-        in_space = np.concatenate([rays, np.ones((*rays.shape[:-1], 1))], axis=-1).reshape(-1, 1, 3)
-        shown = cv2.projectPoints(in_space, np.zeros(3), np.zeros(3), matrix, distortion)[0]
-        return np.asarray(shown, dtype=float).reshape(rays.shape)
-    k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4 = np.pad(distortion, (0, _UNTILTED - distortion.size))
-    x, y = rays[..., 0], rays[..., 1]
-    r2 = x * x + y * y
-    r4 = r2 * r2
-    r6 = r4 * r2
-    outward, inward = 1.0 + k1 * r2 + k2 * r4 + k3 * r6, 1.0 / (1.0 + k4 * r2 + k5 * r4 + k6 * r6)
-    across, along_x, along_y = 2.0 * x * y, r2 + 2.0 * x * x, r2 + 2.0 * y * y
-    u = x * outward * inward + p1 * across + p2 * along_x + s1 * r2 + s2 * r4
-    v = y * outward * inward + p1 * along_y + p2 * across + s3 * r2 + s4 * r4
-    return np.stack([u * matrix[0, 0] + matrix[0, 2], v * matrix[1, 1] + matrix[1, 2]], axis=-1)
 
 
 def _map(homography: Floats, points: Floats) -> Floats:

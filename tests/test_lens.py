@@ -245,14 +245,3 @@ def test_the_mean_over_an_exposure_lies_off_its_middle_by_what_is_stated():
     off = mean - 0.5 * acceleration * t[2] ** 2
     np.testing.assert_allclose(mean_off_middle(t, 0.5 * acceleration * t**2, exposure), off, rtol=1e-4)
     assert not mean_off_middle(t, t**2, None).any()
-
-
-@pytest.mark.parametrize("size", [4, 5, 8, 12, 14])
-def test_a_lens_shows_points_where_opencv_does_to_the_last_bit(size):
-    rng = np.random.default_rng(size)
-    matrix = np.array([[800.0, 0.0, MIDDLE[0]], [0.0, 807.0, MIDDLE[1]], [0.0, 0.0, 1.0]])
-    lens = Lens(Calibration(SIZE, matrix, rng.normal(0.0, 0.02, size)))
-    square = rng.uniform(0.0, SIZE, (7, 50, 2))
-    rays = np.dstack([(square.reshape(-1, 1, 2) - MIDDLE) / lens.calibration.focal_px, np.ones((350, 1))])
-    seen = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), matrix, lens.calibration.distortion)[0]
-    np.testing.assert_array_equal(lens.distort(square), seen.reshape(square.shape))
