@@ -80,6 +80,14 @@ def children(pid: int) -> list[int]:
     return [int(c) for task in listed.iterdir() for c in (task / "children").read_text().split()]
 
 
+def command_line(pid: int) -> str:
+    """Return what a process was called with; nothing if it is gone."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text()
+    except (ProcessLookupError, FileNotFoundError):
+        return ""
+
+
 def is_alive(pid: int) -> bool:
     """Tell whether a process is there and not merely waiting to be buried."""
     try:
