@@ -24,6 +24,7 @@ import yaml
 from rich.console import Console
 from rich.table import Table
 
+from anglecam.errors import InputError
 from anglecam.loop.close import close_records
 from anglecam.recordings import measure_session, shown_to_loop
 from anglecam.session import read_session
@@ -118,18 +119,23 @@ def _wrong(case: Case, line: Line) -> list[str]:
 
 
 def main(
-    names: Annotated[list[str] | None, typer.Argument(help="Folders of tests/blind; all without.")] = None,
+    names: Annotated[list[str] | None, typer.Argument(help="Folders of --cases; all without.")] = None,
+    cases: Annotated[Path, typer.Option(help="Where the cases' folders are.")] = CASES,
     keep: Annotated[Path, typer.Option(help="Where measured sessions are kept, and looked for.")] = Path("build/blind"),
 ) -> None:
     """Film, measure, close and judge."""
     console = Console(width=None if Console().is_terminal else 200)
-    paths = [CASES / name for name in names] if names else sorted(path.parent for path in CASES.glob(f"*/{SPEC}"))
+    paths = [cases / name for name in names] if names else sorted(path.parent for path in cases.glob(f"*/{SPEC}"))
     lines = []
     for path in paths:
         case, kept = read_case(path), keep / path.name
         console.print(f"{case.name}: {' + '.join(case.true) or 'nothing'}")
-        if not (kept / MEASURED).exists():
-            film(case, kept)
+        try:
+            if not (kept / MEASURED).exists():
+                film(case, kept)
+        except InputError as error:  # one film's failure must not cost the others
+            lines.append({"case": case.name, "seed": case.spec.seed, "error": str(error)})
+            continue
         lines.append(close(case, kept))
         (kept / "judged.json").write_text(json.dumps(lines[-1], indent=1) + "\n", encoding="utf-8")
     show(lines, lambda line: "films", console)
@@ -139,6 +145,8 @@ def main(
 def _judgements(lines: list[Line]) -> Table:
     table = Table("case", "what acts", "found", "right", "", title="How each was judged", title_justify="left")
     for line in lines:
+        if "error" in line:
+            continue
         found = " + ".join(line["found"]) or line["verdict"]
         table.add_row(
             line["case"], " + ".join(line["true"]) or "nothing", found, "yes" if line["right"] else "no",

@@ -6,7 +6,9 @@ import pytest
 from anglecam.effects import effect
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.simulate.plant import Plant
-from benchmarks.blind.drawn import ALL, draw, magnified
+from benchmarks.blind.drawn import ALL, OUTSIDE, draw, magnified
+from benchmarks.blind.drawn_films import film_spec, write_case
+from benchmarks.blind.films import read_case
 from benchmarks.blind.judged import told
 from benchmarks.blind.sessions import RECORDINGS, residual_deg, scaled, session, spec_of
 
@@ -58,3 +60,15 @@ def test_the_number_told_is_the_one_that_leaves_nothing_when_the_effect_is_fitte
     fit = fit_output_error(Plant((entry,)), records, [np.array(start)])
     assert np.degrees(fit.rmse) < 5e-4
     assert first.told(fit.parameters[3])[0] == pytest.approx(value, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["constant_torque", "slack_spring"])
+def test_a_drawn_film_is_a_case_that_reads_back_with_what_it_is_drawn_to_leave(name, tmp_path):
+    write_case(name, SEED, tmp_path)
+    case = read_case(tmp_path / f"{name}-{SEED}")
+    assert set(case.true) == {name}
+    assert case.verdict == ("unexplained" if name in OUTSIDE else "attributed")
+    assert [p["value"] for p in case.parameters] == pytest.approx(list(told(case.spec, case.true).values()), rel=1e-5)
+    assert ("neutral" in case.spec.declare) == (name == "constant_torque")
+    assert np.hypot(*np.subtract(case.spec.declare["pivot"]["near"], case.spec.rig.pivot_px)) < 6
+    assert case.spec == film_spec(name, SEED)

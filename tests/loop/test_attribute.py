@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 from anglecam.effects import effect
+from anglecam.estimate.noise import DISTANCE, Noise
 from anglecam.estimate.output_error import fit_output_error
-from anglecam.loop.attribute import Candidate, fit_beneath, fit_with
+from anglecam.loop.attribute import SLOW, Candidate, apart, fit_beneath, fit_with, log_likelihood_gain, rivals
 from anglecam.loop.holdout import split_records
+from anglecam.loop.rounds import Task, candidates_of, look
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.simulate.plant import Plant
+from benchmarks.blind.drawn import draw
 from benchmarks.blind.sessions import HELD_OUT, session
 
 
@@ -42,3 +45,41 @@ def test_a_dead_zone_beside_nothing_else_is_fitted_as_well_as_from_the_truth():
     assert deeper.model is zone.fit.model
     assert deeper.cost < (1.0 + 1e-6) * from_truth.cost
     assert fit_beneath(deeper, [], fitted) is deeper
+
+
+def test_a_curve_of_friction_is_confined_to_slow_motion():
+    friction = {"torque": 0.8, "breakaway": 1.6, "stribeck_deg_per_s": 60.0}  # a quarter of the fastest speed
+    fitted, _ = split_records(session({"coulomb_friction": friction}, seed=5, sigma_deg=0.002), HELD_OUT)
+    base = fit_output_error(Plant(), fitted, [np.array([26.0, 524.0, 508.0])])
+    (forecast,) = forecasts(base, directions(base, fitted, changes(base, fitted, [effect("coulomb_friction")])))
+    found = dict(zip((fit := fit_with(base, fitted, forecast)).model.names, fit.parameters, strict=True))
+    fastest = max(np.max(np.abs(np.gradient(r.angle, r.time))) for r in fitted)
+    assert found["stribeck_speed_deg_per_s"] == pytest.approx(SLOW * fastest, rel=0.02)
+
+
+def test_what_differs_by_less_than_the_cameras_uncertainty_decides_nothing():
+    fitted, predicted = split_records(session({"camera_tilt": {"tilt_deg": 9.0}}, seed=3, sigma_deg=0.002), HELD_OUT)
+    base = fit_output_error(Plant(), fitted, [np.array([26.0, 524.0, 508.0])])
+    ledger = [effect(name) for name in ("camera_tilt", "lens_distortion")]
+    tilt, lens = sorted(
+        forecasts(base, directions(base, fitted, changes(base, fitted, ledger))), key=lambda f: f.effect.id
+    )
+    best, other = (fit_with(base, fitted, one) for one in (tilt, lens))
+    distance = apart(best, other)
+    assert len(tilt.effect.parameters) > len(lens.effect.parameters)
+    for camera, kept, first in ((0.98 * distance, [], "camera_tilt"), (1.02 * distance, [lens], "lens_distortion")):
+        found = rivals(best, base, fitted, tilt.effect, [lens], camera)
+        assert list(found) == [one.effect.id for one in kept]
+        floor = Noise(camera, 0.0, 0.1, DISTANCE)
+        task = Task(tuple(fitted), tuple(predicted), tuple(ledger), floor, np.random.default_rng(0), lambda stage: None)
+        assert candidates_of(task, look(task, base))[0].effect.id == first
+
+
+def test_a_fit_ends_only_where_nothing_more_is_gained():
+    gravity = effect("gravity_geometry")
+    fitted, _ = split_records(session(draw(gravity.id, 4), seed=4), HELD_OUT)
+    start = [26.0, 524.0, 508.0, *(p.starts[0] for p in gravity.parameters)]
+    found = further = fit_output_error(Plant((gravity,)), fitted, [np.array(start)])
+    for _ in range(4):
+        further = fit_output_error(further.model, fitted, [further.parameters], own=further.own)
+    assert log_likelihood_gain(found.cost, further.cost, len(found.white)) < 0.01

@@ -1,0 +1,142 @@
+"""Film sessions that nobody chose: effect, size, plant, commands, rig and camera of each case are drawn from a seed.
+
+    .venv/bin/python -m benchmarks.blind.drawn_films --first 100 --seeds 3 --out build/drawn
+    .venv/bin/python -m benchmarks.blind.films --cases build/drawn --keep build/drawn
+
+The folders are like those of ``tests/blind``.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+import yaml
+
+from anglecam.effects import effect
+from benchmarks.blind.drawn import ALL, OUTSIDE, draw
+from benchmarks.blind.judged import told
+from benchmarks.blind.sessions import HELD_OUT, Effects, look, scaled, spec_of
+from synth.spec import Spec
+from synth.spec.picture import LIPSTICKS, SKINS
+
+LEAST_DEG, MOST_DEG = 0.04, 0.5
+"""What the base model leaves: from some ten times a film's own noise to what anyone sees."""
+WITHIN_SIGMA = 3
+HALVINGS = 4
+"""How often a size that the rig cannot show is tried at half."""
+
+
+def film_spec(name: str, seed: int) -> Spec:
+    """Draw what is filmed.
+
+    Parameters
+    ----------
+    name : str
+        An id of `benchmarks.blind.drawn.ALL`.
+    seed : int
+        Of everything.
+
+    Returns
+    -------
+    Spec
+        As for ``synth``, with pivot, mouth and what is held out declared, and a neutral where a steady torque acts.
+
+    Raises
+    ------
+    ValueError
+        Where no size of the effect can be shown.
+    """
+    rng = np.random.default_rng([seed, sorted(ALL).index(name), 2])
+    content = spec_of(_sized(name, seed, rng), seed=seed).model_dump(mode="json", exclude_unset=True)
+    content["camera"] |= _camera(rng)
+    content["rig"] |= {
+        "head": str(rng.choice(["female", "male"])),
+        "skin": str(rng.choice(list(SKINS))),
+        "lips": str(rng.choice([lips for lips in LIPSTICKS if lips != "bare"])),
+    }
+    spec = Spec.model_validate(content)
+    x, y = spec.rig.pivot_px
+    declared: dict[str, Any] = {
+        "mouth": {"rgb": list(spec.rig.lips_rgb)},
+        "pivot": {"near": [round(x + rng.uniform(-3, 3)), round(y + rng.uniform(-3, 3))], "marker": "auto"},
+        "facing": spec.rig.facing,
+        "held_out": list(HELD_OUT),
+    }
+    if name == "constant_torque":
+        ahead, up = look(spec).mouth
+        declared["neutral"] = round(math.degrees(math.atan2(up, ahead)), 3)
+    return spec.model_copy(update={"declare": declared})
+
+
+def _sized(name: str, seed: int, rng: np.random.Generator) -> Effects:
+    """Draw how much of the effect shows; what the rig cannot show, less of it can."""
+    leaves_deg = math.exp(rng.uniform(math.log(LEAST_DEG), math.log(MOST_DEG)))
+    for halving in range(HALVINGS):
+        try:
+            return scaled(draw(name, seed), seed, leaves_deg / 2**halving, sigma_deg=1.0)
+        except ValueError as error:
+            cause = error
+    raise cause
+
+
+def _camera(rng: np.random.Generator) -> dict[str, Any]:
+    codecs: list[dict[str, Any]] = [
+        {"codec": "mjpeg", "quality": int(rng.integers(1, 5))},
+        {"codec": "ffv1"},
+        {"codec": "h264", "crf": int(rng.integers(14, 21))},
+    ]
+    return {
+        "fps": float(rng.choice([25, 30, 40])),
+        "noise_grey": float(rng.uniform(1, 3)),
+        "gamma": float(rng.choice([1.0, 2.2])),
+        "focus_blur_px": float(rng.uniform(0, 0.8)),
+        **codecs[rng.integers(len(codecs))],
+    }
+
+
+def write_case(name: str, seed: int, out: Path) -> None:
+    """Write ``spec.yaml`` and ``expected.yaml`` of one case into its folder ``NAME-SEED``.
+
+    Raises
+    ------
+    ValueError
+        As from `film_spec`.
+    """
+    spec = film_spec(name, seed)
+    values = told(spec, spec.effects.model_dump(exclude_none=True))
+    parameters = [
+        {"name": effect(one).parameters[0].name, "value": float(f"{value:.6g}"), "within_sigma": WITHIN_SIGMA}
+        for one, value in values.items()
+    ]
+    expected = {
+        "verdict": "unexplained" if name in OUTSIDE else "attributed",
+        "effects": list(values),
+        "parameters": parameters,
+    }
+    folder = out / f"{name}-{seed}"
+    folder.mkdir(parents=True, exist_ok=True)
+    for file, content in (("spec.yaml", spec.model_dump(mode="json", exclude_unset=True)), ("expected.yaml", expected)):
+        (folder / file).write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+
+
+def main(
+    out: Annotated[Path, typer.Option(help="Folder for the cases' folders.")],
+    first: Annotated[int, typer.Option(help="First seed.")] = 100,
+    seeds: Annotated[int, typer.Option(help="Sessions of each effect.")] = 3,
+    effects: Annotated[str, typer.Option(help="Ids with commas between; all without.")] = "",
+) -> None:
+    """Draw the cases of all effects, those in no ledger too."""
+    for name in effects.split(",") if effects else ALL:
+        for seed in range(first, first + seeds):
+            try:
+                write_case(name, seed, out)
+            except ValueError as error:
+                typer.echo(f"{name}, seed {seed}: {error}", err=True)
+
+
+if __name__ == "__main__":
+    typer.run(main)
