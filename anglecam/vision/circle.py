@@ -94,8 +94,8 @@ def fit_circle(points_px: Floats, *, start: tuple[Floats, float] | None = None) 
     centre, radius = start if start is not None else circle_through(points_px)
     if not np.isfinite(radius):
         return None
-    if start is None:
-        centre, radius = _solve(points_px, centre, radius, loss="soft_l1")
+    # near is not there: of a mouth that rests in two places one would lie beyond the gate of the start's own circle
+    centre, radius = _solve(points_px, centre, radius, loss="soft_l1")
     fits = np.ones(len(points_px), bool)
     for _ in range(_STEPS):
         residual = np.hypot(*(points_px - centre).T) - radius

@@ -121,6 +121,8 @@ def find_turn(look: Look, glimpse: Glimpse, before: Image | None = None) -> Turn
         by_pixels = 1.0
         if glimpse.wander_px2 is not None:
             normal, gradient, by_pixels = _wandering(normal, gradient, glimpse.wander_px2)
+        if not normal[0, 0] > 0.0:  # nothing of what is clear tells a turn: it has left the picture
+            return LOST
         step = gradient[0] / normal[0, 0]
         turn += step
         if abs(step) < _SETTLED:

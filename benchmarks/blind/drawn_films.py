@@ -21,11 +21,14 @@ from benchmarks.blind.drawn import ALL, OUTSIDE, draw
 from benchmarks.blind.judged import told
 from benchmarks.blind.sessions import HELD_OUT, Effects, look, scaled, spec_of
 from synth.spec import Spec
-from synth.spec.picture import LIPSTICKS, SKINS
+from synth.spec.picture import LIPSTICKS, SKINS, Camera
+from synth.take import FACE_Z
 
 LEAST_DEG, MOST_DEG = 0.04, 0.5
 """What the base model leaves: from some ten times a film's own noise to what anyone sees."""
 WITHIN_SIGMA = 3
+READ_OUT = 0.9
+"""Largest share of the time between frames that a rolling shutter takes."""
 HALVINGS = 4
 """How often a size that the rig cannot show is tried at half."""
 
@@ -53,13 +56,18 @@ def film_spec(name: str, seed: int) -> Spec:
     rng = np.random.default_rng([seed, sorted(ALL).index(name), 2])
     content = spec_of(_sized(name, seed, rng), seed=seed).model_dump(mode="json", exclude_unset=True)
     content["camera"] |= _camera(rng)
+    if "rolling_shutter" in content["effects"]:
+        # no sensor reads its last row after the next frame has begun
+        rows = content["effects"]["rolling_shutter"]
+        rows["row_time_s"] = min(rows["row_time_s"], READ_OUT / (content["camera"]["fps"] * Camera().size[1]))
     content["rig"] |= {
         "head": str(rng.choice(["female", "male"])),
         "skin": str(rng.choice(list(SKINS))),
         "lips": str(rng.choice([lips for lips in LIPSTICKS if lips != "bare"])),
     }
     spec = Spec.model_validate(content)
-    x, y = spec.rig.pivot_px
+    seen = look(spec)
+    x, y = seen.pinhole.project([*seen.mark_offset, FACE_Z])
     declared: dict[str, Any] = {
         "mouth": {"rgb": list(spec.rig.lips_rgb)},
         "pivot": {"near": [round(x + rng.uniform(-3, 3)), round(y + rng.uniform(-3, 3))], "marker": "auto"},
@@ -67,7 +75,7 @@ def film_spec(name: str, seed: int) -> Spec:
         "held_out": list(HELD_OUT),
     }
     if name == "constant_torque":
-        ahead, up = look(spec).mouth
+        ahead, up = seen.mouth
         declared["neutral"] = round(math.degrees(math.atan2(up, ahead)), 3)
     return spec.model_copy(update={"declare": declared})
 
