@@ -112,14 +112,14 @@ class Fit:
         product = [np.outer(self.white[part], self.white[part] @ jacobian[part]) for part in parts]
         return np.concatenate(product) / variance * len(parts) / max(1, len(parts) - 1)
 
-    def pulled_by_offset(self, records: Sequence[Record]) -> Floats:
-        """Return (p,) by how much each parameter changes with an offset that all angles share, SI per rad.
+    def pulled_by(self, records: Sequence[Record], errors: Sequence[Floats]) -> Floats:
+        """Return (p,) by how much each parameter changes, SI, with errors of the angles (rad, one array a recording).
 
-        Nothing where zeros are fitted, which take it up; NaN for a parameter that its bound holds.
+        Nothing for what zeros and initial states that are fitted take up; NaN for a parameter that its bound holds.
         """
         free, jacobian, norm = self._free_columns()
-        ones = np.concatenate([whiten(r, self.phi, np.ones(len(r.time))) for r in records])
-        change = np.linalg.lstsq(jacobian, ones, rcond=None)[0] / norm
+        white = np.concatenate([whiten(r, self.phi, error) for r, error in zip(records, errors, strict=True)])
+        change = np.linalg.lstsq(jacobian, white, rcond=None)[0] / norm
         told = np.full(len(self.parameters), np.nan)
         told[free] = change[: int(free.sum())]
         return told

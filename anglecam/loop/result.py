@@ -9,6 +9,7 @@ import numpy as np
 
 from anglecam.effects import Effect, Parameter, effect
 from anglecam.estimate.output_error import predict_output_error
+from anglecam.estimate.systematic import full_sigma
 from anglecam.loop.attribute import Candidate
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import Experiment, separating_experiment, write_command
@@ -199,17 +200,9 @@ def _values(verdict: Verdict) -> list[dict[str, float]]:
     fit = verdict.after
     own = [p for a in verdict.accepted for p in a.effect.parameters]
     base = len(fit.parameters) - len(own)
-    sigma = np.hypot(fit.sigma, _shared_error(verdict) * fit.pulled_by_offset(verdict.fitted))
+    sigma = full_sigma(fit, verdict.fitted, verdict.noise)
     pairs = list(zip(fit.parameters.tolist(), sigma.tolist(), strict=True))
     # with less than this the recordings do not tell it, as with an asymmetry of friction that hardly acts
     certain = [(value, s if s < p.upper - p.lower else np.nan) for p, (value, s) in zip(own, pairs[base:], strict=True)]
     told = pairs[:base] + [p.told(*pair) for p, pair in zip(own, certain, strict=True)]
     return [{"value": value, "sigma": sigma} for value, sigma in told]
-
-
-def _shared_error(verdict: Verdict) -> float:
-    """Return the standard uncertainty, rad, that all angles share: of what is stated, all but the noise."""
-    stated = np.concatenate([r.sigma for r in verdict.fitted])
-    if not np.all(np.isfinite(stated)):
-        return 0.0
-    return float(np.sqrt(max(0.0, np.mean(stated**2) - verdict.noise.sigma**2)))

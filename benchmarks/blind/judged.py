@@ -16,6 +16,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from anglecam.estimate.systematic import full_sigma
 from anglecam.loop.close import Verdict
 from benchmarks.blind.drawn import LEDGER, Keys
 from benchmarks.blind.sessions import look
@@ -58,13 +59,14 @@ def judge(verdict: Verdict, true: Collection[str], values: Mapping[str, float], 
     found = [accepted.effect.id for accepted in verdict.accepted]
     alias = set(found).union(*(accepted.alias_set for accepted in verdict.accepted))
     estimates = {}
+    sigmas = full_sigma(verdict.after, verdict.fitted, verdict.noise)
     for accepted in verdict.accepted:
         name = accepted.effect.id
         if name not in values:
             continue
         first = accepted.effect.parameters[0]
         at = list(verdict.after.model.names).index(first.name)
-        value, sigma = float(verdict.after.parameters[at]), float(verdict.after.sigma[at])
+        value, sigma = float(verdict.after.parameters[at]), float(sigmas[at])
         # in the fit's own unit: the interval of a limit is one of its reciprocal
         truth = first.to_file / values[name] if first.inverse else values[name] / first.to_file
         estimates[name] = {

@@ -82,10 +82,15 @@ def test_prediction_of_a_held_out_recording_leaves_the_noise():
     assert np.degrees(predict_output_error(fit, [held_out]).rmse) == pytest.approx(0.1, rel=0.1)
 
 
-def test_an_offset_of_all_angles_changes_parameters_as_foretold_and_nothing_where_zeros_are_fitted():
+def test_errors_of_the_angles_change_parameters_as_foretold_and_not_at_all_where_zeros_take_them_up():
     known = [replace(r, zero_known=True) for r in EXACT]
     fit = fit_output_error(Plant(), known, [TRUE])
-    off = fit_output_error(Plant(), [replace(r, angle=r.angle + 1e-4) for r in known], [TRUE])
-    assert (off.parameters - fit.parameters) / 1e-4 == pytest.approx(fit.pulled_by_offset(known), rel=0.005)
+    for course in (np.ones_like, np.sin):
+        errors = [1e-4 * course(r.angle) for r in known]
+        off = fit_output_error(
+            Plant(), [replace(r, angle=r.angle + e) for r, e in zip(known, errors, strict=True)], [TRUE]
+        )
+        assert off.parameters - fit.parameters == pytest.approx(fit.pulled_by(known, errors), rel=0.01, abs=1e-6)
     free = noisy(0)
-    assert np.all(np.abs(fit_output_error(Plant(), free, [TRUE]).pulled_by_offset(free)) < 1e-6 * TRUE)
+    ones = [np.ones_like(r.angle) for r in free]
+    assert np.all(np.abs(fit_output_error(Plant(), free, [TRUE]).pulled_by(free, ones)) < 1e-6 * TRUE)

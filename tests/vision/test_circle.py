@@ -53,6 +53,7 @@ def test_a_mark_that_rests_in_two_places_has_their_circle_wherever_the_search_be
     rng = np.random.default_rng(0)
     at = np.radians(np.concatenate([np.full(140, -17.0), np.linspace(-17.0, 6.0, 15), np.full(40, 0.0)]))
     path = np.array([214.5, 301.3]) + 170.0 * np.column_stack([np.cos(at), np.sin(at)])
-    found = fit_circle(path + 0.02 * rng.standard_normal(path.shape), start=([214.5, 301.3] + np.array(off[:2]), 170.0 + off[2]))
+    start = np.array([214.5, 301.3]) + off[:2], 170.0 + off[2]
+    found = fit_circle(path + 0.02 * rng.standard_normal(path.shape), start=start)
     assert np.hypot(*(found.centre_px - [214.5, 301.3])) < 2.0
     assert found.fits.all()

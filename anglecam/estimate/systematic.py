@@ -1,0 +1,59 @@
+"""What a measurement's systematic errors do to parameters: errors that no scatter shows, because they come again.
+
+A pivot that is wrong by k lever arms turns the line to the mouth, against neutral's, by
+
+    k·sin θ    or, where it is wrong across,    k·(1 − cos θ)
+
+in every frame of its recording, and a declared neutral that is off moves all angles of all recordings alike. A fit
+follows such an error as if the mechanism had moved so. JCGM 100:2008, 5.1.2, of uncertainties of one origin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.estimate.fit import Fit
+from anglecam.estimate.noise import Noise
+from anglecam.estimate.record import Record
+
+Floats = NDArray[np.float64]
+
+
+def full_sigma(fit: Fit, records: Sequence[Record], noise: Noise) -> Floats:
+    """Return the standard uncertainties of a fit's parameters, with what the angles' own uncertainty has in common.
+
+    Parameters
+    ----------
+    fit : Fit
+        To ``records``.
+    records : sequence of Record
+        With a stated uncertainty in every frame, or without: then nothing is added.
+    noise : Noise
+        What of the stated uncertainty is each frame's own.
+
+    Returns
+    -------
+    (p,) ndarray
+        SI; NaN for a parameter that its bound holds.
+    """
+    if not all(np.isfinite(r.sigma).all() for r in records):
+        return fit.sigma
+    stated = np.concatenate([r.sigma for r in records])
+    shared = np.sqrt(max(0.0, float(np.mean(stated**2)) - noise.sigma**2))
+    parts = [shared * fit.pulled_by(records, [np.ones(len(r.time)) for r in records])]
+    for name in dict.fromkeys(r.name for r in records):
+        wrong = _wrong_pivot([r for r in records if r.name == name])
+        for course in (np.sin, lambda angle: 1.0 - np.cos(angle)):
+            errors = [wrong * course(r.angle) if r.name == name else np.zeros(len(r.time)) for r in records]
+            parts.append(fit.pulled_by(records, errors))
+    return np.sqrt(fit.sigma**2 + sum(part**2 for part in parts))
+
+
+def _wrong_pivot(records: Sequence[Record]) -> float:
+    """Return the pivot's standard uncertainty, in lever arms, by which stated uncertainty grows away from neutral."""
+    sigma, angle = (np.concatenate(each) for each in ([r.sigma for r in records], [r.angle for r in records]))
+    turned = float(np.sum(2.0 - 2.0 * np.cos(angle)))
+    return float(np.sqrt(np.sum(sigma**2 - sigma.min() ** 2) / turned)) if turned > 0.0 else 0.0
