@@ -1,0 +1,70 @@
+"""Parameters are as sure as the pivot is known, in every recording anew, and as a declared neutral is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from anglecam.estimate.noise import Noise
+from anglecam.estimate.output_error import fit_output_error
+from anglecam.estimate.systematic import full_sigma
+from anglecam.simulate.plant import Plant
+from support.motion import Plant as TruePlant
+from support.series import session
+
+TRUE = np.array([26.0, 524.0, 508.0])
+EXACT = session(TruePlant(), 0, sigma_deg=0.0)
+OWN = np.radians(0.001)
+"""Each frame's own noise."""
+PIVOT = 1e-3
+"""Standard uncertainty of the pivot, lever arms."""
+
+
+def spread_of(fits):
+    found = [((fit.parameters - TRUE) / sigma, (fit.parameters - TRUE) / fit.sigma) for fit, sigma in fits]
+    return np.sqrt(np.mean(np.array(found) ** 2, axis=0))
+
+
+def fitted(records):
+    fit = fit_output_error(Plant(), records, [TRUE])
+    return fit, full_sigma(fit, records, Noise(OWN, 0.0, 0.1, "stated"))
+
+
+def test_a_pivot_that_is_wrong_in_every_recording_is_in_the_parameters_uncertainty():
+    rng = np.random.default_rng(1)
+    fits = []
+    for _ in range(20):
+        records = []
+        for r in EXACT:
+            along, across = PIVOT * rng.normal(size=2)
+            wrong = along * np.sin(r.angle) + across * (1 - np.cos(r.angle))
+            sigma = np.sqrt(OWN**2 + PIVOT**2 * (2 - 2 * np.cos(r.angle)))
+            records.append(replace(r, angle=r.angle + wrong + OWN * rng.normal(size=len(wrong)), sigma=sigma))
+        fits.append(fitted(records))
+    full, noise_alone = spread_of(fits)
+    assert np.all((full > 0.6) & (full < 1.45)), full  # 99 % limits of a standard deviation over 20 draws
+    assert np.all(noise_alone[1:] > 2.0), noise_alone
+
+
+def test_a_declared_neutral_that_is_off_is_too():
+    rng = np.random.default_rng(2)
+    fits = []
+    for _ in range(20):
+        off = 5 * OWN * rng.normal()
+        records = [
+            replace(
+                r,
+                angle=r.angle + off + OWN * rng.normal(size=len(r.time)),
+                sigma=np.full(len(r.time), np.hypot(OWN, 5 * OWN)),
+                zero_known=True,
+            )
+            for r in EXACT
+        ]
+        fits.append(fitted(records))
+    assert np.all(spread_of(fits)[0] < 1.45)
+
+
+def test_where_no_uncertainty_is_stated_the_scatter_alone_counts():
+    records = [replace(r, angle=r.angle + OWN * np.cos(1e4 * r.time), sigma=np.full(len(r.time), np.nan)) for r in EXACT]
+    fit, sigma = fitted(records)
+    assert sigma == pytest.approx(fit.sigma)
