@@ -228,6 +228,7 @@ def series_of_angles(
         pivot_px=np.where(told[:, None], pivot_px, np.nan),
         picture_px=picture_px,
         marker_px=marker_px,
+        by_mouth=angles.registered is None,
         bounds={r: worst_case(r, levers) for r in {*CONTRACT_RADII_PX, *rig.pixel_error_px}},
     )
 

@@ -16,6 +16,7 @@ from anglecam.estimate.output_error import fit_output_error, predict_output_erro
 from anglecam.estimate.record import Record
 from anglecam.estimate.start import start_parameters
 from anglecam.estimate.step_figures import NO_STEP, StepFigures, step_figures
+from anglecam.estimate.systematic import systematic_covariance
 from anglecam.neck.large_angle import LargeAngleNeck, linearise
 from anglecam.rig import Rig
 from anglecam.simulate.large_angle import DEFAULT, FREE_SWING, LargeAngle
@@ -144,6 +145,8 @@ def identify_records(
         elif estimator == "neck":
             fit = _large_angle(fit, fitted, neck or LargeAngleNeck())
         values, covariance = fit.parameters, fit.coloured_covariance(fitted, phi(fit))
+    if noise := noise_floor(fitted):
+        covariance = covariance + systematic_covariance(fit, fitted, noise)
     scale = fit.model.to_file
     return Identified(
         estimator,

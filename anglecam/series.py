@@ -78,6 +78,8 @@ class AngleSeries:
     """Width and height of the picture; ``None`` where it is not known."""
     marker_px: tuple[float, float] | None = None
     """Where a picture that nothing was undone in shows the mark on the shaft; ``None`` where it does not."""
+    by_mouth: bool = False
+    """Whether the angle was read off the mouth's own place; else that place is a second witness."""
     only_pivot_differs: bool | None = None
     """Of an angle of the line from this mark: whether that is all by which it differs from the measured one."""
 

@@ -47,8 +47,9 @@ def uncorrected(series: Sequence[AngleSeries]) -> tuple[list[AngleSeries], bool]
     marked = [(one, other) for one, other in zip(series, plain, strict=True) if other is not None]
     if not any(_apart(one, other, one.angle) for one, other in marked):
         return list(series), False
-    beside = [(one, other, _about_mark(one)) for one, other in marked]
-    only_pivot: bool | None = not any(_apart(*three) for three in beside)
+    # a line to the mouth about another point is one from another pivot by its making, whatever the camera does
+    beside = [(one, other, _about_mark(one)) for one, other in marked if not one.by_mouth]
+    only_pivot = not any(_apart(*three) for three in beside) if beside else None
     if only_pivot and any(_apart(*three, clearly=DOUBT) for three in beside):
         only_pivot = None
     return [
@@ -69,7 +70,9 @@ def _from_mark(series: AngleSeries) -> AngleSeries | None:
     off = line - series.line
     # the median frame is near neutral: there the two lines part by what has no meaning for the angle
     angle = line - zero - np.nanmedian(off)
-    sigma = np.where(ok, np.std(off[ok] - _course(off[ok], series)), np.nan)
+    # where there is no second witness, the mouth is as sure as its angle is where the pivot has no part in it
+    scatter = np.nanmin(series.sigma) if series.by_mouth else np.std(off[ok] - _course(off[ok], series))
+    sigma = np.where(ok, scatter, np.nan)
     pivot = np.where(ok[:, None], np.asarray(series.marker_px), np.nan)
     return replace(series, angle=angle, line=line, sigma=sigma, pivot_px=pivot)
 

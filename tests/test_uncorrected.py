@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,16 @@ def test_where_it_cannot_be_said_whether_more_than_the_mark_is_beside_nothing_is
     series, differs = uncorrected([barely])
     assert differs
     assert series[0].only_pivot_differs is None
+
+
+def test_an_angle_read_off_the_mouth_does_not_tell_what_else_than_the_pivot_may_be_wrong():
+    bent = filmed((6.0, -4.0), shown=lambda line: line + 0.2 * line**2)
+    arm = bent.mouth_px - PIVOT
+    alone = replace(bent, line=np.arctan2(-arm[:, 1], arm[:, 0]), by_mouth=True, sigma=np.full(len(TIME), 5e-5))
+    (shown,), differs = uncorrected([replace(alone, angle=alone.line - np.radians(-0.6))])
+    assert differs
+    assert shown.only_pivot_differs is None
+    assert shown.sigma == pytest.approx(5e-5)
 
 
 def test_noise_however_large_is_no_difference():

@@ -17,6 +17,7 @@ def keep_series(series: AngleSeries, path: Path) -> None:
         "angle": series.angle,
         "sigma": series.sigma,
         "status": np.array(series.status),
+        "by_mouth": np.array(series.by_mouth),
         "radii": np.array(list(series.bounds)),
         "bounds": np.array(list(series.bounds.values())),
     }
@@ -49,6 +50,7 @@ def read_kept(path: Path) -> AngleSeries:
         mouth_px=found.get("mouth_px"),
         pivot_px=found.get("pivot_px"),
         bounds=dict(zip(found["radii"].tolist(), found["bounds"], strict=True)),
+        by_mouth=bool(found["by_mouth"]),
         only_pivot_differs=bool(found["only_pivot_differs"]) if "only_pivot_differs" in found else None,
         **pair,
     )

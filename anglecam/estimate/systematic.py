@@ -23,33 +23,39 @@ Floats = NDArray[np.float64]
 
 
 def full_sigma(fit: Fit, records: Sequence[Record], noise: Noise) -> Floats:
-    """Return the standard uncertainties of a fit's parameters, with what the angles' own uncertainty has in common.
+    """Return the standard uncertainties, (p,) SI, of a fit's parameters: from scatter and `systematic_covariance`."""
+    return np.sqrt(fit.sigma**2 + np.diag(systematic_covariance(fit, records, noise)))
+
+
+def systematic_covariance(fit: Fit, records: Sequence[Record], noise: Noise) -> Floats:
+    """Return what the uncertainty that a recording's angles have in common adds to the parameters' covariance.
 
     Parameters
     ----------
     fit : Fit
         To ``records``.
     records : sequence of Record
-        With a stated uncertainty in every frame, or without: then nothing is added.
+        With a stated uncertainty in every frame; without it nothing is added.
     noise : Noise
         What of the stated uncertainty is each frame's own.
 
     Returns
     -------
-    (p,) ndarray
+    (p, p) ndarray
         SI; NaN for a parameter that its bound holds.
     """
+    count = len(fit.parameters)
     if not all(np.isfinite(r.sigma).all() for r in records):
-        return fit.sigma
+        return np.zeros((count, count))
     stated = np.concatenate([r.sigma for r in records])
     shared = np.sqrt(max(0.0, float(np.mean(stated**2)) - noise.sigma**2))
-    parts = [shared * fit.pulled_by(records, [np.ones(len(r.time)) for r in records])]
+    pulls = [shared * fit.pulled_by(records, [np.ones(len(r.time)) for r in records])]
     for name in dict.fromkeys(r.name for r in records):
         wrong = _wrong_pivot([r for r in records if r.name == name])
         for course in (np.sin, lambda angle: 1.0 - np.cos(angle)):
             errors = [wrong * course(r.angle) if r.name == name else np.zeros(len(r.time)) for r in records]
-            parts.append(fit.pulled_by(records, errors))
-    return np.sqrt(fit.sigma**2 + sum(part**2 for part in parts))
+            pulls.append(fit.pulled_by(records, errors))
+    return np.sum([np.outer(pull, pull) for pull in pulls], axis=0)
 
 
 def _wrong_pivot(records: Sequence[Record]) -> float:

@@ -82,7 +82,7 @@ def fit_circle(points_px: Floats, *, start: tuple[Floats, float] | None = None) 
     points_px : ndarray
         (n, 2) points.
     start : tuple of (ndarray, float), optional
-        Centre and radius to begin with; without it the algebraic fit.
+        Centre and radius to begin with; where they lead nowhere, and without them, the algebraic fit.
 
     Returns
     -------
@@ -91,7 +91,11 @@ def fit_circle(points_px: Floats, *, start: tuple[Floats, float] | None = None) 
     """
     if len(points_px) < 4:
         return None
-    centre, radius = start if start is not None else circle_through(points_px)
+    begun = None if start is None else _fit_from(points_px, *start)
+    return begun or _fit_from(points_px, *circle_through(points_px))
+
+
+def _fit_from(points_px: Floats, centre: Floats, radius: float) -> Circle | None:
     if not np.isfinite(radius):
         return None
     # near is not there: of a mouth that rests in two places one would lie beyond the gate of the start's own circle

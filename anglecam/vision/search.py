@@ -111,7 +111,7 @@ def find_mouth(
         The declared colour, good to some tens of grey levels; without it the mouth is the reddest thing, as
         against skin, that moves.
     near_px : ndarray, optional
-        (2,) a hint at the pivot, in the plane of motion, px.
+        (2,) a hint at the pivot, in the plane of motion, px; where nothing turns about it, what turns about another.
     placed : callable
         Where a point (2,) of the i-th picture lies in the plane of motion, in which paths are circles, px.
 
@@ -125,22 +125,24 @@ def find_mouth(
     usual, top = _hue_range(maps, at_rest)
     if top - usual < _LEAST_CONTRAST:
         return None
-    tracks: list[_Track] = []
+    cuts = []
     for share in LEVELS:
         level = usual + share * (top - usual)
-        if level - usual < _LEAST_CONTRAST / 2.0:
-            continue
-        patches = _cut_out(maps, level, usual, placed)
-        found = [_moving_track(patches, images, level, near_px)]
-        if at_rest:
-            found.append(_resting_track(patches, images, level))
-        tracks += [track for track in found if track is not None]
-    for track in sorted(tracks, key=lambda t: -t.score):
-        model = _learn(images, maps, track)
-        if model is None or (rgb is not None and not _same_hue(model.chroma, chroma_of(rgb))):
-            continue
-        area, place = track.patches.area[track.members], track.patches.place[track.members]
-        return Found(model, float(np.median(area)), np.median(place, axis=0), track.circle)
+        if level - usual >= _LEAST_CONTRAST / 2.0:
+            cuts.append((level, _cut_out(maps, level, usual, placed)))
+    # a hint misleads where a slanted view shows the mark on a shaft far from what it turns about
+    for hint in (near_px,) if near_px is None else (near_px, None):
+        tracks: list[_Track | None] = []
+        for level, patches in cuts:
+            tracks.append(_moving_track(patches, images, level, hint))
+            if at_rest:
+                tracks.append(_resting_track(patches, images, level))
+        for track in sorted((one for one in tracks if one is not None), key=lambda t: -t.score):
+            model = _learn(images, maps, track)
+            if model is None or (rgb is not None and not _same_hue(model.chroma, chroma_of(rgb))):
+                continue
+            area, place = track.patches.area[track.members], track.patches.place[track.members]
+            return Found(model, float(np.median(area)), np.median(place, axis=0), track.circle)
     return None
 
 

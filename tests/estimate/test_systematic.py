@@ -65,6 +65,7 @@ def test_a_declared_neutral_that_is_off_is_too():
 
 
 def test_where_no_uncertainty_is_stated_the_scatter_alone_counts():
-    records = [replace(r, angle=r.angle + OWN * np.cos(1e4 * r.time), sigma=np.full(len(r.time), np.nan)) for r in EXACT]
+    unstated = [replace(r, sigma=np.full(len(r.time), np.nan)) for r in EXACT]
+    records = [replace(r, angle=r.angle + OWN * np.cos(1e4 * r.time)) for r in unstated]
     fit, sigma = fitted(records)
     assert sigma == pytest.approx(fit.sigma)
