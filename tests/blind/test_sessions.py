@@ -72,3 +72,11 @@ def test_a_drawn_film_is_a_case_that_reads_back_with_what_it_is_drawn_to_leave(n
     assert ("neutral" in case.spec.declare) == (name == "constant_torque")
     assert np.hypot(*np.subtract(case.spec.declare["pivot"]["near"], case.spec.rig.pivot_px)) < 6
     assert case.spec == film_spec(name, SEED)
+
+
+def test_a_shutter_that_takes_most_of_a_frame_to_roll_leaves_nothing_when_it_is_fitted():
+    effects = {"rolling_shutter": {"row_time_s": 4.7e-5}}
+    records = session(effects, seed=SEED, sigma_deg=0.0, fps=40)
+    true = spec_of(effects, seed=SEED).plant
+    start = np.array([true.a, true.b, true.c, 4.7e-5])
+    assert np.degrees(fit_output_error(Plant((effect("rolling_shutter"),)), records, [start]).rmse) < 1e-3
