@@ -24,7 +24,10 @@ def _seen(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats
         across, along = ahead * np.sin(line) - up * np.cos(line), ahead * np.cos(line) + up * np.sin(line)
         return np.arctan2(across, 1.0 - along)
 
-    return angle + off(view.neutral + angle) - off(np.asarray(view.neutral))
+    # neutral is known as it was seen, from the wrong point
+    aside = float(np.clip(ahead * np.sin(view.neutral) - up * np.cos(view.neutral), -1.0, 1.0))
+    neutral = np.asarray(view.neutral - np.arcsin(aside))
+    return angle + off(neutral + angle) - off(neutral)
 
 
 def _needs(view: View) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,7 +64,8 @@ def _seen(effect_id: str, *parameters: float) -> np.ndarray:
 
 def _line(place: np.ndarray, pivot: np.ndarray) -> np.ndarray:
     arm = place - pivot
-    return np.unwrap(np.arctan2(arm[..., 1], arm[..., 0]))
+    line = np.arctan2(arm[..., 1], arm[..., 0])
+    return np.unwrap(line) if line.ndim else line
 
 
 def _mouth() -> np.ndarray:
@@ -75,8 +77,11 @@ def _zeroed(line: np.ndarray) -> np.ndarray:
 
 
 def test_a_pivot_beside_the_axis_turns_the_line():
-    expected = _zeroed(_line(_mouth(), np.array([0.05, -0.03])))
-    assert _zeroed(_seen("pivot_offset", 0.05, -0.03)) == pytest.approx(expected, abs=2e-6)
+    wrong = np.array([0.25, -0.15])
+    at_rest = np.array([np.cos(VIEW.neutral), np.sin(VIEW.neutral)])
+    view = replace(VIEW, neutral=float(_line(at_rest, wrong)))  # all that is known of neutral was seen from there
+    found = effect("pivot_offset").seen(TIME, NOD, wrong, view)
+    assert _zeroed(found) == pytest.approx(_zeroed(_line(_mouth(), wrong)), abs=2e-6)
 
 
 def test_a_tilted_camera_shortens_what_lies_across_its_axis():
