@@ -21,6 +21,7 @@ from anglecam.session import Command, recording_name
 from anglecam.shutter import measurement_time
 from anglecam.sighting import Sighting, sight_clip, sight_head
 from anglecam.video.rereading import decoded_once
+from anglecam.vision.own_turn import own_turn
 
 Floats = NDArray[np.float64]
 
@@ -220,7 +221,19 @@ def _series(
     mouths = seen.in_picture(_among(ok, angles.mouth_px))
     pivots = seen.in_picture(np.broadcast_to(angles.pivot.centre_px, (len(time), 2)))
     name, marker = recording_name(path), _marker(seen)
-    return series_of_angles(name, time, status, ok, angles, mouths, pivots, rig, picture_px=seen.size, marker_px=marker)
+    series = series_of_angles(
+        name, time, status, ok, angles, mouths, pivots, rig, picture_px=seen.size, marker_px=marker
+    )
+    return replace(series, own_turn=_own_turn(seen, ok)) if series.by_mouth else series
+
+
+def _own_turn(seen: Sighting, ok: NDArray[np.bool_]) -> tuple[float, float] | None:
+    regions = [seen.regions[i] for i in np.flatnonzero(ok)]
+    whole = [region for region in regions if region is not None]
+    if seen.circle is None or not whole:
+        return None
+    arm = np.array([region.centre_px for region in whole]) - seen.circle.centre_px
+    return own_turn(whole, np.unwrap(np.arctan2(arm[:, 1], arm[:, 0])))
 
 
 def _marker(seen: Sighting) -> tuple[float, float] | None:

@@ -80,6 +80,8 @@ class AngleSeries:
     """Where a picture that nothing was undone in shows the mark on the shaft; ``None`` where it does not."""
     by_mouth: bool = False
     """Whether the angle was read off the mouth's own place; else that place is a second witness."""
+    own_turn: tuple[float, float] | None = None
+    """Share by which a mouth that was measured alone turns more than the line to it, and its standard uncertainty."""
     only_pivot_differs: bool | None = None
     """Of an angle of the line from this mark: whether that is all by which it differs from the measured one."""
 

@@ -68,6 +68,9 @@ def test_an_angle_read_off_the_mouth_does_not_tell_what_else_than_the_pivot_may_
     assert differs
     assert shown.only_pivot_differs is None
     assert shown.sigma == pytest.approx(5e-5)
+    for own_turn, slanted in (((0.3, 0.01), True), ((-0.3, 0.01), True), ((0.3, 0.1), False), ((0.04, 0.001), False)):
+        (shown,), _ = uncorrected([replace(alone, own_turn=own_turn)])
+        assert (shown.only_pivot_differs is False) == slanted
 
 
 def test_noise_however_large_is_no_difference():

@@ -8,6 +8,8 @@ import numpy as np
 
 from anglecam.series import AngleSeries
 
+PAIRS = ("picture_px", "marker_px", "own_turn")
+
 
 def keep_series(series: AngleSeries, path: Path) -> None:
     """Write a series to the last bit, as NumPy's ``.npz`` without pickled objects."""
@@ -21,7 +23,7 @@ def keep_series(series: AngleSeries, path: Path) -> None:
         "radii": np.array(list(series.bounds)),
         "bounds": np.array(list(series.bounds.values())),
     }
-    for field in ("line", "mouth_px", "pivot_px", "picture_px", "marker_px", "only_pivot_differs"):
+    for field in ("line", "mouth_px", "pivot_px", "picture_px", "marker_px", "own_turn", "only_pivot_differs"):
         value = getattr(series, field)
         if value is not None:
             arrays[field] = np.asarray(value)
@@ -39,7 +41,7 @@ def read_kept(path: Path) -> AngleSeries:
     """
     with np.load(path, allow_pickle=False) as arrays:
         found = dict(arrays)
-    pair = {field: tuple(found[field].tolist()) if field in found else None for field in ("picture_px", "marker_px")}
+    pair = {field: tuple(found[field].tolist()) if field in found else None for field in PAIRS}
     return AngleSeries(
         name=str(found["name"]),
         time=found["time"],
