@@ -25,6 +25,8 @@ _COARSE_PX = 6.0
 _LEAST_GATE_PX = 1.5
 _SPOT_PX = 3.0
 """A region that comes back within this distance while the mouth is elsewhere is part of the scenery."""
+_SCATTER_TOLD = 8
+"""Places from which on a circle's scatter says how far off it the mouth may be: through four any circle fits."""
 _ROBUST = 6.0
 """Robust standard deviations at which size, shape or distance are off the clip's norm."""
 _LEAST_SHARE = 0.04
@@ -77,7 +79,7 @@ def follow_mouth(candidates: Sequence[Sequence[Region]], time: Floats, found: Fo
     area = float(np.median([r.area_px2 for r in single]))
     if found.circle is not None:
         circle = fit_circle(np.array([r.centre_px for r in single]), start=found.circle)
-        if circle is not None:
+        if circle is not None and circle.fits.sum() >= _SCATTER_TOLD:
             centre, radius = circle.centre_px, circle.radius_px
             gate = max(_LEAST_GATE_PX, _ROBUST * circle.scatter_px)
     chosen, status = _choose(candidates, time, centre, radius, gate, area)
