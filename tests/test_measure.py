@@ -281,3 +281,14 @@ def test_sigma_propagates_noise_pose_and_pivot():
         line = np.arctan2(-arm[:, 1], arm[:, 0])
         pulls.append((line - line[resting].mean() - angle) / sigma)
     assert 0.85 < np.std(pulls) < 1.15
+
+
+@pytest.mark.parametrize("off", [(-60, 30), (60, 20)])
+def test_a_mouth_that_rests_in_two_places_is_found_though_the_hint_is_far_from_its_centre(tmp_path, off):
+    look = Look()
+    held = np.concatenate([np.full(45, -15.0), [-10.0, -2.0, 4.0, 3.0, 0.5, -0.3], np.zeros(25)])
+    x, y = look.pivot
+    rig = Rig(facing=look.facing, pivot=Pivot(near=(x + off[0], y + off[1]), marker="none"))
+    measured = measure_clip(_film(tmp_path, look, held), rig)
+    assert set(measured.series.status) == {"ok"}
+    assert np.hypot(*(measured.angles.pivot.centre_px - look.pivot)) < 3.0
