@@ -142,14 +142,14 @@ def describe(effect: Effect, verdict: Verdict) -> str:
     return ", ".join(f"{p.name} = {with_uncertainty(**model[p.name])}" for p in effect.parameters)
 
 
-def with_uncertainty(value: float, sigma: float) -> str:
-    """Write a value to the second digit of its standard uncertainty, if it has one."""
+def with_uncertainty(value: float, sigma: float, unit: str = "") -> str:
+    """Write a value to the second digit of its standard uncertainty, if it has one, and ``unit`` as it is behind it."""
     if not np.isfinite(value):
         return "none"
     if not 0.0 < sigma < np.inf:
-        return f"{value:.4g} (not told by these recordings, or held by a bound of what is possible)"
+        return f"{value:.4g}{unit} (not told by these recordings, or held by a bound of what is possible)"
     digits = int(np.clip(1 - np.floor(np.log10(sigma)), 0, 8))
-    return f"{value:.{digits}f} ± {sigma:.{digits}f}"
+    return f"{value:.{digits}f} ± {sigma:.{digits}f}{unit}"
 
 
 def split_unit(name: str) -> tuple[str, str]:

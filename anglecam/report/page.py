@@ -230,8 +230,7 @@ def _effect_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any
                 {
                     "symbol": parameter.symbol,
                     "name": split_unit(parameter.name)[0],
-                    "value": with_uncertainty(told["value"], told["sigma"]),
-                    "unit": _unit(parameter.name),
+                    "value": with_uncertainty(told["value"], told["sigma"], _unit(parameter.name)),
                 }
                 for parameter, told in zip(a.effect.parameters, shown["parameters"].values(), strict=True)
             ],
@@ -253,7 +252,7 @@ def _final_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, str]
     """List the final model's own a, b, c."""
     count = plant_of(verdict.after).base_count
     return [
-        {"name": split_unit(name)[0], "value": with_uncertainty(told["value"], told["sigma"]), "unit": _unit(name)}
+        {"name": split_unit(name)[0], "value": with_uncertainty(told["value"], told["sigma"], _unit(name))}
         for name, told in list(result["model"].items())[:count]
     ]
 
