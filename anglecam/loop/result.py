@@ -139,7 +139,8 @@ def plain(effect_id: str) -> str:
 def describe(effect: Effect, verdict: Verdict) -> str:
     """Return an effect's fitted parameters with their standard uncertainties, as text."""
     model = dict(zip(verdict.after.model.names, _values(verdict), strict=True))
-    return ", ".join(f"{p.name} = {with_uncertainty(**model[p.name])}" for p in effect.parameters)
+    fitted = ((p.name, model[p.name]) for p in effect.parameters)
+    return ", ".join(f"{name} = {with_uncertainty(told['value'], told['sigma'])}" for name, told in fitted)
 
 
 def with_uncertainty(value: float, sigma: float, unit: str = "") -> str:
