@@ -1,6 +1,6 @@
 """From a clip to the angle in every frame: coarse by the mouth's place, fine by the whole head.
 
-`anglecam.sighting` finds mouth and pivot. Where more of the head than the mouth is rigid and has edges,
+`anglecam.sight_clip` finds mouth and pivot. Where more of the head than the mouth is rigid and has edges,
 `anglecam.registration` reads on and finds the turn from all of it; the more certain of the two is taken.
 """
 
@@ -19,7 +19,9 @@ from anglecam.rig import Rig
 from anglecam.series import OK, AngleSeries
 from anglecam.session import Command, recording_name
 from anglecam.shutter import measurement_time
-from anglecam.sighting import Sighting, sight_clip, sight_head
+from anglecam.sight_clip import sight_clip
+from anglecam.sight_head import sight_head
+from anglecam.sighting import Sighting
 from anglecam.video.rereading import decoded_once
 from anglecam.vision.own_turn import own_turn
 

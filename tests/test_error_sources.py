@@ -13,7 +13,7 @@ from anglecam.measurement import measure_clip
 from anglecam.registration import Registered, register_clip
 from anglecam.rig import read_rig
 from anglecam.session import read_command
-from anglecam.sighting import sight_clip
+from anglecam.sight_clip import sight_clip
 from anglecam.uncertainty import angle_draws, courses
 from support.drawn import Look, Recording, draw_session
 

@@ -13,7 +13,7 @@ from anglecam.errors import InputError
 from anglecam.measurement import measure_clip
 from anglecam.rig import Mouth, Pivot, Rig, read_rig
 from anglecam.session import Command, read_command
-from anglecam.sighting import sight_clip
+from anglecam.sight_clip import sight_clip
 from support import broken
 from support.drawn import Look, Recording, draw_frames, draw_session, write_clip
 

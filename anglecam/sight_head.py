@@ -1,0 +1,83 @@
+"""The coarse pass over a clip without a mouth: a head that turns as one rigid body, a face in profile as it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from anglecam.lens import lens_from_rig
+from anglecam.rig import Rig
+from anglecam.series import OK
+from anglecam.sighting import Sighting, find_pivot, frames_to_keep, why_truncated
+from anglecam.video.frames import inspect_clip, read_frames, sample_frames
+from anglecam.vision.circle import Circle
+from anglecam.vision.noise import pixel_noise
+from anglecam.vision.rigid import follow_head
+
+
+def sight_head(path: Path, rig: Rig) -> Sighting | str:
+    """Follow the rigid head in place of a mouth.
+
+    Parameters
+    ----------
+    path : Path
+        The clip.
+    rig : Rig
+        What is declared about pivot and camera.
+
+    Returns
+    -------
+    Sighting or str
+        Why not, in a few words.
+
+    Raises
+    ------
+    InputError
+        As `sight_clip`, for a file that cannot be read.
+    """
+    info = inspect_clip(path)
+    lens = lens_from_rig(rig, (info.width, info.height), path)
+    sample = sample_frames(path, frames_to_keep(info))
+    images = [f.image for f in sample.frames if f.image is not None]
+    noise = pixel_noise(images)
+    head = follow_head(read_frames(path), images, noise)
+    if isinstance(head, str):
+        return head
+    stamps, repeated, before = [], [], None
+    for frame in read_frames(path):
+        stamps.append(frame.time)
+        same = frame.image is not None and before is not None and np.array_equal(frame.image, before)
+        repeated.append(same)
+        before = frame.image
+    lever = float(np.hypot(*(head.centre_px - head.pivot_px)))
+    turned = Circle(
+        head.pivot_px,
+        lever,
+        head.wander_px,
+        np.pad(head.pivot_covariance_px2, (0, 1)) + np.diag([0.0, 0.0, float(np.trace(head.pivot_covariance_px2))]),
+        np.ones(len(stamps), bool),
+    )
+    marker, pivot, disagreement = find_pivot(images, rig, turned, lens)
+    if pivot is None or OK not in head.status:
+        return "it hardly turns"
+    notes = ["the rigid head alone is measured, without a mouth", *([disagreement] if disagreement else [])]
+    return Sighting(
+        time=np.array(stamps),
+        status=head.status,
+        regions=(None,) * len(stamps),
+        smeared=np.zeros(len(stamps), bool),
+        pivot=pivot,
+        marker=marker,
+        circle=None,
+        moves=True,
+        lens=lens,
+        shakes=None,
+        head=head,
+        noise=noise,
+        repeated=np.array(repeated),
+        colour_rgb=None,
+        size=(info.width, info.height),
+        truncated=why_truncated(info, sample),
+        notes=tuple(notes),
+    )
