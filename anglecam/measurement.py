@@ -13,7 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.angles import Angles, coarse_angles, fine_angles, series_of_angles, turns, why_zero_is_elsewhere
+from anglecam.angle_series import series_of_angles, why_zero_is_elsewhere
+from anglecam.angles import Angles, coarse_angles, turns
+from anglecam.fine_angles import fine_angles
 from anglecam.registration import Registered, Start, register_clip
 from anglecam.rig import Rig
 from anglecam.series import OK, AngleSeries

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.angles import Angles, angles_of_places, series_of_angles, why_zero_is_elsewhere
+from anglecam.angle_series import series_of_angles, why_zero_is_elsewhere
+from anglecam.angles import Angles, angles_of_places
 from anglecam.budget import PlaceErrors
 from anglecam.errors import InputError, RigError
 from anglecam.lens import lens_from_rig
