@@ -29,8 +29,9 @@ _LEAST_CONTRAST = 8.0
 """Units of a*, b* by which the mouth's hue must stand out; JPEG's own chroma errors reach 3 or 4."""
 _TOP_PX = 40
 """The most mouth-like hue is that of the 40th pixel, past the codec's outliers."""
-_MOST_NOISE = 0.15
-"""Standard deviation of the surroundings' fraction of mouth above which they and the mouth are one."""
+_MOST_NOISE, _MOST_NOISE_DECLARED = 0.15, 0.25
+"""Standard deviation of the surroundings' fraction of mouth above which they and the mouth are one; a mouth of the very
+colour that is declared may stand out less, as brick-red lips on brown skin do."""
 _HUE_TOLERANCE = np.radians(25.0)
 
 
@@ -91,7 +92,7 @@ def find_mouth(
             if at_rest:
                 tracks.append(resting_track(patches, images, level))
         for track in sorted((one for one in tracks if one is not None), key=lambda t: -t.score):
-            model = _learn(images, maps, track)
+            model = _learn(images, maps, track, _MOST_NOISE if rgb is None else _MOST_NOISE_DECLARED)
             if model is None or (rgb is not None and not _same_hue(model.chroma, chroma_of(rgb))):
                 continue
             area, place = track.patches.area[track.members], track.patches.place[track.members]
@@ -121,7 +122,9 @@ def _something_moves(images: Sequence[Image]) -> bool:
     return False
 
 
-def _learn(images: Sequence[Image], maps: Sequence[NDArray[Any]], track: Track) -> ColourModel | None:
+def _learn(
+    images: Sequence[Image], maps: Sequence[NDArray[Any]], track: Track, most_noise: float
+) -> ColourModel | None:
     """Learn the colour from a track's patches; ``None`` where they do not stand out from what is next to them."""
     inside, around, elsewhere, contrast = [], [], [], []
     for m in track.members:
@@ -148,7 +151,7 @@ def _learn(images: Sequence[Image], maps: Sequence[NDArray[Any]], track: Track) 
     if min(map(len, parts)) < 20 or np.median(contrast) < _LEAST_CONTRAST:
         return None
     model = learn_colour(*parts)
-    return model if model.noise < _MOST_NOISE else None
+    return model if model.noise < most_noise else None
 
 
 def _same_hue(chroma: Floats, declared: Floats) -> bool:
