@@ -29,6 +29,8 @@ LEAST_DEG, MOST_DEG = 0.04, 0.5
 WITHIN_SIGMA = 3
 READ_OUT = 0.9
 """Largest share of the time between frames that a rolling shutter takes."""
+MOST_TILT_DEG = 25.0
+"""Who films at more of a slant knows it."""
 HALVINGS = 4
 """How often a size that the rig cannot show is tried at half."""
 
@@ -85,9 +87,13 @@ def _sized(name: str, seed: int, rng: np.random.Generator) -> Effects:
     leaves_deg = math.exp(rng.uniform(math.log(LEAST_DEG), math.log(MOST_DEG)))
     for halving in range(HALVINGS):
         try:
-            return scaled(draw(name, seed), seed, leaves_deg / 2**halving, sigma_deg=1.0)
+            effects = scaled(draw(name, seed), seed, leaves_deg / 2**halving, sigma_deg=1.0)
         except ValueError as error:
             cause = error
+            continue
+        if effects[name].get("tilt_deg", 0.0) <= MOST_TILT_DEG:
+            return effects
+        cause = ValueError(f"{name}: session {seed} shows less of it than can be seen")
     raise cause
 
 
