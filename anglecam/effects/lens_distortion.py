@@ -8,6 +8,8 @@ and leaves them out.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,12 +17,18 @@ from anglecam.effects.effect import Effect, Parameter, View
 
 Floats = NDArray[np.float64]
 
+ROUNDS = 8
+"""Steps in which the picture is undone; each leaves a share of the error that is as large as the distortion itself."""
+LEAST = 0.3
+"""A lens does not draw a picture in by more."""
+
 
 def _seen(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
     lever, pivot = view.lever_px or 1.0, view.pivot_px or (0.0, 0.0)
     # ahead and up from the middle of the picture, in lever arms
     side = -1.0 if view.mirrored else 1.0
-    centre = np.array([side * pivot[0], -pivot[1]]) / lever
+    shown = np.array([side * pivot[0], -pivot[1]]) / lever
+    centre, neutral = _undone(shown, view.neutral, parameters[0])
 
     def filmed(place: Floats) -> Floats:
         return place * (1.0 + parameters[0] * (place**2).sum(axis=-1, keepdims=True))
@@ -31,7 +39,18 @@ def _seen(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats
         cross, dot = arm[..., 0] * seen[..., 1] - arm[..., 1] * seen[..., 0], (arm * seen).sum(axis=-1)
         return np.arctan2(cross, dot)
 
-    return angle + line(view.neutral + angle) - line(np.asarray(view.neutral))
+    return angle + line(neutral + angle) - line(np.asarray(neutral))
+
+
+def _undone(shown: Floats, neutral: float, kappa: float) -> tuple[Floats, float]:
+    """Return where the pivot is, in true lever arms, and the true neutral, of what the picture shows of both."""
+    places = np.stack([shown, shown + [math.cos(neutral), math.sin(neutral)]])
+    true, lever = places, 1.0
+    for _ in range(ROUNDS):
+        true = places / np.maximum(1.0 + kappa * (true**2).sum(axis=1, keepdims=True) / lever**2, LEAST)
+        arm = true[1] - true[0]
+        lever = math.hypot(*arm)
+    return true[0] / lever, math.atan2(arm[1], arm[0])
 
 
 def _needs(view: View) -> bool:

@@ -102,8 +102,13 @@ def test_a_lens_draws_mouth_and_pivot_about_the_middle_of_the_picture():
     def drawn(place):
         return place * (1.0 + kappa * (place**2).sum(axis=-1, keepdims=True))
 
-    expected = _zeroed(_line(drawn(centre + _mouth()), drawn(centre)))
-    assert _zeroed(_seen("lens_distortion", kappa)) == pytest.approx(expected, abs=2e-6)
+    at_rest = np.array([np.cos(VIEW.neutral), np.sin(VIEW.neutral)])
+    pivot, arm = drawn(centre), drawn(centre + at_rest) - drawn(centre)
+    lever = VIEW.lever_px * float(np.hypot(*arm))
+    x, y = VIEW.lever_px * pivot
+    view = View(float(np.arctan2(arm[1], arm[0])), lever, (float(x), float(-y)))  # all that the picture shows
+    found = effect("lens_distortion").seen(TIME, NOD, np.array([kappa]), view)
+    assert _zeroed(found) == pytest.approx(_zeroed(_line(drawn(centre + _mouth()), pivot)), abs=2e-6)
 
 
 def test_a_mouth_lower_in_the_picture_is_seen_later():
