@@ -131,3 +131,14 @@ def test_a_declared_rolling_shutter_moves_the_time_of_each_row(tmp_path):
     # undone by the stamps alone it would be a tenth of a degree
     assert np.median(np.abs(error)) < 0.002
     assert np.sqrt((error**2).mean()) < 0.02
+
+
+def test_brick_red_lips_on_brown_skin_are_found_by_the_colour_that_is_declared(tmp_path):
+    measured, truth = _measure(
+        tmp_path,
+        command=STAIRS,
+        rig={"skin": "brown", "lips": "brick", "lever_px": 190},
+        camera={"codec": "h264", "crf": 20, "noise_grey": 5.0, "gamma": 2.2, "focus_blur_px": 0.8},
+        declare={"mouth": {"rgb": [150, 56, 42]}, "pivot": {"near": [238, 298]}},
+    )
+    _all_right(measured, truth, 0.1)
