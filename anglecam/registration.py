@@ -145,7 +145,7 @@ def register_clip(
         look = learn(glimpses, tiles, plane, start.pivot)
     del glimpses
     if look.yielding > _YIELDING:
-        return "the head is seen in too few poses to be learnt"
+        return "the head is seen in too few poses, or at too much of a slant, to be learnt"
     apart = look.pivot_px - start.pivot.centre_px
     if apart @ np.linalg.solve(look.pivot_covariance_px2 + start.pivot.covariance_px2, apart) > _ASTRAY:
         return "what is rigid in the picture does not turn about the pivot"
