@@ -40,6 +40,8 @@ LIKELIEST = 2
 NEGLIGIBLE = 2.0
 """In a film, structure smaller than this many times the angle's stated uncertainty is neither traced nor called
 unexplained: it may be the measurement's own."""
+DECISIVE = 10.0
+"""Log-likelihood from which on evidence chooses between effects whose predictions a film's angle hardly tells apart."""
 SURE = 0.01
 """What an effect explains must be this improbable as noise; and so must what remains once one has proven itself, to be
 traced further or to take the verdict back."""
@@ -102,13 +104,14 @@ def smallest(task: Task, first: Round) -> float:
 def candidates_of(task: Task, now: Round) -> list[Candidate]:
     """Fit what is promising beside what the model has, strongest evidence first.
 
-    Of those whose predictions differ from the best's by less than a film's angle is uncertain, the one with fewest
-    parameters comes first.
+    Of those whose predictions differ from the best's by less than a film's angle is uncertain, and whose evidence is
+    nearly as strong, the one with fewest parameters comes first.
     """
     found = fit_candidates(now.fit, now.unseen, task.fitted, task.predicted, now.forecasts)
     if not found or task.camera == 0.0:
         return found
-    alike = [one for one in found if apart(one.fit, found[0].fit) <= task.camera]
+    near = [one for one in found if found[0].evidence - one.evidence <= DECISIVE]
+    alike = [one for one in near if apart(one.fit, found[0].fit) <= task.camera]
     first = min(alike, key=lambda one: len(one.effect.parameters))
     return [first, *(one for one in found if one is not first)]
 

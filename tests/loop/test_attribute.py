@@ -57,22 +57,22 @@ def test_a_curve_of_friction_is_confined_to_slow_motion():
     assert found["stribeck_speed_deg_per_s"] == pytest.approx(SLOW * fastest, rel=0.02)
 
 
-def test_what_differs_by_less_than_the_cameras_uncertainty_decides_nothing():
-    fitted, predicted = split_records(session({"camera_tilt": {"tilt_deg": 9.0}}, seed=3, sigma_deg=0.002), HELD_OUT)
+@pytest.mark.parametrize(("sigma_deg", "alike"), [(0.002, "camera_tilt"), (0.05, "lens_distortion")])
+def test_what_differs_by_less_than_the_cameras_uncertainty_is_chosen_by_strong_evidence_alone(sigma_deg, alike):
+    effects = {"camera_tilt": {"tilt_deg": 9.0}}
+    fitted, predicted = split_records(session(effects, seed=3, sigma_deg=sigma_deg), HELD_OUT)
     base = fit_output_error(Plant(), fitted, [np.array([26.0, 524.0, 508.0])])
     ledger = [effect(name) for name in ("camera_tilt", "lens_distortion")]
     tilt, lens = sorted(
         forecasts(base, directions(base, fitted, changes(base, fitted, ledger))), key=lambda f: f.effect.id
     )
-    best, other = (fit_with(base, fitted, one) for one in (tilt, lens))
-    distance = apart(best, other)
+    best = fit_with(base, fitted, tilt)
+    distance = apart(best, fit_with(base, fitted, lens))
     assert len(tilt.effect.parameters) > len(lens.effect.parameters)
-    for camera, kept, first in ((0.98 * distance, [], "camera_tilt"), (1.02 * distance, [lens], "lens_distortion")):
-        found = rivals(best, base, fitted, tilt.effect, [lens], camera)
-        assert list(found) == [one.effect.id for one in kept]
-        floor = Noise(camera, 0.0, 0.1, DISTANCE)
-        task = Task(tuple(fitted), tuple(predicted), tuple(ledger), floor, np.random.default_rng(0), lambda stage: None)
-        assert candidates_of(task, look(task, base))[0].effect.id == first
+    assert list(rivals(best, base, fitted, tilt.effect, [lens], 1.02 * distance)) == ["lens_distortion"]
+    floor = Noise(1.02 * distance, 0.0, 0.1, DISTANCE)
+    task = Task(tuple(fitted), tuple(predicted), tuple(ledger), floor, np.random.default_rng(0), lambda stage: None)
+    assert candidates_of(task, look(task, base))[0].effect.id == alike
 
 
 def test_a_fit_ends_only_where_nothing_more_is_gained():
