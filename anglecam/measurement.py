@@ -228,6 +228,8 @@ def _series(
     series = series_of_angles(
         name, time, status, ok, angles, mouths, pivots, rig, picture_px=seen.size, marker_px=marker
     )
+    if seen.head is not None:
+        return replace(series, by_mouth=False)
     return replace(series, own_turn=_own_turn(seen, ok)) if series.by_mouth else series
 
 

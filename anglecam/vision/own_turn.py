@@ -1,6 +1,7 @@
 """Whether the mouth turns with the line to it: as it must in a view that is square to the plane of motion.
 
-In a slanted view a mouth stands out before the plane, and its outline turns by less or more than its place does.
+In a slanted view a mouth stands out before the plane, and its outline turns by less or more than its place does; so it
+does, by less, where a strong lens bends the picture.
 """
 
 from __future__ import annotations
