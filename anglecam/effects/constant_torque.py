@@ -12,13 +12,12 @@ from __future__ import annotations
 import math
 
 from numba import njit
-from numpy.typing import NDArray
 
-from anglecam.effects.effect import Effect, Parameter
+from anglecam.effects.effect import Effect, Parameter, Values
 
 
 @njit
-def _load(theta: float, omega: float, parameters: NDArray) -> float:
+def _load(theta: float, omega: float, parameters: Values) -> float:
     return parameters[0]
 
 

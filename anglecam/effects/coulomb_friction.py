@@ -13,15 +13,14 @@ from __future__ import annotations
 import math
 
 from numba import njit
-from numpy.typing import NDArray
 
-from anglecam.effects.effect import Effect, Parameter
+from anglecam.effects.effect import Effect, Parameter, Values
 
 SI_TO_FILE = math.degrees(1.0)
 
 
 @njit
-def _dry(parameters: NDArray) -> tuple[float, float, float, float]:
+def _dry(parameters: Values) -> tuple[float, float, float, float]:
     mean, difference, more = parameters[0], parameters[1], parameters[2]
     breakaway = mean + more if more > 0.0 else 0.0
     return max(mean + difference, 0.0), max(mean - difference, 0.0), breakaway, parameters[3]

@@ -12,13 +12,12 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from anglecam.effects.effect import Effect, Parameter
+from anglecam.effects.effect import Effect, Parameter, Values
 
 
 @njit
-def _servo(torque: float, theta: float, abc: NDArray, parameters: NDArray) -> float:
+def _servo(torque: float, theta: float, abc: Values, parameters: Values) -> float:
     if parameters[0] == 0.0:
         return torque
     width = abs(abc[2]) * parameters[0]

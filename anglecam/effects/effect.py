@@ -24,6 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Values = tuple[float, ...]
+"""Parameters as compiled functions take them: arrays would cost them more than what they work out."""
 
 PORTS = ("command", "lag", "servo", "load", "dry", "when", "seen")
 

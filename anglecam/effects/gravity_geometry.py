@@ -12,13 +12,12 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from anglecam.effects.effect import Effect, Parameter
+from anglecam.effects.effect import Effect, Parameter, Values
 
 
 @njit
-def _load(theta: float, omega: float, parameters: NDArray) -> float:
+def _load(theta: float, omega: float, parameters: Values) -> float:
     if parameters[0] == 0.0:
         return 0.0
     neutral = parameters[1]

@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from anglecam.effects.effect import Effect, Parameter
+from anglecam.effects.effect import Effect, Parameter, Values
 from anglecam.neck.fourbar import NEUTRAL_SERVO, FourBar, head_angle, reach, servo_angle
 from anglecam.neck.transmission import slope
 
@@ -30,7 +29,7 @@ _LEVER = _AT_NEUTRAL / slope(_LINKS, _CRANK)
 
 
 @njit
-def _servo(torque: float, theta: float, abc: NDArray, parameters: NDArray) -> float:
+def _servo(torque: float, theta: float, abc: Values, parameters: Values) -> float:
     amount = parameters[0]
     if amount == 0.0:
         return torque

@@ -8,13 +8,12 @@ The paper takes the spring for linear in the angle, Eqs. (18a) and (25); its own
 from __future__ import annotations
 
 from numba import njit
-from numpy.typing import NDArray
 
-from anglecam.effects.effect import Effect, Parameter
+from anglecam.effects.effect import Effect, Parameter, Values
 
 
 @njit
-def _load(theta: float, omega: float, parameters: NDArray) -> float:
+def _load(theta: float, omega: float, parameters: Values) -> float:
     return -parameters[0] * theta**3
 
 

@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 
 from numba import njit
-from numpy.typing import NDArray
 
-from anglecam.effects.effect import Effect, Parameter
+from anglecam.effects.effect import Effect, Parameter, Values
 
 
 @njit
-def _servo(torque: float, theta: float, abc: NDArray, parameters: NDArray) -> float:
+def _servo(torque: float, theta: float, abc: Values, parameters: Values) -> float:
     inverse, share = parameters[0], parameters[1]
     if inverse <= 0.0:
         return torque

@@ -42,6 +42,14 @@ WIDTH = max(len(e.parameters) for e in LEDGER)
 """Parameters an effect may have: the rows of the integrator's parameter tables are this long."""
 
 
+def _tuple_of(count, item):  # type: ignore[no-untyped-def]  # compiled
+    """Compile the tuple of an array's first items; to take them from the array costs more than to work with them."""
+    if count == 0:
+        return njit(lambda array: ())
+    before = _tuple_of(count - 1, item)
+    return njit(lambda array: before(array) + (item(array[count - 1]),))  # numba knows no other way
+
+
 def _chain_of_servos(servos, row=0):  # type: ignore[no-untyped-def]  # compiled
     """Compile the servo functions, one after another, each with its row of the parameter table, into one function."""
     if row == len(servos):
@@ -73,6 +81,8 @@ def _sum_of_dries(dries, row=0):  # type: ignore[no-untyped-def]  # compiled
     return total
 
 
+_row = _tuple_of(WIDTH, njit(lambda value: value))
+_rows_of_servos, _rows_of_loads, _rows_of_dries = (_tuple_of(len(ids), _row) for ids in (SERVO_IDS, LOAD_IDS, DRY_IDS))
 _servo = _chain_of_servos([e.servo for e in _SERVOS])
 _load = _sum_of_loads([e.load for e in LEDGER if e.load is not None])
 _friction = _sum_of_dries([e.dry for e in LEDGER if e.dry is not None])
@@ -221,9 +231,10 @@ def _series(theta, omega, h, level, slope, off, lag, abc):  # type: ignore[no-un
 @njit
 def _run(time, theta, omega, knots, lag, abc, servos, loads, dries, max_step):  # type: ignore[no-untyped-def]
     n, m = len(time), knots.shape[1]
+    plant, servo_rows, load_rows = (abc[0], abc[1], abc[2]), _rows_of_servos(servos), _rows_of_loads(loads)
     states = np.empty((n, 2))
     states[0] = theta, omega
-    dry = _friction(dries)
+    dry = _friction(_rows_of_dries(dries))
     k, now = -1, time[0]
     while k + 1 < m and knots[0, k + 1] <= now:
         k += 1
@@ -248,7 +259,9 @@ def _run(time, theta, omega, knots, lag, abc, servos, loads, dries, max_step):  
                     steps = int(np.ceil((end - begin) / longest)) if end > begin else 0
                     for step in range(steps):
                         h = (end - begin) / steps
-                        theta, omega = _advance(theta, omega, begin + step * h, h, line, lag, abc, servos, loads, dry)
+                        theta, omega = _advance(
+                            theta, omega, begin + step * h, h, line, lag, plant, servo_rows, load_rows, dry
+                        )
             v = _asked(stop - now, line, lag)
             now = stop
             while k + 1 < m and knots[0, k + 1] <= now:
