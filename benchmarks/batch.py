@@ -2,12 +2,13 @@
 
     PYTHONPATH=tests .venv/bin/python benchmarks/batch.py [clips] [kills]
 
-Films: thirty frames of a nodding head, 320 × 240, ten of them under many names. Each is measured by a bare loop in one
-process (one thread, as the batch's jobs have), by a batch with one job and by a batch with two.
+Films: thirty frames of a nodding head, 320 × 240, ten of them under many names. All are measured by a batch with one
+job and by a batch with two; sixty also by a bare loop in one process (one thread, as the batch's jobs have)
+and by batches of their own, one of them unbroken and one killed again and again.
 
 - Gain: wall time with two jobs over that with one.
-- Overhead: wall time × jobs less the sum of the clips' wall times, as a share of wall time × jobs; and wall time with
-  one job over that of the bare loop, less one. Both include starting Python and writing the index.
+- Overhead: wall time × jobs less the sum of the clips' wall times, as a share of wall time × jobs; and a clip's part of
+  wall time with one job over that in the bare loop, less one. Both include starting Python and writing the index.
 - Memory: the batch's own resident size when a tenth, half and all of the clips are done, its measuring processes apart.
 - Kills: a batch with two jobs is killed (SIGKILL, in turn the batch itself and first one of its measuring processes) at
   instants drawn evenly over the time that an unbroken one takes, and started again with `--retry-failed` until it has
@@ -34,7 +35,7 @@ import numpy as np
 from support.drawn import RATE_HZ, Look, draw_frames
 from support.tiny import batch_command, children, is_alive, results, unfinished
 
-CLIPS, KILLS = 1_000, 20
+CLIPS, FEW, KILLS = 1_000, 60, 20
 SIZE, FRAMES, FILMS = (320, 240), 30, 10
 SINGLE = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
 
@@ -150,16 +151,17 @@ def main() -> None:
     kills = int(sys.argv[2]) if len(sys.argv) > 2 else KILLS
     with tempfile.TemporaryDirectory() as folder:
         top = Path(folder)
-        lab = film(top / "lab", clips)
-        plain = bare(lab, top / "bare")
+        lab, few = film(top / "lab", clips), film(top / "few", min(clips, FEW))
+        plain = bare(few, top / "bare") / min(clips, FEW)
         one, _ = batch(lab, top / "one", 1)
         two, sizes = batch(lab, top / "two", 2)
         print(f"{clips} clips of {FRAMES} frames, {SIZE[0]} × {SIZE[1]}; {os.cpu_count()} cores")
-        print(f"bare loop {plain:.1f} s; one job {one:.1f} s; two jobs {two:.1f} s: {two / one:.2f} × one job")
+        print(f"bare loop {plain:.2f} s a clip; one job {one:.0f} s; two jobs {two:.0f} s: {two / one:.2f} × one job")
         print(f"overhead by the clips' own wall times: {overhead(top / 'one', one, 1):.1%} with one job, ", end="")
-        print(f"{overhead(top / 'two', two, 2):.1%} with two; over the bare loop {one / plain - 1.0:.1%}")
+        print(f"{overhead(top / 'two', two, 2):.1%} with two; over the bare loop {one / clips / plain - 1.0:.1%}")
         print(f"memory when a tenth, half, all are done: {', '.join(f'{size:.0f}' for size in sizes)} MB")
-        print(killed_and_resumed(lab, top / "two", top / "killed", kills, two))
+        span, _ = batch(few, top / "unbroken", 2)
+        print(killed_and_resumed(few, top / "unbroken", top / "killed", kills, span))
 
 
 if __name__ == "__main__":
