@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -61,8 +62,13 @@ def shown_to_loop(session: Session, measured: Measured) -> Shown:
     if not differs:
         return Shown(kept, measured.records, differs)
     commands = {recording.name: recording.command for recording in session.recordings}
-    known = session.rig.neutral != "auto"
-    return Shown(kept, tuple(record_from_series(one, commands[one.name], zero_known=known) for one in kept), differs)
+    return Shown(kept, tuple(_record(one, commands[one.name], session.rig) for one in kept), differs)
+
+
+def _record(series: AngleSeries, command: Command | None, rig: Rig) -> Record:
+    declared = rig.model.gravity_deg
+    upright = None if declared is None else math.radians(declared)
+    return record_from_series(series, command, zero_known=rig.neutral != "auto", upright=upright)
 
 
 def measure_recording(
@@ -149,7 +155,6 @@ def gather_session(session: Session, series_of: Callable[[Recording], tuple[Angl
         In the order of the recordings' names.
     """
     series, records, problems = [], [], list(session.problems)
-    zero_known = session.rig.neutral != "auto"
     for recording in session.recordings:
         try:
             if recording.is_series:
@@ -159,7 +164,7 @@ def gather_session(session: Session, series_of: Callable[[Recording], tuple[Angl
                 if truncated:
                     problems.append(InputError(f"{recording.source}: {truncated}"))
             series.append(one)
-            records.append(record_from_series(one, recording.command, zero_known=zero_known))
+            records.append(_record(one, recording.command, session.rig))
         except InputError as problem:
             problems.append(problem)
     return Measured(tuple(series), tuple(records), tuple(problems))

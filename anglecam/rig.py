@@ -114,7 +114,6 @@ class Rig(Declared):
         """Name the declared keys that this version reads but does not yet act on."""
         keys = {
             "sync.lamp": self.sync.lamp,
-            "model.gravity_deg": self.model.gravity_deg,
         }
         return [key for key, value in keys.items() if value is not None]
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from anglecam.errors import InputError, RigError
+from anglecam.recordings import measure_session
 from anglecam.rig import read_rig
 from anglecam.series import COLUMNS, AngleSeries, read_series, write_series
 from anglecam.session import Command, read_command, read_session
@@ -150,3 +151,12 @@ def test_a_command_without_a_recording_is_told(tmp_path):
     session = read_session(tmp_path)
     assert session.problems == ()
     assert "b.command.csv" in session.notes[0]
+
+
+def test_a_declared_centre_of_mass_comes_with_every_recording(tmp_path):
+    rows = "".join(f"{k / 30:.4f},{10 * np.sin(k / 5):.4f}\n" for k in range(60))
+    (tmp_path / "swing.angles.csv").write_text("time_s,angle_deg\n" + rows)
+    for declared, upright in (("{}", None), ("model: {gravity_deg: -30}", np.radians(-30.0))):
+        (tmp_path / "rig.yaml").write_text(declared)
+        (record,) = measure_session(read_session(tmp_path)).records
+        assert record.upright == upright

@@ -117,6 +117,8 @@ class Effect:
     separating_experiment: str
     """What to record next to tell it from its aliases."""
     source: str
+    declared: Values = ()
+    """What the parameters would be that stand after these, SI: known, so that they are not fitted."""
     rank: int = 0
     """Place among the effects of the same port, on the signal's way."""
     command: Callable[[Knots, Floats], Knots] | None = field(default=None, repr=False)

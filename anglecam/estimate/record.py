@@ -42,6 +42,8 @@ class Record:
     direction in which nothing can move; ``None`` for a series without marks."""
     view: View = UNSEEN
     """How the camera sees the mechanism."""
+    upright: float | None = None
+    """The centre of mass from upright at neutral, rad, where it is declared."""
 
     @property
     def interval(self) -> float:
@@ -58,7 +60,9 @@ class Record:
         return replace(self, time=self.time[frames], angle=self.angle[frames], sigma=self.sigma[frames], cross=cross)
 
 
-def record_from_series(series: AngleSeries, command: Command | None, *, zero_known: bool) -> Record:
+def record_from_series(
+    series: AngleSeries, command: Command | None, *, zero_known: bool, upright: float | None = None
+) -> Record:
     """Keep what an estimator can use of a series.
 
     Parameters
@@ -69,6 +73,8 @@ def record_from_series(series: AngleSeries, command: Command | None, *, zero_kno
         On the same clock.
     zero_known : bool
         Whether the rig declares ``neutral`` as a number.
+    upright : float, optional
+        The centre of mass from upright at neutral, rad, where the rig declares it.
 
     Returns
     -------
@@ -97,6 +103,7 @@ def record_from_series(series: AngleSeries, command: Command | None, *, zero_kno
         series.sigma[ok],
         cross,
         _view(series, ok),
+        upright,
     )
     return record if acts else _from_release(record)
 

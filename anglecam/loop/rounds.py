@@ -16,6 +16,7 @@ import numpy as np
 from scipy import special
 
 from anglecam.effects import LEDGER, Effect
+from anglecam.effects.gravity_geometry import gravity_from
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise, autoregression
 from anglecam.estimate.record import Record
@@ -211,8 +212,9 @@ def applicable(records: Sequence[Record]) -> list[Effect]:
     """List the effects that recordings can show: a free swing has no command, a series without marks no rows."""
     driven = any(r.command is not None for r in records)
     known = all(r.zero_known for r in records)
+    upright = next((r.upright for r in records if r.upright is not None), None)
     return [
-        e
+        e if upright is None or e.id != "gravity_geometry" else gravity_from(upright)
         for e in LEDGER
         if (driven or e.port not in ("command", "lag", "servo"))
         and (known or e.id != "constant_torque")

@@ -130,7 +130,8 @@ class Plant:
                 lag += effect.lag(own)
             for ids, table, port in zip((SERVO_IDS, LOAD_IDS, DRY_IDS), tables, ("servo", "load", "dry"), strict=True):
                 if effect.port == port:
-                    table[ids.index(effect.id), : len(own)] = own
+                    both = (*own, *effect.declared)
+                    table[ids.index(effect.id), : len(both)] = both
             if effect.port in ("servo", "load", "dry"):
                 step = KINKED_STEP if effect.port == "servo" or step == KINKED_STEP else MAX_STEP
         rows = np.stack([knots.time, knots.level, knots.slope])

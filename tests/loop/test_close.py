@@ -45,6 +45,20 @@ def test_two_hidden_effects_are_both_named():
     assert {e["id"] for e in result["effects"]} == {"dead_time", "coulomb_friction"}
 
 
+def test_a_declared_centre_of_mass_is_not_fitted_and_the_weight_is_told_so_much_better():
+    gravity = {"gravity_geometry": {"strength": 60.0, "gravity_deg": 20.0}}
+    records = drawn_session(gravity, seed=4, sigma_deg=0.01)
+    found = []
+    for upright in (None, np.radians(20.0)):
+        verdict = close_records([replace(r, upright=upright) for r in records], held_out=HELD_OUT)
+        assert [a.effect.id for a in verdict.accepted] == ["gravity_geometry"]
+        assert abs(verdict.after.parameters[3] - 60.0) < 3.0 * verdict.after.sigma[3]
+        found.append(verdict.after)
+    fitted, declared = found
+    assert declared.model.names[3:] == ("gravity_deg_per_s2",)
+    assert declared.sigma[3] < 0.25 * fitted.sigma[3]
+
+
 @pytest.fixture(scope="module")
 def clean():
     """Return the verdicts on sessions in which nothing is hidden, every other one's noise being coloured."""
