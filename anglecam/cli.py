@@ -263,7 +263,6 @@ def _open(session: Path, out: Path) -> tuple[Session, Measured]:
 
     opened = read_session(session)
     make_folder(out)
-    _say_what_is_not_applied(opened.rig, session / "rig.yaml")
     for note in opened.notes:
         errors.print(printable(note))
     with _progress() as bars:
@@ -306,7 +305,6 @@ def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement | MeasuredTrac
     from anglecam.recordings import measure_recording
 
     bar = bars.add_task(clip.name, total=None)
-    _say_what_is_not_applied(rig, clip)
     with blame(clip):
         measurement = measure_recording(
             clip,
@@ -317,11 +315,6 @@ def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement | MeasuredTrac
     for note in measurement.notes:
         screen.print(printable(f"{clip}: {note}"), soft_wrap=True, highlight=False, markup=False)
     return measurement
-
-
-def _say_what_is_not_applied(rig: Rig, where: Path) -> None:
-    for key in rig.not_applied():
-        errors.print(printable(f"{where}: {key} is declared but this version does not apply it"))
 
 
 @contextmanager

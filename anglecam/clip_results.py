@@ -13,6 +13,7 @@ from anglecam.report.figures import plot_series
 from anglecam.response import Response, responses, responses_as_dicts
 from anglecam.series import write_series
 from anglecam.session import SERIES_ENDING, Command
+from anglecam.sync import offset_of, on_clip_clock
 
 
 def write_measurement(
@@ -35,6 +36,7 @@ def write_measurement(
         How the angle answered every change.
     """
     series = measurement.series
+    command = on_clip_clock(command, offset_of(command, series.lamp_s))
     write_series(series, out / f"{series.name}{SERIES_ENDING}")
     changes = [] if command is None else command.time[1:][np.diff(command.angle) != 0.0].tolist()
     answers = responses(series.time, series.angle, series.sigma, changes)

@@ -24,6 +24,7 @@ from anglecam.shutter import measurement_time
 from anglecam.sight_clip import sight_clip
 from anglecam.sight_head import sight_head
 from anglecam.sighting import Sighting
+from anglecam.sync import DARK, note_on, offset_of, on_clip_clock, see_lamp
 from anglecam.video.rereading import decoded_once
 from anglecam.vision.own_turn import own_turn
 
@@ -48,6 +49,8 @@ class Measurement:
     """Why the angles are the mouth's own; ``None`` where they are the whole head's."""
     zero: str | None
     """Where zero is not where it should be, and why."""
+    clock: str | None
+    """Where the lamp shows that the command's clock is not the clip's, or does not show it."""
 
     @property
     def pivot(self) -> str:
@@ -70,7 +73,7 @@ class Measurement:
     def notes(self) -> tuple[str, ...]:
         """What the user should know, a line each."""
         coarse = () if self.why_coarse is None else (f"measured by the {self.by} alone: {self.why_coarse}",)
-        return (*self.sighting.notes, *coarse, *(() if self.zero is None else (self.zero,)))
+        return (*self.sighting.notes, *coarse, *(note for note in (self.zero, self.clock) if note is not None))
 
     @property
     def contours_px(self) -> tuple[NDArray[np.int32] | None, ...]:
@@ -91,7 +94,8 @@ def measure_clip(
     rig : Rig
         What is declared about mouth, pivot, direction, neutral and camera.
     command : Command, optional
-        What was commanded; its first change ends the rest that defines neutral.
+        What was commanded; its first change ends the rest that defines neutral. Where the rig declares a lamp, it is
+        dated by that.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
 
@@ -105,6 +109,9 @@ def measure_clip(
     InputError
         Where the file cannot be read, or no frame of it can be measured: one line with file, count and cause.
     """
+    lamp = None if command is None else see_lamp(path, rig)
+    offset = offset_of(command, lamp)
+    command = on_clip_clock(command, offset)
     seen = sight_clip(path, rig, progress)
     ok = np.array([s == OK for s in seen.status])
     row = _mouth_rows(seen)
@@ -133,8 +140,10 @@ def measure_clip(
                 other = coarse_angles(head, rigid, head.time, rig, command)
                 if (other.sigma**2).mean() < (angles.sigma**2).mean():
                     seen, ok, time, angles = head, rigid, head.time, other
-    series = _series(path, rig, time, seen, ok, angles)
-    return Measurement(series, seen, angles, why_coarse, why_zero_is_elsewhere(rig, command, time[ok]))
+    series = replace(_series(path, rig, time, seen, ok, angles), lamp_s=lamp)
+    zero = why_zero_is_elsewhere(rig, command, time[ok])
+    dark = lamp is None and command is not None and rig.sync.lamp is not None
+    return Measurement(series, seen, angles, why_coarse, zero, DARK if dark else note_on(offset))
 
 
 def _only_the_path_tells(seen: Sighting, rig: Rig) -> bool:

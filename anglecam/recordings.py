@@ -15,6 +15,7 @@ from anglecam.measurement import Measurement, measure_clip
 from anglecam.rig import Rig
 from anglecam.series import AngleSeries, read_series, write_series
 from anglecam.session import SERIES_ENDING, Command, Recording, Session
+from anglecam.sync import note_on, offsets, on_clip_clock
 from anglecam.uncorrected import uncorrected
 
 
@@ -28,7 +29,7 @@ class Measured:
     problems: tuple[InputError, ...]
     """What could not be used, one line each."""
     notes: tuple[str, ...] = ()
-    """What the user should know of tracks, such as which animal was followed, a line each."""
+    """What the user should know, such as which animal was followed in tracks, a line each."""
 
 
 @dataclass(frozen=True)
@@ -61,14 +62,15 @@ def shown_to_loop(session: Session, measured: Measured) -> Shown:
     kept = tuple(one for one in series if one.name in usable)
     if not differs:
         return Shown(kept, measured.records, differs)
-    commands = {recording.name: recording.command for recording in session.recordings}
-    return Shown(kept, tuple(_record(one, commands[one.name], session.rig) for one in kept), differs)
+    dated = {record.name: (record.command, record.clock_sigma) for record in measured.records}
+    return Shown(kept, tuple(_record(one, *dated[one.name], session.rig) for one in kept), differs)
 
 
-def _record(series: AngleSeries, command: Command | None, rig: Rig) -> Record:
+def _record(series: AngleSeries, command: Command | None, clock_sigma: float, rig: Rig) -> Record:
     declared = rig.model.gravity_deg
     upright = None if declared is None else math.radians(declared)
-    return record_from_series(series, command, zero_known=rig.neutral != "auto", upright=upright)
+    record = record_from_series(series, command, zero_known=rig.neutral != "auto", upright=upright)
+    return replace(record, clock_sigma=clock_sigma)
 
 
 def measure_recording(
@@ -136,7 +138,7 @@ def measure_session(
         return measurement.series, measurement.truncated
 
     gathered = gather_session(session, measured)
-    return replace(gathered, notes=tuple(notes))
+    return replace(gathered, notes=(*notes, *gathered.notes))
 
 
 def gather_session(session: Session, series_of: Callable[[Recording], tuple[AngleSeries, str | None]]) -> Measured:
@@ -155,6 +157,7 @@ def gather_session(session: Session, series_of: Callable[[Recording], tuple[Angl
         In the order of the recordings' names.
     """
     series, records, problems = [], [], list(session.problems)
+    commands: dict[str, Command | None] = {}
     for recording in session.recordings:
         try:
             if recording.is_series:
@@ -164,7 +167,15 @@ def gather_session(session: Session, series_of: Callable[[Recording], tuple[Angl
                 if truncated:
                     problems.append(InputError(f"{recording.source}: {truncated}"))
             series.append(one)
-            records.append(_record(one, recording.command, session.rig))
+            commands[one.name] = recording.command
         except InputError as problem:
             problems.append(problem)
-    return Measured(tuple(series), tuple(records), tuple(problems))
+    ahead = offsets(commands, {one.name: one.lamp_s for one in series})
+    for one in series:
+        offset = ahead[one.name]
+        try:
+            records.append(_record(one, on_clip_clock(commands[one.name], offset), offset.sigma, session.rig))
+        except InputError as problem:
+            problems.append(problem)
+    notes = [f"{one.name}: {said}" for one in series if (said := note_on(ahead[one.name]))]
+    return Measured(tuple(series), tuple(records), tuple(problems), tuple(notes))

@@ -57,6 +57,7 @@ class Sync(Declared):
     """What ties the command's clock to the clip's."""
 
     lamp: tuple[Finite, Finite] | None = None
+    """Where in the picture a lamp stands that lights at the first command change, px."""
 
 
 class Model(Declared):
@@ -109,13 +110,6 @@ class Rig(Declared):
     def mouth_rgb(self) -> tuple[int, int, int] | None:
         """The declared colour of the mouth, ``None`` where it is to be found."""
         return None if self.mouth == "auto" else self.mouth.rgb
-
-    def not_applied(self) -> list[str]:
-        """Name the declared keys that this version reads but does not yet act on."""
-        keys = {
-            "sync.lamp": self.sync.lamp,
-        }
-        return [key for key, value in keys.items() if value is not None]
 
 
 def read_rig(path: Path) -> Rig:

@@ -82,6 +82,8 @@ class AngleSeries:
     """Whether the angle was read off the mouth's own place; else that place is a second witness."""
     own_turn: tuple[float, float] | None = None
     """Share by which a mouth that was measured alone turns more than the line to it, and its standard uncertainty."""
+    lamp_s: tuple[float, float] | None = None
+    """Between which instants the lamp was lit that shows the first command change, s on the clip's clock."""
     only_pivot_differs: bool | None = None
     """Of an angle of the line from this mark: whether that is all by which it differs from the measured one."""
 

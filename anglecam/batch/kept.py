@@ -8,7 +8,7 @@ import numpy as np
 
 from anglecam.series import AngleSeries
 
-PAIRS = ("picture_px", "marker_px", "own_turn")
+PAIRS = ("picture_px", "marker_px", "own_turn", "lamp_s")
 
 
 def keep_series(series: AngleSeries, path: Path) -> None:
@@ -23,7 +23,7 @@ def keep_series(series: AngleSeries, path: Path) -> None:
         "radii": np.array(list(series.bounds)),
         "bounds": np.array(list(series.bounds.values())),
     }
-    for field in ("line", "mouth_px", "pivot_px", "picture_px", "marker_px", "own_turn", "only_pivot_differs"):
+    for field in ("line", "mouth_px", "pivot_px", *PAIRS, "only_pivot_differs"):
         value = getattr(series, field)
         if value is not None:
             arrays[field] = np.asarray(value)

@@ -42,6 +42,8 @@ class Record:
     direction in which nothing can move; ``None`` for a series without marks."""
     view: View = UNSEEN
     """How the camera sees the mechanism."""
+    clock_sigma: float = 0.0
+    """Standard uncertainty of the command's clock against the clip's, s."""
     upright: float | None = None
     """The centre of mass from upright at neutral, rad, where it is declared."""
 
@@ -103,7 +105,7 @@ def record_from_series(
         series.sigma[ok],
         cross,
         _view(series, ok),
-        upright,
+        upright=upright,
     )
     return record if acts else _from_release(record)
 

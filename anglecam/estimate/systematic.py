@@ -4,8 +4,9 @@ A pivot that is wrong by k lever arms turns the line to the mouth, against neutr
 
     k·sin θ    or, where it is wrong across,    k·(1 − cos θ)
 
-in every frame of its recording, and a declared neutral that is off moves all angles of all recordings alike. A fit
-follows such an error as if the mechanism had moved so. JCGM 100:2008, 5.1.2, of uncertainties of one origin.
+in every frame of its recording, a declared neutral that is off moves all angles of all recordings alike, and a command
+dated wrongly all motion. A fit follows such an error as if the mechanism had moved so. JCGM 100:2008, 5.1.2, of
+uncertainties of one origin.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ def systematic_covariance(fit: Fit, records: Sequence[Record], noise: Noise) -> 
     fit : Fit
         To ``records``.
     records : sequence of Record
-        With a stated uncertainty in every frame; without it nothing is added.
+        With a stated uncertainty in every frame; without it nothing but the command's clock is added.
     noise : Noise
         What of the stated uncertainty is each frame's own.
 
@@ -44,9 +45,21 @@ def systematic_covariance(fit: Fit, records: Sequence[Record], noise: Noise) -> 
     (p, p) ndarray
         SI; NaN for a parameter that its bound holds.
     """
+    pulls = [fit.pulled_by(records, _later(fit, records))] if any(r.clock_sigma for r in records) else []
+    if all(np.isfinite(r.sigma).all() for r in records):
+        pulls += _pulls_of_places(fit, records, noise)
     count = len(fit.parameters)
-    if not all(np.isfinite(r.sigma).all() for r in records):
-        return np.zeros((count, count))
+    return np.sum([np.outer(pull, pull) for pull in pulls], axis=0) if pulls else np.zeros((count, count))
+
+
+def _later(fit: Fit, records: Sequence[Record]) -> list[Floats]:
+    """Return what the angles would err by if all commands came later by their clock's uncertainty, rad."""
+    predicted = [r.angle - left for r, left in zip(records, fit.residuals, strict=True)]
+    return [r.clock_sigma * np.gradient(angle, r.time) for r, angle in zip(records, predicted, strict=True)]
+
+
+def _pulls_of_places(fit: Fit, records: Sequence[Record], noise: Noise) -> list[Floats]:
+    """Return what a neutral and pivots that are wrong by their uncertainties change each parameter by, SI."""
     stated = np.concatenate([r.sigma for r in records])
     shared = np.sqrt(max(0.0, float(np.mean(stated**2)) - noise.sigma**2))
     pulls = [shared * fit.pulled_by(records, [np.ones(len(r.time)) for r in records])]
@@ -55,7 +68,7 @@ def systematic_covariance(fit: Fit, records: Sequence[Record], noise: Noise) -> 
         for course in (np.sin, lambda angle: 1.0 - np.cos(angle)):
             errors = [wrong * course(r.angle) if r.name == name else np.zeros(len(r.time)) for r in records]
             pulls.append(fit.pulled_by(records, errors))
-    return np.sum([np.outer(pull, pull) for pull in pulls], axis=0)
+    return pulls
 
 
 def _wrong_pivot(records: Sequence[Record]) -> float:

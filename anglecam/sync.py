@@ -1,0 +1,129 @@
+"""The command's clock and the clip's: a lamp that lights at the first command change shows both.
+
+Between a dark frame and a lit one lies the instant of the change on the clip's clock; the command file says when it was
+on the command's. Clips of one session are taken to be off by one and the same time where one time suits them all: the
+frames of five clips then tell it several times better than those of one. A time of zero that suits is not corrected.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from anglecam.errors import RigError
+from anglecam.rig import Rig
+from anglecam.session import Command
+from anglecam.shutter import measurement_time
+from anglecam.video.frames import inspect_clip, read_frames
+from anglecam.vision.lamp import lit_between, patch_levels
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Offset:
+    """By how much a clip's clock is ahead of its command's."""
+
+    value: float
+    """s; 0 where the lamp does not contradict it."""
+    sigma: float
+    """Standard uncertainty, s."""
+
+
+AGREED = Offset(0.0, 0.0)
+DARK = "the lamp is not seen to light; the command's clock is taken for the clip's"
+
+
+def see_lamp(clip: Path, rig: Rig) -> Interval | None:
+    """Find when the lamp that the rig declares is lit first.
+
+    Parameters
+    ----------
+    clip : Path
+        A film.
+    rig : Rig
+        Whose ``sync.lamp`` says where the lamp is to be seen.
+
+    Returns
+    -------
+    (float, float) or None
+        The last instant at which it was surely dark and the first at which it was fully lit, s on the clip's clock;
+        ``None`` where no lamp is declared, or it does not light.
+
+    Raises
+    ------
+    RigError
+        Where the lamp lies outside the picture.
+    InputError
+        As `read_frames`.
+    """
+    place = rig.sync.lamp
+    if place is None:
+        return None
+    info = inspect_clip(clip)
+    if not (0.0 <= place[0] <= info.width - 1 and 0.0 <= place[1] <= info.height - 1):
+        where, size = f"[{place[0]:g}, {place[1]:g}]", f"{info.width} × {info.height}"
+        raise RigError(f"{clip}: sync: {{lamp: {where}}} lies outside its picture of {size} pixels")
+    frames = [(f.time, None if f.image is None else patch_levels(f.image, place)) for f in read_frames(clip)]
+    time = np.array([t for t, _ in frames])
+    levels = np.array([np.full(3, np.nan) if level is None else level for _, level in frames])
+    rows = np.full(len(time), place[1])
+    return lit_between(measurement_time(time, rows, info.height, rig.camera.row_time_s), levels)
+
+
+def offsets(commands: Mapping[str, Command | None], lit: Mapping[str, Interval | None]) -> dict[str, Offset]:
+    """Tell how far each clip's clock is ahead of its command's.
+
+    Parameters
+    ----------
+    commands : mapping
+        From a recording's name to its command.
+    lit : mapping
+        From a recording's name to what `see_lamp` found.
+
+    Returns
+    -------
+    dict
+        For each name in ``commands``; where nothing is known, the clocks agree.
+    """
+    ahead = {}
+    for name, command in commands.items():
+        change, between = None if command is None else command.first_change(), lit.get(name)
+        if change is not None and between is not None:
+            ahead[name] = (between[0] - change, between[1] - change)
+    if not ahead:
+        return dict.fromkeys(commands, AGREED)
+    common = max(low for low, _ in ahead.values()), min(high for _, high in ahead.values())
+    if common[0] <= common[1]:
+        return dict.fromkeys(commands, _offset(common))
+    return {name: _offset(ahead[name]) if name in ahead else AGREED for name in commands}
+
+
+def offset_of(command: Command | None, lit: Interval | None) -> Offset:
+    """Tell how far one clip's clock is ahead of its command's, as `offsets` does for several."""
+    return offsets({"": command}, {"": lit})[""]
+
+
+def note_on(offset: Offset) -> str | None:
+    """Say in a line that clocks disagree; ``None`` where they do not."""
+    if offset == AGREED:
+        return None
+    side = "ahead of" if offset.value > 0.0 else "behind"
+    return (
+        f"the lamp shows the clip's clock {abs(offset.value):.4f} s {side} the command's, ±{offset.sigma:.4f} s; "
+        "the command is dated by the lamp"
+    )
+
+
+def on_clip_clock(command: Command | None, offset: Offset) -> Command | None:
+    """Return a command as the clip's clock dates it."""
+    return None if command is None else replace(command, time=command.time + offset.value)
+
+
+def _offset(ahead: Interval) -> Offset:
+    low, high = ahead
+    return AGREED if low <= 0.0 <= high else Offset(0.5 * (low + high), (high - low) / math.sqrt(12.0))
