@@ -11,6 +11,7 @@ paper's damping is a lubricant film alone, Eqs. (19)–(22).
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from numba import njit
 
@@ -65,3 +66,9 @@ EFFECT = Effect(
     source="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994",
     dry=_dry,
 )
+
+
+def even_friction() -> Effect:
+    """Return the effect with both directions alike: a difference moves the head as a wrong zero of the angle does."""
+    mean, _, *others = EFFECT.parameters
+    return replace(EFFECT, parameters=(mean, *others), fixed=((1, 0.0),))

@@ -117,8 +117,8 @@ class Effect:
     separating_experiment: str
     """What to record next to tell it from its aliases."""
     source: str
-    declared: Values = ()
-    """What the parameters would be that stand after these, SI: known, so that they are not fitted."""
+    fixed: tuple[tuple[int, float], ...] = ()
+    """Places, ascending, and values, SI, of parameters that are not fitted: they are known, or cannot be."""
     rank: int = 0
     """Place among the effects of the same port, on the signal's way."""
     command: Callable[[Knots, Floats], Knots] | None = field(default=None, repr=False)
@@ -139,6 +139,12 @@ class Effect:
     """(stamps s, angle rad, parameters, view) → the angle that is measured, rad."""
     needs: Callable[[View], bool] = field(default=lambda view: True, repr=False)
     """Whether a view tells what the effect is reckoned from."""
+
+    def complete(self, own: Floats) -> Floats:
+        """Put the parameters that are `fixed` among the (k,) fitted ones."""
+        for place, value in self.fixed:
+            own = np.insert(own, place, value)
+        return own
 
     @property
     def null(self) -> Floats:

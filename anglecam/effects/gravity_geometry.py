@@ -54,4 +54,4 @@ EFFECT = Effect(
 
 def gravity_from(upright: float) -> Effect:
     """Return the effect with its centre of mass declared: ``upright`` is its angle from upright at neutral, rad."""
-    return replace(EFFECT, parameters=EFFECT.parameters[:1], declared=(upright,))
+    return replace(EFFECT, parameters=EFFECT.parameters[:1], fixed=((1, upright),))

@@ -75,7 +75,7 @@ class Fit:
 
     @cached_property
     def sigma(self) -> Floats:
-        """(p,) standard uncertainties of ``parameters``, SI, NaN for a parameter that its bound holds.
+        """(p,) standard uncertainties of ``parameters``, SI; NaN for one that cannot be told: a bound holds it, or it moves nothing.
 
         The larger of what noise that the whitening made white would give, and of what is left over itself gives if it
         may hang together within `CLUSTER` frames: a measurement's errors follow the motion, and so does what a model's
@@ -86,7 +86,7 @@ class Fit:
 
     @cached_property
     def covariance(self) -> Floats:
-        """(p, p) covariance of ``parameters``, SI, likewise; NaN for a parameter that its bound holds."""
+        """(p, p) covariance of ``parameters``, SI, likewise; NaN for a parameter that cannot be told."""
         return self._covariance(lambda jacobian: jacobian)
 
     def coloured_covariance(self, records: Sequence[Record], phi: float) -> Floats:
@@ -115,7 +115,7 @@ class Fit:
     def pulled_by(self, records: Sequence[Record], errors: Sequence[Floats]) -> Floats:
         """Return (p,) by how much each parameter changes, SI, with errors of the angles (rad, one array a recording).
 
-        Nothing for what zeros and initial states that are fitted take up; NaN for a parameter that its bound holds.
+        Nothing for what zeros and initial states that are fitted take up; NaN for a parameter that cannot be told.
         """
         free, jacobian, norm = self._free_columns()
         white = np.concatenate([whiten(r, self.phi, error) for r, error in zip(records, errors, strict=True)])
@@ -125,10 +125,12 @@ class Fit:
         return told
 
     def _free_columns(self) -> tuple[NDArray[np.bool_], Floats, Floats]:
-        """Return which parameters no bound holds, and theirs and all own columns of the Jacobian over their norms."""
+        """Return which parameters can be told, and theirs and all own columns of the Jacobian over their norms."""
         p = len(self.parameters)
         margin = 1e-6 * self.model.scales
         free = (self.parameters > self.model.lower + margin) & (self.parameters < self.model.upper - margin)
+        # what lets go or does not moves nothing if it is a little more or less
+        free &= np.linalg.norm(self.jacobian[:, :p], axis=0) > 0.0
         columns = np.concatenate([free, np.ones(self.jacobian.shape[1] - p, bool)])
         norm = np.linalg.norm(self.jacobian[:, columns], axis=0)
         norm[norm == 0.0] = 1.0
@@ -141,7 +143,7 @@ class Fit:
         bread = np.linalg.pinv(jacobian.T @ jacobian)
         covariance = variance * bread @ (jacobian.T @ correlate(jacobian)) @ bread
         covariance /= np.outer(norm, norm)
-        told = np.full((p, p), np.nan)  # a parameter held by its bound has none
+        told = np.full((p, p), np.nan)  # a parameter that cannot be told has none
         told[np.ix_(free, free)] = covariance[:n, :n]
         return told
 

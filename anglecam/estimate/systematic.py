@@ -38,7 +38,7 @@ def systematic_covariance(fit: Fit, records: Sequence[Record], noise: Noise) -> 
     records : sequence of Record
         With a stated uncertainty in every frame; without it nothing but the command's clock is added.
     noise : Noise
-        What of the stated uncertainty is each frame's own.
+        What of the stated uncertainty is each frame's own, at most.
 
     Returns
     -------
@@ -61,7 +61,8 @@ def _later(fit: Fit, records: Sequence[Record]) -> list[Floats]:
 def _pulls_of_places(fit: Fit, records: Sequence[Record], noise: Noise) -> list[Floats]:
     """Return what a neutral and pivots that are wrong by their uncertainties change each parameter by, SI."""
     stated = np.concatenate([r.sigma for r in records])
-    shared = np.sqrt(max(0.0, float(np.mean(stated**2)) - noise.sigma**2))
+    own = min(noise.sigma, fit.rmse)  # what is each frame's own scatters about the model
+    shared = np.sqrt(max(0.0, float(np.mean(stated**2)) - own**2))
     pulls = [shared * fit.pulled_by(records, [np.ones(len(r.time)) for r in records])]
     for name in dict.fromkeys(r.name for r in records):
         wrong = _wrong_pivot([r for r in records if r.name == name])

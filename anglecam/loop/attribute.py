@@ -17,7 +17,7 @@ from anglecam.estimate.fit import Fit
 from anglecam.estimate.output_error import first_state, fit_best_start, fit_output_error, output_error
 from anglecam.estimate.record import Record
 from anglecam.loop.holdout import Prediction, predict_unseen
-from anglecam.loop.refit import effects_of, plant_of
+from anglecam.loop.refit import effects_of, plant_of, without
 from anglecam.loop.screen import Forecast
 from anglecam.threads import native_threads
 
@@ -143,7 +143,7 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast, *, late: 
         # on the way here initial states may have got into a valley of their own
         again = fit_output_error(plant, records, [best.parameters], own=own, phi=base.phi)
         best = again if again.cost < best.cost else best
-    return _with_late(base, effect, best, records) if late else best
+    return with_late(base, effect, best, records) if late else best
 
 
 def fit_beneath(base: Fit, candidates: Sequence[Candidate], records: Sequence[Record]) -> Fit:
@@ -171,7 +171,27 @@ def _held(base: Fit, records: Sequence[Record]) -> list[NDArray[np.float64]]:
     return [rest if one[1] == 0.0 else own for own, rest, one in zip(base.own, at_rest, first, strict=True)]
 
 
-def _with_late(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record]) -> Fit:
+def fit_to_more(
+    fit: Fit, records: Sequence[Record], own: Sequence[NDArray[np.float64]], ledger: Sequence[Effect]
+) -> Fit:
+    """Fit a plant again to more recordings, with late parameters of its effects that the first ones did not ask for."""
+    best = fit_output_error(fit.model, records, [fit.parameters], own=own, phi=fit.phi)
+    for effect in effects_of(fit):
+        whole = next(e for e in ledger if e.id == effect.id)
+        if any(p.late for p in whole.parameters):
+            early = tuple(p for p in whole.parameters if not p.late)
+            base = without(best, effect, records)
+            size = [best.parameters[best.model.names.index(p.name)] for p in early]
+            plant, start = (
+                plant_of(base).with_effect(replace(whole, parameters=early)),
+                np.append(base.parameters, size),
+            )
+            first = fit_output_error(plant, records, [start], own=best.own, phi=fit.phi)
+            best = min(best, with_late(base, whole, first, records), key=lambda one: one.cost)
+    return best
+
+
+def with_late(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record]) -> Fit:
     """Let in the late parameters of a fit's last effect, one after another, as far as the data ask for them.
 
     At once, they would stand in for the size; one alone may show nothing that it and the next do show. When a head sets

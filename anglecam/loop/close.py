@@ -17,23 +17,21 @@ from threadpoolctl import threadpool_limits
 from anglecam.effects import Effect
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise, autoregression, noise_floor
-from anglecam.estimate.output_error import fit_output_error
+from anglecam.estimate.output_error import fit_output_error, predict_output_error
 from anglecam.estimate.record import Record
 from anglecam.estimate.shooting import drifts, goes_astray, windows
 from anglecam.estimate.start import start_parameters
-from anglecam.loop.attribute import Candidate, log_likelihood_gain, promising, rivals
+from anglecam.loop.attribute import Candidate, fit_to_more, log_likelihood_gain, promising, rivals
 from anglecam.loop.gate import LEVEL, Gate
-from anglecam.loop.holdout import Gain, Prediction, compare, predict_unseen, split_records
+from anglecam.loop.holdout import Gain, Prediction, compare, predict_unseen, split_records, typical
 from anglecam.loop.refit import effects_of, left_of, recoloured, with_last, without
 from anglecam.loop.rounds import SURE, Round, Task, applicable, candidates_of, look, smallest, trace
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.simulate.plant import Plant
 
 CONTRADICTED = 3.0
-"""A model that errs this many times more on what was held out than on what was fitted lacks something there."""
-PREDICTED = 0.03
-"""Or nothing, where that is no more than this share of what the base model errs by: what holds a head at rest is
-told by few frames, and guessed wrongly in others."""
+"""A model that errs this many times more on what was held out than on what was fitted lacks something there, or one of
+its parameters was not told by what was fitted."""
 REMAINDER, REMAINDER_UNDRIVEN = 0.1, 0.75
 """After an effect has proven itself, what remains must also be this share of what the base model left, or it does not
 take the verdict back. Where nothing is commanded, or nothing tells the noise, most of it may be what no model of a
@@ -170,8 +168,7 @@ def _conclude(task: Task, first: Round, last: Round, candidates: Sequence[Candid
 def _remains(task: Task, first: Round, last: Round, before: Fit, noise: Noise) -> bool:
     """Say whether the best model leaves structure that no candidate explains."""
     named, least = bool(effects_of(last.fit)), smallest(task, first)
-    # typically: whether dry friction lets go at an instant is all or nothing, and one wrong guess is no contradiction
-    if last.told.typical > max(CONTRADICTED * max(last.fit.rmse, least), PREDICTED * first.unseen.rmse):
+    if _contradicted(task, last, least):
         return True
     if last.gate.p_value >= (SURE if named else LEVEL) or last.fit.rmse**2 <= task.camera**2 + least**2:
         return False
@@ -183,6 +180,20 @@ def _remains(task: Task, first: Round, last: Round, before: Fit, noise: Noise) -
         or _beyond(last.unseen, noise) > share * _beyond(first.unseen, noise)
         or _could_still_gain(last, before) > share**2
     )
+
+
+def _contradicted(task: Task, last: Round, least: float) -> bool:
+    """Say whether what was held out is as no parameters of the model would have it that fit the rest too.
+
+    Typically: whether dry friction lets go at an instant is all or nothing, and one wrong guess is no contradiction.
+    """
+    most = CONTRADICTED * max(last.fit.rmse, least)
+    if last.told.typical <= most or not task.predicted:
+        return last.told.typical > most
+    told = predict_output_error(last.fit, task.predicted)
+    own, both = [*last.fit.own, *told.own], [*task.fitted, *task.predicted]
+    fit = fit_to_more(last.fit, both, own, task.ledger)
+    return typical(fit.residuals[len(task.fitted) :]) > most
 
 
 def _beyond(prediction: Prediction, noise: Noise) -> float:

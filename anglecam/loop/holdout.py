@@ -54,8 +54,8 @@ class Prediction:
 
     @property
     def typical(self) -> float:
-        """Standard deviation that the median absolute residual speaks of, rad: a few frames far off do not count."""
-        return float(MAD * np.median(np.abs(np.concatenate(self.residuals))))
+        """`typical` of ``residuals``."""
+        return typical(self.residuals)
 
 
 @dataclass(frozen=True)
@@ -64,6 +64,11 @@ class Gain:
 
     ratio: float
     interval_95: tuple[float, float]
+
+
+def typical(residuals: Sequence[Floats]) -> float:
+    """Return the standard deviation that the median absolute residual speaks of: a few frames far off do not count."""
+    return float(MAD * np.median(np.abs(np.concatenate(residuals))))
 
 
 def split_records(records: Sequence[Record], held_out: Sequence[str]) -> tuple[list[Record], list[Record]]:

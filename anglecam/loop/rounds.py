@@ -16,6 +16,7 @@ import numpy as np
 from scipy import special
 
 from anglecam.effects import LEDGER, Effect
+from anglecam.effects.coulomb_friction import even_friction
 from anglecam.effects.gravity_geometry import gravity_from
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise, autoregression
@@ -209,12 +210,18 @@ def _colour(task: Task, fit: Fit, moved: Sequence[Change]) -> float:
 
 
 def applicable(records: Sequence[Record]) -> list[Effect]:
-    """List the effects that recordings can show: a free swing has no command, a series without marks no rows."""
+    """List the effects that recordings can show: a free swing has no command, a series without marks no rows.
+
+    What is the same as a wrong zero of the angle can be told only where that is known.
+    """
     driven = any(r.command is not None for r in records)
     known = all(r.zero_known for r in records)
     upright = next((r.upright for r in records if r.upright is not None), None)
+    as_told = {} if upright is None else {"gravity_geometry": gravity_from(upright)}
+    if not known:
+        as_told["coulomb_friction"] = even_friction()
     return [
-        e if upright is None or e.id != "gravity_geometry" else gravity_from(upright)
+        as_told.get(e.id, e)
         for e in LEDGER
         if (driven or e.port not in ("command", "lag", "servo"))
         and (known or e.id != "constant_torque")

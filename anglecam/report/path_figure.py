@@ -98,8 +98,8 @@ def curve_of(effect: Effect, fit: Fit, records: Sequence[Record]) -> Curve:
         In degrees, seconds and milliseconds.
     """
     own = entry(effect.id).null  # late parameters that the data did not ask for stay at it
-    fitted = [fit.parameters[fit.model.names.index(p.name)] for p in effect.parameters]
-    own[: len(fitted) + len(effect.declared)] = [*fitted, *effect.declared]
+    fitted = effect.complete(np.array([fit.parameters[fit.model.names.index(p.name)] for p in effect.parameters]))
+    own[: len(fitted)] = fitted
     if effect.port in ("command", "lag"):
         return _command_curve(effect, own, records)
     angles = [r.angle - e for r, e in zip(records, fit.residuals, strict=True)]

@@ -130,8 +130,7 @@ class Plant:
                 lag += effect.lag(own)
             for ids, table, port in zip((SERVO_IDS, LOAD_IDS, DRY_IDS), tables, ("servo", "load", "dry"), strict=True):
                 if effect.port == port:
-                    both = (*own, *effect.declared)
-                    table[ids.index(effect.id), : len(both)] = both
+                    table[ids.index(effect.id), : len(own)] = own
             if effect.port in ("servo", "load", "dry"):
                 step = KINKED_STEP if effect.port == "servo" or step == KINKED_STEP else MAX_STEP
         rows = np.stack([knots.time, knots.level, knots.slope])
@@ -151,7 +150,7 @@ class Plant:
         return angle
 
     def own_parameters(self, parameters: Floats) -> list[tuple[Effect, Floats]]:
-        """Pair each effect, in the order in which the signal passes them, with its parameters."""
+        """Pair each effect, in the order in which the signal passes them, with its parameters, the fixed among them."""
         edges = self.base_count + np.cumsum([0, *(len(e.parameters) for e in self.effects)])
-        pairs = [(e, parameters[i:j]) for e, i, j in zip(self.effects, edges, edges[1:], strict=False)]
+        pairs = [(e, e.complete(parameters[i:j])) for e, i, j in zip(self.effects, edges, edges[1:], strict=False)]
         return sorted(pairs, key=lambda pair: pair[0].rank)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anglecam.effects import effect
 from anglecam.estimate.noise import Noise
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.systematic import full_sigma
@@ -62,6 +63,16 @@ def test_a_declared_neutral_that_is_off_is_too():
         ]
         fits.append(fitted(records))
     assert np.all(spread_of(fits)[0] < 1.45)
+
+
+def test_what_scatters_less_than_is_stated_has_the_rest_in_common():
+    common = replace(EXACT[0], sigma=np.full(len(EXACT[0].time), 5 * OWN), zero_known=True)
+    noise = OWN * np.random.default_rng(3).normal(size=len(common.time))
+    records = [replace(common, angle=common.angle + noise)]
+    torque = Plant().with_effect(effect("constant_torque"))
+    fit = fit_output_error(torque, records, [np.append(TRUE, 0.0)])
+    sigma = full_sigma(fit, records, Noise(5 * OWN, 0.0, 0.1, "stated"))  # as if all of it were each frame's own
+    assert sigma[3] == pytest.approx(TRUE[1] * np.sqrt(24.0) * OWN, rel=0.05)
 
 
 def test_where_no_uncertainty_is_stated_the_scatter_alone_counts():

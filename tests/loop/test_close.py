@@ -12,6 +12,7 @@ from anglecam.estimate.output_error import fit_output_error
 from anglecam.loop.close import close_records
 from anglecam.loop.holdout import Prediction, predict_unseen, split_records
 from anglecam.loop.result import sentence, verdict_as_dict
+from anglecam.loop.rounds import applicable
 from anglecam.simulate.plant import Plant
 from benchmarks.blind.sessions import session as drawn_session
 from support.motion import Plant as TruePlant
@@ -38,6 +39,26 @@ def test_the_hidden_effect_is_named_and_its_size_found(true, effect_id, name, va
     assert result["rmse_deg"]["after"]["held_out"] == pytest.approx(0.05, rel=0.15)
     assert result["held_out_gain"]["interval_95"][0] > 0.0
     assert result["effects"][0]["alias_set"][0] == effect_id
+
+
+@pytest.mark.parametrize("seed", [105, 108])
+def test_when_a_head_lets_go_is_told_by_few_frames_and_contradicts_nothing(seed):
+    # at each seed what is fitted leaves the breakaway open, or does not ask for it, and what is held out needs it
+    friction = {"coulomb_friction": {"torque": 1.83, "breakaway": 2.69}}
+    verdict = close_records(drawn_session(friction, seed=seed, sigma_deg=0.0005), held_out=HELD_OUT)
+    assert [a.effect.id for a in verdict.accepted] == ["coulomb_friction"]
+    assert abs(verdict.after.parameters[3] - 1.83) < 3.0 * verdict.after.sigma[3]
+
+
+def test_where_zero_is_not_declared_friction_has_no_direction():
+    records = drawn_session({"coulomb_friction": {"torque": 2.0, "downward": 1.6}}, seed=2, sigma_deg=0.005)
+    free, known = ([replace(r, zero_known=one) for r in records] for one in (False, True))
+    (even,), (uneven,) = ([e for e in applicable(rs) if e.id == "coulomb_friction"] for rs in (free, known))
+    assert "asymmetry_deg_per_s2" not in [p.name for p in even.parameters]
+    assert len(uneven.parameters) == len(even.parameters) + 1
+    verdict = close_records(free, held_out=HELD_OUT)
+    assert [a.effect.id for a in verdict.accepted] == ["coulomb_friction"]
+    assert abs(verdict.after.parameters[3] - 1.8) < 3.0 * verdict.after.sigma[3]  # the mean of both directions
 
 
 def test_two_hidden_effects_are_both_named():
