@@ -75,7 +75,7 @@ class Fit:
 
     @cached_property
     def sigma(self) -> Floats:
-        """(p,) standard uncertainties of ``parameters``, SI; NaN for one that cannot be told: a bound holds it, or it moves nothing.
+        """(p,) standard uncertainties of ``parameters``, SI; NaN for one that a bound holds or that moves nothing.
 
         The larger of what noise that the whitening made white would give, and of what is left over itself gives if it
         may hang together within `CLUSTER` frames: a measurement's errors follow the motion, and so does what a model's
