@@ -27,8 +27,8 @@ R = TypeVar("R")
 PROMISING, LEAST_PROMISING = 8, 3
 """Most and fewest effects that are fitted, of those that the screen puts first."""
 HOPEFUL = 0.2
-"""Share of the best forecast below which an effect is not fitted, and of the best fit below which it is not tried on
-what was not fitted."""
+"""Share of the best forecast below which an effect is not fitted, or if so from one start only, and of the best fit
+below which it is not tried on what was not fitted."""
 FULFILLED = 0.7
 """Share of its forecast that a fit must reach, or else it begins again from where the screen tried the effect and from
 the effect's own start; and if it then reaches less than `HOPEFUL`, from half and twice the forecast's."""
@@ -69,8 +69,7 @@ class Candidate:
 
 def promising(all_forecasts: Sequence[Forecast]) -> list[Forecast]:
     """Choose the effects that are worth a fit from forecasts in falling order."""
-    best = all_forecasts[0].gain if all_forecasts else 0.0
-    return [f for i, f in enumerate(all_forecasts[:PROMISING]) if i < LEAST_PROMISING or f.gain >= HOPEFUL * best]
+    return [f for i, f in enumerate(all_forecasts[:PROMISING]) if i < LEAST_PROMISING or f.share >= HOPEFUL]
 
 
 def fit_candidates(
@@ -135,7 +134,7 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast, *, late: 
     further = [(near, HOPEFUL)] if several else [([forecast.tried, first], FULFILLED), (near, HOPEFUL)]
     best = fit_from(forecast.start, forecast.tried, first) if several else fit_from(forecast.start)
     # what a limit does is not in proportion: scaled down it may do nothing, where nothing tells which way to go
-    for starts, share in further:
+    for starts, share in further if forecast.share >= HOPEFUL else ():
         if log_likelihood_gain(base.cost, best.cost, len(base.white)) < share * forecast.gain:
             fit = fit_from(*starts)
             best = fit if fit.cost < best.cost else best

@@ -216,6 +216,6 @@ def _could_still_gain(now: Round, before: Fit) -> float:
 def _rivals(fit: Fit, effect: Effect, task: Task) -> dict[str, Fit]:
     """Say of an effect, the others in place, what it cannot be told from."""
     base, best = without(fit, effect, task.fitted), with_last(fit, effect, task.fitted)
-    moved = changes(base, task.fitted, left_of(task.ledger, fit))
-    others = promising(forecasts(base, directions(base, task.fitted, moved)))
+    moved = changes(base, task.fitted, left_of(task.ledger, base))
+    others = [f for f in promising(forecasts(base, directions(base, task.fitted, moved))) if f.effect.id != effect.id]
     return rivals(best, base, task.fitted, effect, others, task.camera)

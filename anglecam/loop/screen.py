@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,8 @@ class Forecast:
     """The same as they were tried."""
     gain: float
     """Log-likelihood that the fit would gain."""
+    share: float = 1.0
+    """Of the most that is forecast to any effect."""
 
 
 def absorbed_space(fit: Fit) -> Floats:
@@ -190,7 +192,9 @@ def forecasts(fit: Fit, ways: Sequence[Direction]) -> list[Forecast]:
         one = _forecast(way, left, energy)
         if way.effect.id not in best or one.gain > best[way.effect.id].gain:
             best[way.effect.id] = one
-    return sorted(best.values(), key=lambda forecast: -forecast.gain)
+    most = max((forecast.gain for forecast in best.values()), default=0.0)
+    shares = [replace(forecast, share=forecast.gain / most if most > 0.0 else 1.0) for forecast in best.values()]
+    return sorted(shares, key=lambda forecast: -forecast.gain)
 
 
 def _forecast(way: Direction, left: Floats, energy: float) -> Forecast:
