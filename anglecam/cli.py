@@ -23,7 +23,7 @@ from anglecam.errors import AnglecamError, InputError, RigError, blame, printabl
 from anglecam.exchange import Also, write_also
 from anglecam.neck_cli import app as neck
 from anglecam.rig import Rig, read_rig
-from anglecam.session import Session, command_beside, find_clips, read_session, recording_name, rig_beside
+from anglecam.session import Session, command_beside, find_measurable, read_session, recording_name, rig_beside
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def measure(
     done: dict[str, Path] = {}
     rows, tables = [], []
     with _progress() as bars:
-        for clip in _expand(clips, problems):
+        for clip in _expand(clips, declared, problems):
             try:
                 name = recording_name(clip)
                 if name in done:
@@ -130,7 +130,7 @@ def budget(
     make_folder(out)
     problems: list[AnglecamError] = []
     with _progress() as bars:
-        for clip in _expand(clips, problems):
+        for clip in _expand(clips, Rig(), problems):  # a budget needs the pictures, whatever tracks there are
             try:
                 used = declared if declared is not None else rig_beside(clip)
                 measurement = _measure(clip, used, bars)
@@ -224,7 +224,8 @@ def close(
     shown = shown_to_loop(opened, measured)
     if shown.differs:
         errors.print(
-            "the angles measured are free of something that the pictures show; the loop begins with what they show"
+            "measuring has put right what the pictures show of a lens, a slanted view or a mark beside the axis; "
+            "the loop begins with what they show, and names it if it is larger than that is sure"
         )
     with _progress() as bars:
         bar = bars.add_task("", total=None)
@@ -279,13 +280,13 @@ def _open(session: Path, out: Path) -> tuple[Session, Measured]:
     return opened, measured
 
 
-def _expand(paths: list[Path], problems: list[AnglecamError]) -> Iterator[Path]:
+def _expand(paths: list[Path], rig: Rig | None, problems: list[AnglecamError]) -> Iterator[Path]:
     for path in paths:
         if path.is_dir():
-            clips = find_clips(path)
-            if not clips:
+            found = find_measurable(path, rig_beside(path) if rig is None else rig)
+            if not found:
                 problems.append(InputError(f"{path}: no clip in this folder"))
-            yield from clips
+            yield from found
         else:
             yield path
 

@@ -178,4 +178,5 @@ def gather_session(session: Session, series_of: Callable[[Recording], tuple[Angl
         except InputError as problem:
             problems.append(problem)
     notes = [f"{one.name}: {said}" for one in series if (said := note_on(ahead[one.name]))]
+    notes += [f"{r.name}: no command that changes; taken for a free swing" for r in records if r.command is None]
     return Measured(tuple(series), tuple(records), tuple(problems), tuple(notes))

@@ -145,6 +145,12 @@ def find_clips(directory: Path) -> list[Path]:
     return sorted(p for p in directory.iterdir() if p.is_file() and p.suffix.lower() in CLIP_ENDINGS)
 
 
+def find_measurable(directory: Path, rig: Rig) -> list[Path]:
+    """List what a folder holds to be measured: clips, or the tracks in their place that ``rig`` tells to read."""
+    tracks, _ = _choose_tracks(directory, rig)
+    return sorted([*(clip for clip in find_clips(directory) if clip.stem not in tracks), *tracks.values()])
+
+
 def read_session(directory: Path, rig: Rig | None = None) -> Session:
     """Read a session's rig and commands and list its recordings.
 
@@ -195,7 +201,10 @@ def read_session(directory: Path, rig: Rig | None = None) -> Session:
             problems.append(problem)
     commands = sorted(directory.glob(f"*{COMMAND_ENDING}"))
     orphans = [p for p in commands if p.name.removesuffix(COMMAND_ENDING) not in sources]
-    notes = tuple(f"{p}: not used; there is no recording of that name" for p in orphans)
+    notes = [f"{p}: not used; there is no recording of that name" for p in orphans]
+    known = {*sources.values(), *commands, *find_tracks(directory)}
+    others = [p for p in sorted(directory.glob("*.csv")) if p not in known and any(map(p.name.startswith, sources))]
+    notes += [f"{p}: not used; a command is NAME{COMMAND_ENDING}, a series NAME{SERIES_ENDING}" for p in others]
     return Session(directory, rig, tuple(recordings), tuple(problems), (*idle, *notes))
 
 

@@ -18,6 +18,8 @@ STILL = 0.02
 """Share of the whole swing within which the angle counts as not yet released."""
 REST = 10.0
 """A range below this many median steps from frame to frame is noise about a rest: of white noise it is 5 to 8."""
+SLOWEST = 1.0
+"""s from frame to frame; what moves so slowly is no mechanism that is looked at here, and milliseconds are likelier."""
 LEAST_FRAMES = 20
 """Fewer measured frames than this tell nothing about a model of three parameters and three unknowns of its own."""
 
@@ -86,11 +88,14 @@ def record_from_series(
     Raises
     ------
     InputError
-        Where fewer than `LEAST_FRAMES` frames are measured.
+        Where fewer than `LEAST_FRAMES` frames are measured, or they follow each other more slowly than `SLOWEST`.
     """
     ok = series.ok
     if ok.sum() < LEAST_FRAMES:
         raise InputError(f"{series.name}: {ok.sum()} measured frames are too few to fit a model (need {LEAST_FRAMES})")
+    interval = float(np.median(np.diff(series.time[ok])))
+    if interval > SLOWEST:
+        raise InputError(f"{series.name}: its frames are {interval:.3g} s apart; are times in seconds?")
     cross = None
     if series.mouth_px is not None and series.pivot_px is not None:
         lever = np.hypot(*(series.mouth_px - series.pivot_px)[ok].T)

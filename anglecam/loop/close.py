@@ -32,6 +32,8 @@ from anglecam.simulate.plant import Plant
 CONTRADICTED = 3.0
 """A model that errs this many times more on what was held out than on what was fitted lacks something there, or one of
 its parameters was not told by what was fitted."""
+COLOURFUL = 0.8
+"""Correlation from frame to frame of what is left over, from which on it is taken for motion and not for noise."""
 REMAINDER, REMAINDER_UNDRIVEN = 0.1, 0.75
 """After an effect has proven itself, what remains must also be this share of what the base model left, or it does not
 take the verdict back. Where nothing is commanded, or nothing tells the noise, most of it may be what no model of a
@@ -170,6 +172,9 @@ def _remains(task: Task, first: Round, last: Round, before: Fit, noise: Noise) -
     named, least = bool(effects_of(last.fit)), smallest(task, first)
     if _contradicted(task, last, least):
         return True
+    # nothing but what is left over tells the noise, and it may look like noise of any colour
+    if named and task.floor is None and last.unseen.rmse > REMAINDER_UNDRIVEN * first.unseen.rmse:
+        return last.fit.phi > COLOURFUL
     if last.gate.p_value >= (SURE if named else LEVEL) or last.fit.rmse**2 <= task.camera**2 + least**2:
         return False
     driven = any(r.command is not None for r in task.fitted)

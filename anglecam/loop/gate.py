@@ -11,6 +11,7 @@ be known. Davison and Hinkley, Bootstrap Methods and their Application, 1997, se
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -57,7 +58,9 @@ class Gate:
         return self.p_value >= LEVEL
 
 
-def test_residual(fit: Fit, records: Sequence[Record], ways: Sequence[Direction], rng: np.random.Generator) -> Gate:
+def test_residual(
+    fit: Fit, records: Sequence[Record], ways: Sequence[Direction], rng: np.random.Generator, finest: float
+) -> Gate:
     """Test the residual of a fitted plant.
 
     Parameters
@@ -70,6 +73,8 @@ def test_residual(fit: Fit, records: Sequence[Record], ways: Sequence[Direction]
         From `anglecam.loop.screen.directions` of the same fit: of what could be added.
     rng : numpy.random.Generator
         For the bootstrap.
+    finest : float
+        Structure smaller than this, rad RMS, is not traced, however sure it is: no smaller effect counts as detectable.
 
     Returns
     -------
@@ -98,6 +103,7 @@ def test_residual(fit: Fit, records: Sequence[Record], ways: Sequence[Direction]
     p_value = np.mean(smallest <= smallest[0])
     critical = float(np.quantile(smallest[1:], LEVEL))
     needed = float(-(special.ndtri(critical) + special.ndtri(0.05)) * np.sqrt(fit.cost / free))
+    needed = max(needed, finest * math.sqrt(n))
     tests = tuple(Test(name, float(p[0])) for name, p in p_each.items())
     return Gate(float(p_value), tests, torque_gain, _detectable(ways, needed))
 

@@ -63,6 +63,7 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
         Every candidate has its error on what is held out, those among them that the loop did not try there.
     """
     model = dict(zip(verdict.after.model.names, _values(verdict), strict=True))
+    named = {name for accepted in verdict.accepted for name in accepted.alias_set}
     return {
         "verdict": verdict.verdict,
         "effects": [
@@ -91,6 +92,7 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
         "detectable": [
             {"id": name, "smallest": size_of(name).told(smallest)[0], "unit": split_unit(size_of(name).name)[1]}
             for name, smallest in verdict.last_gate.detectable.items()
+            if name not in named
         ],
         "candidates": [
             {
@@ -109,8 +111,8 @@ def sentence(verdict: Verdict) -> str:
     if verdict.verdict == "nothing_missing" and not verdict.first_gate.passed:
         return (
             f"Nothing is missing that this camera could show: what θ̈ = c·u − a·θ̇ − b·θ leaves over ({before} on "
-            f"recordings that it was not fitted to) is no larger than the camera's noise allows "
-            f"({np.degrees(verdict.noise.sigma):.3g}°)."
+            f"recordings that it was not fitted to) is not noise alone, but no larger than errors of the measurement "
+            f"itself may be, whose angles are uncertain by {np.degrees(verdict.noise.sigma):.3g}°."
         )
     if verdict.verdict == "nothing_missing":
         return (

@@ -94,7 +94,7 @@ def look(task: Task, fit: Fit) -> Round:
     fit = recoloured(fit, task.fitted, _colour(task, fit, moved))
     ways = directions(fit, task.fitted, moved)
     told, unseen = predict_unseen(fit, task.fitted, task.predicted)
-    gate = test_residual(fit, task.fitted, ways, task.rng)
+    gate = test_residual(fit, task.fitted, ways, task.rng, NEGLIGIBLE * task.camera)
     return Round(fit, told, unseen, gate, tuple(promising(forecasts(fit, ways))))
 
 

@@ -272,7 +272,7 @@ def _detectable_rows(result: dict[str, Any]) -> list[dict[str, Any]]:
 
 def _undetectable(verdict: Verdict) -> list[str]:
     """Name the effects that would not have been seen at any size that was looked at."""
-    told = {*verdict.last_gate.detectable, *(a.effect.id for a in verdict.accepted)}
+    told = {*verdict.last_gate.detectable, *(name for a in verdict.accepted for name in a.alias_set)}
     return [plain(e.id) for e in applicable([*verdict.fitted, *verdict.held_out]) if e.id not in told]
 
 

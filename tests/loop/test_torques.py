@@ -58,6 +58,6 @@ def test_the_gate_sees_a_slack_spring_behind_the_gravity_that_comes_nearest_to_i
     near = np.array([26.1, 622.9, 435.6, math.radians(4625.0), math.radians(40.6)])
     fit = fit_output_error(Plant((effect("gravity_geometry"),)), fitted, [near])
     assert np.degrees(fit.rmse) < 1.05 * 0.05
-    gate = _test_residual(fit, fitted, [], np.random.default_rng(0))
+    gate = _test_residual(fit, fitted, [], np.random.default_rng(0), 0.0)
     assert gate.p_value < 0.01
     assert min(gate.tests, key=lambda test: test.p_value).name == "torque against angle"
