@@ -137,6 +137,7 @@ def identify_records(
         starts.insert(0, declared_start(rig)[: 3 if driven else 2])
     plant = Plant(driven=driven)
     fit = fit_output_error(plant, fitted, starts)
+    optimum = fit  # what a systematic error does to a filter's parameters it does to these
     if estimator == "ekf":
         fit, values, covariance = _by_filter(fit, fitted, starts[0])
     else:
@@ -144,9 +145,9 @@ def identify_records(
             fit = _third_order(fit, fitted)
         elif estimator == "neck":
             fit = _large_angle(fit, fitted, neck or LargeAngleNeck())
-        values, covariance = fit.parameters, fit.coloured_covariance(fitted, phi(fit))
+        values, covariance, optimum = fit.parameters, fit.coloured_covariance(fitted, phi(fit)), fit
     if noise := noise_floor(fitted):
-        covariance = covariance + systematic_covariance(fit, fitted, noise)
+        covariance = covariance + systematic_covariance(optimum, fitted, noise)
     scale = fit.model.to_file
     return Identified(
         estimator,

@@ -78,6 +78,7 @@ def fit_candidates(
     fitted: Sequence[Record],
     held_out: Sequence[Record],
     tried: Sequence[Forecast],
+    camera: float = 0.0,
 ) -> list[Candidate]:
     """Fit effects beside what the plant already has, and predict what they were not fitted to.
 
@@ -91,13 +92,15 @@ def fit_candidates(
         Recordings to fit and to predict only.
     tried : sequence of Forecast
         What to try, and from where.
+    camera : float
+        Stated uncertainty of a film's angle, rad; 0 for a series from elsewhere.
 
     Returns
     -------
     list of Candidate
         Strongest evidence first, then those that were not tried, best fit first.
     """
-    fits = side_by_side(lambda one: fit_with(base, fitted, one), tried)
+    fits = side_by_side(lambda one: fit_with(base, fitted, one, camera=camera), tried)
     gains = [log_likelihood_gain(base.cost, fit.cost, len(base.white)) for fit in fits]
     serious = sorted(gains, reverse=True)[: LEAST_PROMISING - 1]
 
@@ -112,7 +115,9 @@ def fit_candidates(
     return sorted(candidates, key=lambda c: (-c.evidence, -c.log_likelihood_gain))
 
 
-def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast, *, late: bool = True) -> Fit:
+def fit_with(
+    base: Fit, records: Sequence[Record], forecast: Forecast, *, late: bool = True, camera: float = 0.0
+) -> Fit:
     """Fit the plant of ``base`` with one more effect, from where the screen would start, or else the effect itself.
 
     Its ``late`` parameters, which take most of the time, are let in as far as the data ask for them, or not at all.
@@ -142,7 +147,7 @@ def fit_with(base: Fit, records: Sequence[Record], forecast: Forecast, *, late: 
         # on the way here initial states may have got into a valley of their own
         again = fit_output_error(plant, records, [best.parameters], own=own, phi=base.phi)
         best = again if again.cost < best.cost else best
-    return with_late(base, effect, best, records) if late else best
+    return with_late(base, effect, best, records, camera) if late else best
 
 
 def fit_beneath(base: Fit, candidates: Sequence[Candidate], records: Sequence[Record]) -> Fit:
@@ -190,12 +195,13 @@ def fit_to_more(
     return best
 
 
-def with_late(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record]) -> Fit:
+def with_late(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record], camera: float = 0.0) -> Fit:
     """Let in the late parameters of a fit's last effect, one after another, as far as the data ask for them.
 
     At once, they would stand in for the size; one alone may show nothing that it and the next do show. When a head sets
     off is all or nothing, so there are valleys everywhere: of many starts, each with the late parameters before it as
-    they are and without them, the fit begins from those that come nearest.
+    they are and without them, the fit begins from those that come nearest. In a film they must also change the
+    prediction by more than the angle is uncertain: what is finer may follow the measurement's own errors.
     """
     plant, best, spent = plant_of(base), fit, 0
     effect = _within(effect, fit, records)
@@ -206,7 +212,8 @@ def with_late(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record]) ->
         values = [np.append(x, v) for v in effect.parameters[count - 1].starts for x in (fit.parameters, bare)]
         values.sort(key=lambda one: output_error(richer, one, records, fit.own, fit.phi))
         fit, spent = fit_best_start(richer, records, values[:NEAREST], fit.own, fit.phi), spent + 1
-        if 2.0 * log_likelihood_gain(best.cost, fit.cost, len(fit.white)) > special.chdtri(spent, ASKED_FOR):
+        gain = log_likelihood_gain(best.cost, fit.cost, len(fit.white))
+        if 2.0 * gain > special.chdtri(spent, ASKED_FOR) and apart(fit, best) > camera:
             best, spent = fit, 0
     return best
 
@@ -249,7 +256,7 @@ def rivals(
     dict
         Id of each that stays → the same plant with it in place of ``effect``.
     """
-    fits = side_by_side(lambda other: fit_with(base, records, other), others)
+    fits = side_by_side(lambda other: fit_with(base, records, other, camera=camera), others)
     widest = 0.5 * special.ndtri(ALIAS_LEVEL) ** 2
     gaps = [log_likelihood_gain(fit.cost, best.cost, len(best.white)) for fit in fits]
     return {

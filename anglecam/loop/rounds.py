@@ -109,7 +109,7 @@ def candidates_of(task: Task, now: Round) -> list[Candidate]:
     Of those whose predictions differ from the best's by less than a film's angle is uncertain, and whose evidence is
     nearly as strong, the one with fewest parameters comes first.
     """
-    found = fit_candidates(now.fit, now.unseen, task.fitted, task.predicted, now.forecasts)
+    found = fit_candidates(now.fit, now.unseen, task.fitted, task.predicted, now.forecasts, task.camera)
     if not found or task.camera == 0.0:
         return found
     near = [one for one in found if found[0].evidence - one.evidence <= DECISIVE]

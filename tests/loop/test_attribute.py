@@ -57,6 +57,19 @@ def test_a_curve_of_friction_is_confined_to_slow_motion():
     assert found["stribeck_speed_deg_per_s"] == pytest.approx(SLOW * fastest, rel=0.02)
 
 
+def test_in_a_film_what_is_finer_than_the_angle_asks_for_no_late_parameter():
+    friction = {"torque": 0.8, "breakaway": 1.6}
+    fitted, _ = split_records(session({"coulomb_friction": friction}, seed=5, sigma_deg=0.002), HELD_OUT)
+    base = fit_output_error(Plant(), fitted, [np.array([26.0, 524.0, 508.0])])
+    (forecast,) = forecasts(base, directions(base, fitted, changes(base, fitted, [effect("coulomb_friction")])))
+    sure = fit_with(base, fitted, forecast)
+    size_alone = fit_with(base, fitted, forecast, late=False)
+    distance = apart(sure, size_alone)
+    assert len(sure.parameters) > len(size_alone.parameters)
+    assert len(fit_with(base, fitted, forecast, camera=0.9 * distance).parameters) == len(sure.parameters)
+    assert len(fit_with(base, fitted, forecast, camera=1.1 * distance).parameters) == len(size_alone.parameters)
+
+
 @pytest.mark.parametrize(("sigma_deg", "alike"), [(0.002, "camera_tilt"), (0.05, "lens_distortion")])
 def test_what_differs_by_less_than_the_cameras_uncertainty_is_chosen_by_strong_evidence_alone(sigma_deg, alike):
     effects = {"camera_tilt": {"tilt_deg": 9.0}}
