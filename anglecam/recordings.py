@@ -93,6 +93,8 @@ def measure_recording(
     InputError, RigError
         As of both.
     """
+    if source.name.endswith(SERIES_ENDING):
+        raise InputError(f"{source}: holds angles already; identify or close the folder that it is in")
     if source.suffix.lower() in TRACKS_ENDINGS:
         return measure_tracks(source, rig, command)
     return measure_clip(source, rig, command, progress=progress)
