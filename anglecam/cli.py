@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -23,7 +23,15 @@ from anglecam.errors import AnglecamError, InputError, RigError, blame, printabl
 from anglecam.exchange import Also, write_also
 from anglecam.neck_cli import app as neck
 from anglecam.rig import Rig, read_rig
-from anglecam.session import Session, command_beside, find_measurable, read_session, recording_name, rig_beside
+from anglecam.session import (
+    Session,
+    command_beside,
+    find_clips,
+    find_measurable,
+    read_session,
+    recording_name,
+    rig_beside,
+)
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
@@ -89,7 +97,7 @@ def measure(
     done: dict[str, Path] = {}
     rows, tables = [], []
     with _progress() as bars:
-        for clip in _expand(clips, declared, problems):
+        for clip in _expand(clips, problems, lambda folder: _clips_and_tracks(folder, declared)):
             try:
                 name = recording_name(clip)
                 if name in done:
@@ -130,7 +138,7 @@ def budget(
     make_folder(out)
     problems: list[AnglecamError] = []
     with _progress() as bars:
-        for clip in _expand(clips, Rig(), problems):  # a budget needs the pictures, whatever tracks there are
+        for clip in _expand(clips, problems, find_clips):
             try:
                 used = declared if declared is not None else rig_beside(clip)
                 measurement = _measure(clip, used, bars)
@@ -280,10 +288,19 @@ def _open(session: Path, out: Path) -> tuple[Session, Measured]:
     return opened, measured
 
 
-def _expand(paths: list[Path], rig: Rig | None, problems: list[AnglecamError]) -> Iterator[Path]:
+def _clips_and_tracks(folder: Path, rig: Rig | None) -> list[Path]:
+    found, idle = find_measurable(folder, rig_beside(folder) if rig is None else rig)
+    for note in idle:
+        errors.print(printable(note))
+    return found
+
+
+def _expand(
+    paths: list[Path], problems: list[AnglecamError], list_folder: Callable[[Path], list[Path]]
+) -> Iterator[Path]:
     for path in paths:
         if path.is_dir():
-            found = find_measurable(path, rig_beside(path) if rig is None else rig)
+            found = list_folder(path)
             if not found:
                 problems.append(InputError(f"{path}: no clip in this folder"))
             yield from found

@@ -145,10 +145,10 @@ def find_clips(directory: Path) -> list[Path]:
     return sorted(p for p in directory.iterdir() if p.is_file() and p.suffix.lower() in CLIP_ENDINGS)
 
 
-def find_measurable(directory: Path, rig: Rig) -> list[Path]:
-    """List what a folder holds to be measured: clips, or the tracks in their place that ``rig`` tells to read."""
-    tracks, _ = _choose_tracks(directory, rig)
-    return sorted([*(clip for clip in find_clips(directory) if clip.stem not in tracks), *tracks.values()])
+def find_measurable(directory: Path, rig: Rig) -> tuple[list[Path], list[str]]:
+    """List what a folder holds to be measured, clips or the tracks in their place, and a line on each unused file."""
+    tracks, idle = _choose_tracks(directory, rig)
+    return sorted([*(clip for clip in find_clips(directory) if clip.stem not in tracks), *tracks.values()]), idle
 
 
 def read_session(directory: Path, rig: Rig | None = None) -> Session:
