@@ -9,9 +9,9 @@ import pytest
 
 from anglecam.errors import InputError, RigError
 from anglecam.recordings import measure_session
-from anglecam.rig import read_rig
+from anglecam.rig import Marks, Rig, read_rig
 from anglecam.series import COLUMNS, AngleSeries, read_series, write_series
-from anglecam.session import Command, read_command, read_session
+from anglecam.session import Command, find_measurable, read_command, read_session
 from support import broken
 
 
@@ -160,3 +160,34 @@ def test_a_declared_centre_of_mass_comes_with_every_recording(tmp_path):
         (tmp_path / "rig.yaml").write_text(declared)
         (record,) = measure_session(read_session(tmp_path)).records
         assert record.upright == upright
+
+
+def test_what_looks_like_a_swing_or_a_command_is_said_to_be_taken_for_what_it_is(tmp_path):
+    rows = "".join(f"{k / 30:.4f},{10 * np.sin(k / 5):.4f}\n" for k in range(60))
+    (tmp_path / "swing.angles.csv").write_text("time_s,angle_deg\n" + rows)
+    (tmp_path / "swing.commands.csv").write_text("time_s,command_deg\n0,0\n1,5\n")
+    session = read_session(tmp_path)
+    (unused,) = session.notes
+    assert "swing.commands.csv: not used; a command is NAME.command.csv" in unused
+    assert measure_session(session).notes == ("swing: no command that changes; taken for a free swing",)
+
+
+def test_times_in_milliseconds_are_refused(tmp_path):
+    rows = "".join(f"{k * 33.3:.1f},{10 * np.sin(k / 5):.4f}\n" for k in range(60))
+    (tmp_path / "swing.angles.csv").write_text("time_s,angle_deg\n" + rows)
+    measured = measure_session(read_session(tmp_path))
+    assert not measured.records
+    assert "33.3 s apart; are times in seconds?" in str(measured.problems[0])
+
+
+def test_tracks_stand_in_the_place_of_their_clip_where_the_rig_tells_them(tmp_path):
+    for name in ("a.avi", "b.avi"):
+        (tmp_path / name).touch()
+    head = "scorer,x,x,x\nbodyparts,nose,nose,nose\ncoords,x,y,likelihood\n"
+    tracks = tmp_path / "aDLC_resnet50_labshuffle1_100.csv"
+    tracks.write_text(head + "0,1,2,0.9\n")
+    rig = Rig(marks=Marks(mouth="nose", pivot="neck"))
+    assert find_measurable(tmp_path, rig) == ([tracks, tmp_path / "b.avi"], [])
+    clips, (idle,) = find_measurable(tmp_path, Rig())
+    assert [clip.name for clip in clips] == ["a.avi", "b.avi"]
+    assert "not used; say which of its points are which" in idle

@@ -50,6 +50,11 @@ def test_when_a_head_lets_go_is_told_by_few_frames_and_contradicts_nothing(seed)
     assert abs(verdict.after.parameters[3] - 1.83) < 3.0 * verdict.after.sigma[3]
 
 
+def test_a_driven_head_whose_command_is_missing_is_no_free_swing_with_much_noise():
+    driven = session(TruePlant(a=5.0, b=60.0, c=55.0), 11)[3]
+    assert close_records([replace(driven, command=None)]).verdict == "unexplained"
+
+
 def test_where_zero_is_not_declared_friction_has_no_direction():
     records = drawn_session({"coulomb_friction": {"torque": 2.0, "downward": 1.6}}, seed=2, sigma_deg=0.005)
     free, known = ([replace(r, zero_known=one) for r in records] for one in (False, True))
