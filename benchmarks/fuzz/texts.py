@@ -282,16 +282,12 @@ def readers() -> dict[str, Reader]:
 
     marks = Rig(marks=Marks(mouth="lips", pivot="ear", rate_hz=30))
 
-    def rig(path: Path) -> object:
-        declared = read_rig(path)
-        return declared, declared.not_applied()
-
     def calibration(path: Path) -> object:
         read_calibration(path)
         return lens_from_rig(Rig.model_validate({"camera": {"calibration": str(path)}}), (640, 480), path)
 
     return {
-        "rig": rig,
+        "rig": read_rig,
         "neck": read_neck,
         "calibration": calibration,
         "calibration in XML": calibration,
