@@ -289,7 +289,10 @@ def _open(session: Path, out: Path) -> tuple[Session, Measured]:
 
 
 def _clips_and_tracks(folder: Path, rig: Rig | None) -> list[Path]:
-    found, idle = find_measurable(folder, rig_beside(folder) if rig is None else rig)
+    try:
+        found, idle = find_measurable(folder, rig_beside(folder) if rig is None else rig)
+    except RigError:  # said of each clip that it is for
+        return find_clips(folder)
     for note in idle:
         errors.print(printable(note))
     return found

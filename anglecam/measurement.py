@@ -109,7 +109,8 @@ def measure_clip(
     InputError
         Where the file cannot be read, or no frame of it can be measured: one line with file, count and cause.
     """
-    lamp = None if command is None else see_lamp(path, rig)
+    changes = command is not None and command.first_change() is not None
+    lamp = see_lamp(path, rig) if changes else None
     offset = offset_of(command, lamp)
     command = on_clip_clock(command, offset)
     seen = sight_clip(path, rig, progress)
@@ -142,7 +143,7 @@ def measure_clip(
                     seen, ok, time, angles = head, rigid, head.time, other
     series = replace(_series(path, rig, time, seen, ok, angles), lamp_s=lamp)
     zero = why_zero_is_elsewhere(rig, command, time[ok])
-    dark = lamp is None and command is not None and rig.sync.lamp is not None
+    dark = changes and lamp is None and rig.sync.lamp is not None
     return Measurement(series, seen, angles, why_coarse, zero, DARK if dark else note_on(offset))
 
 

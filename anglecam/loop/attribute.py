@@ -186,10 +186,8 @@ def fit_to_more(
             early = tuple(p for p in whole.parameters if not p.late)
             base = without(best, effect, records)
             size = [best.parameters[best.model.names.index(p.name)] for p in early]
-            plant, start = (
-                plant_of(base).with_effect(replace(whole, parameters=early)),
-                np.append(base.parameters, size),
-            )
+            plant = plant_of(base).with_effect(replace(whole, parameters=early))
+            start = np.append(base.parameters, size)
             first = fit_output_error(plant, records, [start], own=best.own, phi=fit.phi)
             best = min(best, with_late(base, whole, first, records), key=lambda one: one.cost)
     return best

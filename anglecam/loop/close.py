@@ -172,9 +172,10 @@ def _remains(task: Task, first: Round, last: Round, before: Fit, noise: Noise) -
     named, least = bool(effects_of(last.fit)), smallest(task, first)
     if _contradicted(task, last, least):
         return True
-    # nothing but what is left over tells the noise, and it may look like noise of any colour
-    if named and task.floor is None and last.unseen.rmse > REMAINDER_UNDRIVEN * first.unseen.rmse:
-        return last.fit.phi > COLOURFUL
+    # where nothing but what is left over tells the noise, motion may pass for noise of a colour
+    mostly = last.unseen.rmse > REMAINDER_UNDRIVEN * first.unseen.rmse
+    if named and mostly and task.floor is None and last.fit.phi > COLOURFUL:
+        return True
     if last.gate.p_value >= (SURE if named else LEVEL) or last.fit.rmse**2 <= task.camera**2 + least**2:
         return False
     driven = any(r.command is not None for r in task.fitted)
