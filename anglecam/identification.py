@@ -137,26 +137,25 @@ def identify_records(
         starts.insert(0, declared_start(rig)[: 3 if driven else 2])
     plant = Plant(driven=driven)
     fit = fit_output_error(plant, fitted, starts)
-    optimum = fit  # what a systematic error does to a filter's parameters it does to these
     if estimator == "ekf":
-        fit, values, covariance = _by_filter(fit, fitted, starts[0])
+        run, values, covariance = _by_filter(fit, fitted, starts[0])
     else:
         if estimator == "oe3":
             fit = _third_order(fit, fitted)
         elif estimator == "neck":
             fit = _large_angle(fit, fitted, neck or LargeAngleNeck())
-        values, covariance, optimum = fit.parameters, fit.coloured_covariance(fitted, phi(fit)), fit
-    if noise := noise_floor(fitted):
-        covariance = covariance + systematic_covariance(optimum, fitted, noise)
-    scale = fit.model.to_file
+        run, values, covariance = fit, fit.parameters, fit.coloured_covariance(fitted, phi(fit))
+    if noise := noise_floor(fitted):  # what a systematic error does to the optimum it does to a filter's parameters
+        covariance = covariance + systematic_covariance(fit, fitted, noise)
+    scale = run.model.to_file
     return Identified(
         estimator,
-        fit.model.names,
+        run.model.names,
         values * scale,
         covariance * np.outer(scale, scale),
-        fit,
-        predict_output_error(fit, held_out) if held_out else None,
-        _step(fit) if driven else NO_STEP,
+        run,
+        predict_output_error(run, held_out) if held_out else None,
+        _step(run) if driven else NO_STEP,
         tuple(fitted),
     )
 

@@ -88,19 +88,19 @@ def offsets(commands: Mapping[str, Command | None], lit: Mapping[str, Interval |
     Returns
     -------
     dict
-        For each name in ``commands``; where nothing is known, the clocks agree.
+        For each name in ``commands``; where no lamp was seen, as of a series from elsewhere, the clocks agree.
     """
     ahead = {}
     for name, command in commands.items():
         change, between = None if command is None else command.first_change(), lit.get(name)
         if change is not None and between is not None:
             ahead[name] = (between[0] - change, between[1] - change)
-    if not ahead:
-        return dict.fromkeys(commands, AGREED)
-    common = max(low for low, _ in ahead.values()), min(high for _, high in ahead.values())
-    if common[0] <= common[1]:
-        return dict.fromkeys(commands, _offset(common))
-    return {name: _offset(ahead[name]) if name in ahead else AGREED for name in commands}
+    common = (
+        max((low for low, _ in ahead.values()), default=0.0),
+        min((high for _, high in ahead.values()), default=0.0),
+    )
+    suits = common[0] <= common[1]
+    return {name: _offset(common if suits else ahead[name]) if name in ahead else AGREED for name in commands}
 
 
 def offset_of(command: Command | None, lit: Interval | None) -> Offset:

@@ -146,4 +146,4 @@ def test_clips_that_no_one_offset_suits_have_each_their_own():
     assert found["a"].sigma == pytest.approx(0.1 / np.sqrt(12.0))
     assert found["b"] == found["c"] == AGREED
     together = offsets(commands, {"a": (1.3, 1.4), "b": (1.38, 1.5), "c": None})
-    assert [one.value for one in together.values()] == pytest.approx([0.39] * 3)
+    assert [one.value for one in together.values()] == pytest.approx([0.39, 0.39, 0.0])  # nothing is known of the last

@@ -32,8 +32,6 @@ from anglecam.simulate.plant import Plant
 CONTRADICTED = 3.0
 """A model that errs this many times more on what was held out than on what was fitted lacks something there, or one of
 its parameters was not told by what was fitted."""
-COLOURFUL = 0.8
-"""Correlation from frame to frame of what is left over, from which on it is taken for motion and not for noise."""
 REMAINDER, REMAINDER_UNDRIVEN = 0.1, 0.75
 """After an effect has proven itself, what remains must also be this share of what the base model left, or it does not
 take the verdict back. Where nothing is commanded, or nothing tells the noise, most of it may be what no model of a
@@ -146,7 +144,7 @@ def _conclude(task: Task, first: Round, last: Round, candidates: Sequence[Candid
     before = recoloured(first.fit, task.fitted, last.fit.phi)
     before_told, _ = predict_unseen(before, task.fitted, task.predicted)
     noise = task.floor or replace(autoregression(last.fit.residuals, "residual"), sigma=last.fit.rmse)
-    remains = _remains(task, first, last, before, noise)
+    remains = _remains(task, first, last, before)
     # where something remains nothing is named, so nothing is added
     after, after_told = (before, before_told) if remains else (last.fit, last.told)
     named = effects_of(after)
@@ -167,23 +165,21 @@ def _conclude(task: Task, first: Round, last: Round, candidates: Sequence[Candid
     )
 
 
-def _remains(task: Task, first: Round, last: Round, before: Fit, noise: Noise) -> bool:
+def _remains(task: Task, first: Round, last: Round, before: Fit) -> bool:
     """Say whether the best model leaves structure that no candidate explains."""
     named, least = bool(effects_of(last.fit)), smallest(task, first)
     if _contradicted(task, last, least):
-        return True
-    # where nothing but what is left over tells the noise, motion may pass for noise of a colour
-    mostly = last.unseen.rmse > REMAINDER_UNDRIVEN * first.unseen.rmse
-    if named and mostly and task.floor is None and last.fit.phi > COLOURFUL:
         return True
     if last.gate.p_value >= (SURE if named else LEVEL) or last.fit.rmse**2 <= task.camera**2 + least**2:
         return False
     driven = any(r.command is not None for r in task.fitted)
     share = REMAINDER if driven and task.floor is not None else REMAINDER_UNDRIVEN
-    # told by the noise floor, whatever it is, and by what would explain most of it, which is finer
+    # told by the noise floor, whatever it is, and by what would explain most of it, which is finer; where nothing but
+    # what is left over would tell the noise, all of that counts
+    floor = task.floor.sigma if task.floor else 0.0
     return (
         not named
-        or _beyond(last.unseen, noise) > share * _beyond(first.unseen, noise)
+        or _beyond(last.unseen, floor) > share * _beyond(first.unseen, floor)
         or _could_still_gain(last, before) > share**2
     )
 
@@ -202,9 +198,9 @@ def _contradicted(task: Task, last: Round, least: float) -> bool:
     return typical(fit.residuals[len(task.fitted) :]) > most
 
 
-def _beyond(prediction: Prediction, noise: Noise) -> float:
+def _beyond(prediction: Prediction, noise: float) -> float:
     """Return what a prediction errs by beyond the noise, rad."""
-    return math.sqrt(max(prediction.rmse**2 - noise.sigma**2, 0.0))
+    return math.sqrt(max(prediction.rmse**2 - noise**2, 0.0))
 
 
 def _could_still_gain(now: Round, before: Fit) -> float:

@@ -9,6 +9,8 @@ from anglecam.effects import effect
 from anglecam.estimate.noise import Noise
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.systematic import full_sigma
+from anglecam.identification import identify_records
+from anglecam.rig import Rig
 from anglecam.simulate.plant import Plant
 from support.motion import Plant as TruePlant
 from support.series import session
@@ -73,6 +75,17 @@ def test_what_scatters_less_than_is_stated_has_the_rest_in_common():
     fit = fit_output_error(torque, records, [np.append(TRUE, 0.0)])
     sigma = full_sigma(fit, records, Noise(5 * OWN, 0.0, 0.1, "stated"))  # as if all of it were each frame's own
     assert sigma[3] == pytest.approx(TRUE[1] * np.sqrt(24.0) * OWN, rel=0.05)
+
+
+def test_a_filters_parameters_are_no_surer_than_the_pivot_lets_them_be():
+    sigma = [np.sqrt(OWN**2 + PIVOT**2 * (2 - 2 * np.cos(r.angle))) for r in EXACT]
+    noise = np.random.default_rng(4)
+    records = [
+        replace(r, angle=r.angle + OWN * noise.normal(size=len(r.time)), sigma=s)
+        for r, s in zip(EXACT, sigma, strict=True)
+    ]
+    filtered, optimal = (identify_records(records, Rig(), name) for name in ("ekf", "oe2"))
+    assert filtered.sigmas == pytest.approx(optimal.sigmas, rel=0.1)
 
 
 def test_where_no_uncertainty_is_stated_the_scatter_alone_counts():
