@@ -27,7 +27,11 @@ EFFECT = Effect(
     summary="A steady torque pulls the head away from where it should rest.",
     equation="θ̈ = c·u − a·θ̇ − b·θ + T",
     relaxes="Eqs. (23), (24): the spring balances gravity exactly at neutral",
-    parameters=(Parameter("torque_deg_per_s2", "T", 0.0, -500.0, 500.0, (1.0, -1.0, 20.0, -20.0), math.degrees(1.0)),),
+    parameters=(
+        Parameter(
+            "torque_deg_per_s2", "T", 0.0, -500.0, 500.0, (1.0, -1.0, 20.0, -20.0), math.degrees(1.0), like_zero=True
+        ),
+    ),
     aliases=("coulomb_friction",),
     separating_experiment="a rest without power, where only spring and weight hold the head",
     source="the paper, Remarks on Fig. 14",

@@ -11,7 +11,6 @@ paper's damping is a lubricant film alone, Eqs. (19)–(22).
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 from numba import njit
 
@@ -38,7 +37,7 @@ EFFECT = Effect(
     relaxes="Eq. (22): damping is viscous only",
     parameters=(
         Parameter("friction_deg_per_s2", "F", 0.0, 0.0, 500.0, (0.3, 3.0, 15.0), SI_TO_FILE),
-        Parameter("asymmetry_deg_per_s2", "D", 0.0, -250.0, 250.0, (0.0,), SI_TO_FILE, late=True),
+        Parameter("asymmetry_deg_per_s2", "D", 0.0, -250.0, 250.0, (0.0,), SI_TO_FILE, late=True, like_zero=True),
         Parameter(
             "breakaway_excess_deg_per_s2",
             "B",
@@ -66,9 +65,3 @@ EFFECT = Effect(
     source="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994",
     dry=_dry,
 )
-
-
-def even_friction() -> Effect:
-    """Return the effect with both directions alike: a difference moves the head as a wrong zero of the angle does."""
-    mean, _, *others = EFFECT.parameters
-    return replace(EFFECT, parameters=(mean, *others), fixed=((1, 0.0),))

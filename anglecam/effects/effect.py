@@ -15,8 +15,8 @@ there through one *port*. Its parameters at their null leave the model exactly a
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -84,6 +84,8 @@ class Parameter:
     """Whether it is a direction, which files state between −180° and 180°."""
     late: bool = False
     """Whether it is left out, which must be the same as 0, until the data ask for it; such parameters come last."""
+    like_zero: bool = False
+    """Whether it moves the head as a wrong zero of the angle does, so that it can be told only where zero is known."""
     is_speed: bool = False
     """Whether it is a speed of the head, which recordings that are much slower cannot tell."""
 
@@ -139,6 +141,13 @@ class Effect:
     """(stamps s, angle rad, parameters, view) → the angle that is measured, rad."""
     needs: Callable[[View], bool] = field(default=lambda view: True, repr=False)
     """Whether a view tells what the effect is reckoned from."""
+
+    def fixing(self, values: Mapping[str, float]) -> Effect:
+        """Return the effect with some parameters fixed: ``values`` by name, SI; itself where none is its own."""
+        own = tuple((i, values[p.name]) for i, p in enumerate(self.parameters) if p.name in values)
+        if not own:
+            return self
+        return replace(self, parameters=tuple(p for p in self.parameters if p.name not in values), fixed=own)
 
     def complete(self, own: Floats) -> Floats:
         """Put the parameters that are `fixed` among the (k,) fitted ones."""

@@ -9,7 +9,6 @@ neutral; with θ0 near 0 or 180° this is a cubic, which a spring can be as well
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numba import njit
@@ -50,8 +49,3 @@ EFFECT = Effect(
     source="the paper, Eqs. (16), (23)",
     load=_load,
 )
-
-
-def gravity_from(upright: float) -> Effect:
-    """Return the effect with its centre of mass declared: ``upright`` is its angle from upright at neutral, rad."""
-    return replace(EFFECT, parameters=EFFECT.parameters[:1], fixed=((1, upright),))

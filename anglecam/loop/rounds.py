@@ -16,8 +16,6 @@ import numpy as np
 from scipy import special
 
 from anglecam.effects import LEDGER, Effect
-from anglecam.effects.coulomb_friction import even_friction
-from anglecam.effects.gravity_geometry import gravity_from
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise, autoregression
 from anglecam.estimate.record import Record
@@ -216,14 +214,14 @@ def applicable(records: Sequence[Record]) -> list[Effect]:
     """
     driven = any(r.command is not None for r in records)
     known = all(r.zero_known for r in records)
+    fixed = {} if known else {p.name: p.null for e in LEDGER for p in e.parameters if p.like_zero}
     upright = next((r.upright for r in records if r.upright is not None), None)
-    as_told = {} if upright is None else {"gravity_geometry": gravity_from(upright)}
-    if not known:
-        as_told["coulomb_friction"] = even_friction()
+    if upright is not None:
+        fixed["gravity_deg"] = upright
     return [
-        as_told.get(e.id, e)
-        for e in LEDGER
-        if (driven or e.port not in ("command", "lag", "servo"))
-        and (known or e.id != "constant_torque")
+        e
+        for e in (entry.fixing(fixed) for entry in LEDGER)
+        if e.parameters
+        and (driven or e.port not in ("command", "lag", "servo"))
         and all(e.needs(r.view) for r in records)
     ]
