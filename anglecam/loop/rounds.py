@@ -38,7 +38,7 @@ MOST_EFFECTS = 3
 LIKELIEST = 2
 """Effects that are fitted to see what colour the noise has."""
 NEGLIGIBLE = 2.0
-"""In a film, structure smaller than this many times the angle's stated uncertainty is neither traced nor called
+"""In a film, structure smaller than this many times the angle's stated uncertainty is neither traced further nor called
 unexplained: it may be the measurement's own."""
 DECISIVE = 10.0
 """Log-likelihood from which on evidence chooses between effects whose predictions a film's angle hardly tells apart."""
@@ -101,6 +101,17 @@ def smallest(task: Task, first: Round) -> float:
     return max(FINEST, NEGLIGIBLE * task.camera, FAITHFUL * first.unseen.rmse)
 
 
+def faintest(task: Task, first: Round, best: Fit) -> float:
+    """Return the smallest doing of a first effect, rad RMS.
+
+    In a film it must be as large as the angle's stated uncertainty, and `NEGLIGIBLE` times that part of it which does
+    not scatter from frame to frame once the effect is in: only that can follow the motion as an effect does.
+    """
+    scatter = math.sqrt(1.0 - best.phi**2) * min(best.rmse, task.camera)
+    common = math.sqrt(task.camera**2 - scatter**2)
+    return max(FINEST, task.camera, NEGLIGIBLE * common, FAITHFUL * first.unseen.rmse)
+
+
 def candidates_of(task: Task, now: Round) -> list[Candidate]:
     """Fit what is promising beside what the model has, strongest evidence first.
 
@@ -136,7 +147,7 @@ def trace(task: Task, first: Round, candidates: Sequence[Candidate]) -> Round:
     now, negligible, been = first, smallest(task, first), [_names(first)]
     while candidates:
         best = candidates[0]
-        if not _convincing(task, now, best, negligible):
+        if not _convincing(task, now, best, negligible if effects_of(now.fit) else faintest(task, first, best.fit)):
             # one effect may mask another: neither helps alone, and both do together
             if len(effects_of(now.fit)) + 2 > MOST_EFFECTS:
                 break
