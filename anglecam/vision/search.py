@@ -29,7 +29,7 @@ _LEAST_CONTRAST = 8.0
 """Units of a*, b* by which the mouth's hue must stand out; JPEG's own chroma errors reach 3 or 4."""
 _TOP_PX = 40
 """The most mouth-like hue is that of the 40th pixel, past the codec's outliers."""
-_MOST_NOISE, _MOST_NOISE_DECLARED = 0.15, 0.25
+_MOST_NOISE, _MOST_NOISE_DECLARED = 0.15, 0.4
 """Standard deviation of the surroundings' fraction of mouth above which they and the mouth are one; a mouth of the very
 colour that is declared may stand out less, as brick-red lips on brown skin do."""
 _HUE_TOLERANCE = np.radians(25.0)
