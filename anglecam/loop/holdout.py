@@ -28,9 +28,9 @@ BLOCK = 0.5
 TURNS = 5
 """Times that a model is fitted to what is left."""
 LEFT_OUT = 0.25
-"""s; of every recording a block of this length in `TURNS` is left out at a time. That is longer than noise remembers,
-and as predictions run free a block's neighbours tell of it only by way of the parameters; a head's answer to one
-command is longer still, so that no block takes all of it."""
+"""s; of every recording a block of this length in `TURNS` is left out at a time. As predictions run free, a block's
+neighbours tell of it only by way of the parameters; a head's answer to one command is longer, so that no block takes
+all of it."""
 
 
 FIRST_FRAMES = 8

@@ -50,6 +50,13 @@ def test_when_a_head_lets_go_is_told_by_few_frames_and_contradicts_nothing(seed)
     assert abs(verdict.after.parameters[3] - 1.83) < 3.0 * verdict.after.sigma[3]
 
 
+def test_a_limit_that_is_reached_once_is_named():
+    # it acts for a fraction of a second; with so much left out at a time nothing would tell of it
+    limit = {"torque_saturation": {"limit": 159.7, "share": 0.628}}
+    verdict = close_records(drawn_session(limit, seed=0, sigma_deg=0.05), held_out=HELD_OUT)
+    assert [a.effect.id for a in verdict.accepted] == ["torque_saturation"]
+
+
 def test_a_driven_head_whose_command_is_missing_is_no_free_swing_with_much_noise():
     driven = session(TruePlant(a=5.0, b=60.0, c=55.0), 11)[3]
     assert close_records([replace(driven, command=None)]).verdict == "unexplained"
