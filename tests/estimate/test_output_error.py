@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from anglecam.estimate.output_error import fit_output_error, predict_output_error
+from anglecam.estimate.record import Record
 from anglecam.estimate.start import start_parameters
 from anglecam.identification import identify_records
 from anglecam.rig import Rig
@@ -94,3 +95,47 @@ def test_errors_of_the_angles_change_parameters_as_foretold_and_not_at_all_where
     free = noisy(0)
     ones = [np.ones_like(r.angle) for r in free]
     assert np.all(np.abs(fit_output_error(Plant(), free, [TRUE]).pulled_by(free, ones)) < 1e-6 * TRUE)
+
+
+class TwoAlike:
+    """Two parameters whose effects on the angle are nearly the same; the second is at most 1."""
+
+    states, names = 2, ("told", "bounded")
+    lower, upper, scales, to_file = np.zeros(2), np.array([np.inf, 1.0]), np.ones(2), np.ones(2)
+
+    def predict(self, parameters, time, command, state, view=None):
+        return parameters @ [np.sin(time), np.sin(1.05 * time)]
+
+
+def test_what_hangs_together_with_a_parameter_on_its_bound_is_as_unsure_as_the_bound_leaves_it():
+    rng, sigma, time = np.random.default_rng(0), 0.2, np.arange(0.0, 9.0, 1.0 / 15.0)
+    exact = TwoAlike().predict(np.array([1.0, 0.9]), time, None, None)
+    model, unsure, sure = TwoAlike(), [], []
+    for _ in range(200):
+        angle = exact + sigma * rng.standard_normal(len(time))
+        measured = Record("one", time, angle, None, zero_known=True, sigma=np.full(len(time), sigma))
+        fit = fit_output_error(model, [measured], [np.array([1.0, 0.5])], own=[np.zeros(2)])
+        if fit.parameters[1] > 1.0 - 1e-6:
+            assert np.isnan(fit.sigma[1])
+            unsure.append((fit.parameters[0] - 1.0) / fit.sigma[0])
+            sure.append((fit.parameters[0] - 1.0) / (sigma / np.linalg.norm(np.sin(time))))
+    assert len(unsure) > 30
+    assert np.mean(np.abs(unsure) < 1.96) >= 0.9
+    assert np.mean(np.abs(sure) < 1.96) < 0.7  # as if the bound were the truth
+
+
+class RunsAway:
+    """The angle grows with time, and beyond a certain rate it has no number."""
+
+    states, names = 2, ("rate",)
+    lower, upper, scales, to_file = np.full(1, -np.inf), np.full(1, np.inf), np.ones(1), np.ones(1)
+
+    def predict(self, parameters, time, command, state, view=None):
+        return parameters[0] * time if parameters[0] <= 1.0 else np.full(len(time), np.nan)
+
+
+def test_a_start_beside_which_the_plant_runs_away_costs_nothing():
+    time = np.arange(0.0, 2.0, 0.1)
+    measured = Record("one", time, 0.5 * time, None, zero_known=True, sigma=np.full(len(time), 0.01))
+    fit = fit_output_error(RunsAway(), [measured], [np.ones(1)], own=[np.zeros(2)])
+    assert fit.parameters == pytest.approx([0.5])
