@@ -28,6 +28,8 @@ SETTLED = 1e-3
 """Log-likelihood; a fit that has gained no more by its last `PATIENCE` steps is as good as it will be. Along a ridge it
 would crawl for many more, and where the angle has kinks one small step may come before a large one."""
 PATIENCE = 3
+RUNAWAY = 1e100
+"""rad; a plant that comes so far has run away: the squares of its slopes would soon have no number."""
 HEAT, MOST = 8, 60
 """Evaluations that each of several starts is given before the best of them goes on, and that a fit may take."""
 _BLAS = ThreadpoolController()
@@ -110,9 +112,10 @@ def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:
 
 
 def predicted_angle(model: Model, parameters: Floats, record: Record, own: Floats) -> Floats:
-    """Return the (n,) angle, rad, that a model gives a recording from its own unknowns ``own``."""
+    """Return the (n,) angle, rad, that a model gives a recording from its own unknowns; infinite where it runs away."""
     zero = 0.0 if record.zero_known else own[model.states]
-    return zero + model.predict(parameters, record.time, record.command, own[: model.states], record.view)
+    angle = zero + model.predict(parameters, record.time, record.command, own[: model.states], record.view)
+    return np.where(np.abs(angle) < RUNAWAY, angle, np.inf)
 
 
 def output_error(
@@ -156,6 +159,11 @@ def _fit_once(
         parts = [whiten(r, phi, r.angle - p) for r, p in zip(records, predicted(x), strict=True)]
         return np.concatenate(parts)
 
+    def slope(record: Record, both: Floats, here: Floats, j: int, step: float) -> Floats:
+        beside = both.copy()
+        beside[j] += step
+        return (predicted_angle(model, beside[:p], record, beside[p:]) - here) / step
+
     def jacobian(x: Floats) -> Floats:
         parameters, unknowns = split(x)
         result = np.zeros((rows[-1], len(x)))
@@ -171,9 +179,9 @@ def _fit_once(
                     continue
                 # a bound may be a wall of the physics: difference on its inner side there
                 step = -steps[j] if j < p and both[j] + steps[j] > model.upper[j] else steps[j]
-                beside = both.copy()
-                beside[j] += step
-                block[:, k] = (predicted_angle(model, beside[:p], record, beside[p:]) - here) / step
+                # where the plant just does not run away here it may beside it: then on the other side
+                slopes = (slope(record, both, here, j, by) for by in (step, -step))
+                block[:, k] = next((one for one in slopes if np.isfinite(one).all()), 0.0)
             result[rows[i] : rows[i + 1], place] = -whiten(record, phi, block)
         return result
 
