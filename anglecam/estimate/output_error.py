@@ -112,10 +112,10 @@ def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:
 
 
 def predicted_angle(model: Model, parameters: Floats, record: Record, own: Floats) -> Floats:
-    """Return the (n,) angle, rad, that a model gives a recording from its own unknowns; infinite where it runs away."""
+    """Return the (n,) angle, rad, that a model gives a recording from its own unknowns; NaN where it runs away."""
     zero = 0.0 if record.zero_known else own[model.states]
     angle = zero + model.predict(parameters, record.time, record.command, own[: model.states], record.view)
-    return np.where(np.abs(angle) < RUNAWAY, angle, np.inf)
+    return np.where(np.abs(angle) < RUNAWAY, angle, np.nan)
 
 
 def output_error(
