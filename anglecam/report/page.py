@@ -16,6 +16,7 @@ from anglecam.identification import Identified
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.gate import Test
+from anglecam.loop.holdout import LEFT_OUT, TURNS
 from anglecam.loop.refit import plant_of
 from anglecam.loop.remainder import leftover_torque
 from anglecam.loop.result import NEXT_COMMAND, plain, sentence, size_of, split_unit, with_uncertainty
@@ -135,8 +136,8 @@ def unseen_in_words(verdict: Verdict) -> str:
         held_out = ", ".join(r.name for r in verdict.held_out)
         return f"Held out by declaration and never fitted to, only predicted: {held_out}."
     return (
-        "No recording is held out by declaration. So a block of a second in five was predicted at a time, by a model"
-        " that was fitted to all other frames."
+        f"No recording is held out by declaration. So of every {TURNS * LEFT_OUT:g} s a block of {LEFT_OUT:g} s was"
+        " predicted at a time, by a model that was fitted to all other frames."
     )
 
 

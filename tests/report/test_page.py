@@ -71,7 +71,7 @@ def test_what_is_held_out_is_named(dragged):
 def test_without_a_declaration_the_page_says_that_blocks_were_predicted_in_turn(write, dragged):
     page = unescape(write(dragged, problems=[ValueError("swing.avi: no mouth")]))
     assert sentence(dragged) in page
-    assert "a block of a second in five was predicted at a time" in page
+    assert "of every 1.25 s a block of 0.25 s was predicted at a time" in page
     assert page.count("<svg") == 7
     assert "swing.avi: no mouth" in page
     assert re.search(r"− q·θ̇·\|θ̇\|</i> with q = [\d.]+ ± [\d.]+", page)
