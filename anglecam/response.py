@@ -91,8 +91,8 @@ def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[floa
     sigma : ndarray
         (n,) standard uncertainty, rad; where it is NaN throughout, it is taken from the angle's own roughness.
     changes : sequence of float
-        Times at which a command changed, s, where they are known: a response then begins there, and a way on which it
-        changed again is no response to one change and is left out.
+        Times at which a command changed, s, where they are known: a response then begins at the last one before the
+        angle leaves its rest, and a way on which it changed again is no response to one change and is left out.
 
     Returns
     -------
@@ -108,9 +108,13 @@ def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[floa
     rests = _lasting(_distinct(_rests(t, y, s, band), t, y, band), t, y, band)
     found, frame = [], float(np.median(np.diff(t)))
     for before, after in pairwise(rests):
-        meant = [c for c in changes if t[before.last] - frame <= c < t[after.first]]
-        if abs(after.level - before.level) >= _LEAST_WAY * band and len(meant) <= 1:
-            found.append(_response(t, y, s, before, after, meant[0] if meant else None, frame))
+        # what acts late is answered late: the angle may stay at rest for a while after the change that moves it
+        away = np.abs(y[before.last : after.first + 1] - before.level) > 2.0 * band
+        leaves = t[before.last + int(np.argmax(away))]
+        meant = [c for c in changes if t[before.first] <= c <= leaves]
+        again = any(leaves < c < t[after.first] for c in changes)
+        if abs(after.level - before.level) >= _LEAST_WAY * band and not again:
+            found.append(_response(t, y, s, before, after, meant[-1] if meant else None, frame))
     return tuple(found)
 
 

@@ -144,7 +144,7 @@ def read_series(path: Path) -> AngleSeries:
     Parameters
     ----------
     path : Path
-        ``NAME.angles.csv`` with a header; a row with an empty ``angle_deg`` is a frame without a measurement.
+        ``NAME.angles.csv`` with a header; a row whose ``angle_deg`` is empty or NaN is a frame without a measurement.
 
     Returns
     -------
@@ -192,7 +192,8 @@ def read_columns(path: Path, *, required: Sequence[str], may_be_empty: bool = Fa
     required : sequence of str
         Columns that must be there.
     may_be_empty : bool
-        Whether an empty cell of a numeric column is NaN instead of an error (``time_s`` never may be).
+        Whether an empty cell of a numeric column, or one that says so, is NaN instead of an error (``time_s`` never
+        may be).
 
     Returns
     -------
@@ -255,7 +256,7 @@ def require_increasing(path: Path, time: Floats) -> None:
 
 
 def _number(path: Path, line: int, name: str, cell: str, may_be_empty: bool) -> float:
-    if cell == "" and may_be_empty and name != "time_s":
+    if may_be_empty and name != "time_s" and cell.lower() in ("", "nan"):
         return math.nan
     try:
         value = float(cell)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import tempfile
 from pathlib import Path
 
 from rich.console import Console
@@ -20,7 +21,7 @@ def make_folder(out: Path) -> None:
     Raises
     ------
     RigError
-        Where it cannot be made.
+        Where it cannot be made, or written to.
     """
     if out.is_file():
         raise RigError(f"--out {out}: is a file; give a folder")
@@ -28,3 +29,8 @@ def make_folder(out: Path) -> None:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
         raise RigError(f"--out {out}: this folder cannot be made ({problem.strerror})") from problem
+    try:  # before the work, not after it
+        with tempfile.TemporaryFile(dir=out):
+            pass
+    except OSError as problem:
+        raise RigError(f"--out {out}: cannot be written to ({problem.strerror})") from problem

@@ -54,9 +54,9 @@ def test_columns_are_the_contracts_and_an_unmeasured_row_is_empty(tmp_path):
 
 def test_a_bare_series_from_elsewhere_is_enough(tmp_path):
     path = tmp_path / "encoder.angles.csv"
-    path.write_text("time_s,angle_deg,note\n0,1.5,a\n0.5,2.5,b\n1.0,,c\n1.5,3,d\n")
+    path.write_text("time_s,angle_deg,note\n0,1.5,a\n0.5,2.5,b\n1.0,,c\n1.5,3,d\n2.0,nan,e\n")
     series = read_series(path)
-    assert list(series.ok) == [True, True, False, True]
+    assert list(series.ok) == [True, True, False, True, False]
     assert np.degrees(series.angle[1]) == pytest.approx(2.5)
     assert np.isnan(series.sigma).all()
 
@@ -178,6 +178,18 @@ def test_times_in_milliseconds_are_refused(tmp_path):
     measured = measure_session(read_session(tmp_path))
     assert not measured.records
     assert "33.3 s apart; are times in seconds?" in str(measured.problems[0])
+
+
+def test_a_command_that_changes_after_the_recording_costs_that_recording(tmp_path):
+    rows = "".join(f"{k / 30:.4f},{10 * np.sin(k / 5):.4f}\n" for k in range(60))
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.angles.csv").write_text("time_s,angle_deg\n" + rows)
+    (tmp_path / "one.command.csv").write_text("time_s,command_deg\n0,0\n500,10\n")  # milliseconds
+    (tmp_path / "two.command.csv").write_text("time_s,command_deg\n0,0\n0.5,10\n")
+    measured = measure_session(read_session(tmp_path))
+    assert [record.name for record in measured.records] == ["two"]
+    said = "one: its command first changes at 500 s, after the last measured frame at 1.967 s"
+    assert [str(problem).partition(";")[0] for problem in measured.problems] == [said]
 
 
 def test_tracks_stand_in_the_place_of_their_clip_where_the_rig_tells_them(tmp_path):

@@ -74,6 +74,19 @@ def test_without_a_command_the_start_is_where_the_angle_leaves_its_rest():
     assert np.degrees(found[0].to_angle.value) == pytest.approx(15.0, abs=4 * np.degrees(found[0].to_angle.sigma))
 
 
+@pytest.mark.parametrize("late_s", [0.02, 0.05, 0.2])
+def test_an_answer_that_comes_late_begins_at_its_command_all_the_same(late_s):
+    time, angle, sigma = film(np.random.default_rng(4), 60, 0.02, *DAMPED)
+    found = responses(time + late_s, angle, sigma, changes=(0.71, 3.5))
+    assert [one.start.value for one in found] == [0.71, 3.5]
+    assert [one.settling_time.value for one in found] == pytest.approx([SETTLING_S + late_s] * 2, abs=0.005)
+
+
+def test_a_way_on_which_the_command_changes_again_is_left_out():
+    found = responses(*film(np.random.default_rng(4), 60, 0.02, *DAMPED), changes=(0.71, 3.5, 3.6))
+    assert [one.start.value for one in found] == [0.71]
+
+
 def nod_series(rate_hz, sigma_deg, seed=1, until=3.0, **command):
     rng = np.random.default_rng(seed)
     # a variable frame rate: every interval up to 10 % off

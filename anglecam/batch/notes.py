@@ -41,6 +41,8 @@ class Note:
     """Whether another time may be different though nothing has changed: a full disk, a clip still being written."""
     unchanged: bool = False
     """Whether this is what an earlier call found."""
+    gone: bool = False
+    """Whether its folder, when it was last searched, held it no longer: the index then tells of it no more."""
 
 
 @dataclass(frozen=True)

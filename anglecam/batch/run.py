@@ -6,10 +6,11 @@ this machine and one of Dask workers, and holds rows only, never a series.
 
 from __future__ import annotations
 
+import contextlib
 from collections import deque
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Protocol
@@ -114,7 +115,7 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
             retry_failed=options.retry_failed,
             time_limit=options.time_limit,
         )
-        plan = _plan(sources, asked, Store(out), options)
+        plan = _plan(sources, asked, Store(out), run, options)
         ledger = Ledger(settings, plan.earlier, plan.sessions)
         with _team(settings, options) as team, watch(len(sources), len(plan.sessions), quiet=options.quiet) as shown:
             try:
@@ -135,11 +136,9 @@ class Plan:
     """What earlier calls did, here and in other folders."""
 
 
-def _plan(sources: Sequence[Source], asked: Sequence[str], store: Store, options: Options) -> Plan:
+def _plan(sources: Sequence[Source], asked: Sequence[str], store: Store, run: str, options: Options) -> Plan:
     here = {source.address for source in sources}
-    searched = tuple(join(normalised(one), "") for one in asked)
-    # what a folder of this call no longer holds is no longer told of
-    earlier = tuple(n for n in store.clips() if n.address in here or not n.address.startswith(searched))
+    earlier = _still_there(here, asked, store, run)
     found = find_sessions(sources)
     places = session_places([(folder, root) for folder, root, _ in found])
     sessions = tuple(SessionJob(folder, places[folder], clips, options.close) for folder, _, clips in found)
@@ -150,6 +149,21 @@ def _plan(sources: Sequence[Source], asked: Sequence[str], store: Store, options
     clip_place = clip_places(sources, taken)
     clips = tuple(ClipJob(s.address, clip_place[s.address], s.address in in_session) for s in sources)
     return Plan(clips, sessions, earlier)
+
+
+def _still_there(here: set[str], asked: Sequence[str], store: Store, run: str) -> tuple[Note, ...]:
+    """Return what is remembered of clips, but for those that a folder of this call or of one before holds no longer."""
+    searched = tuple(join(normalised(one), "") for one in asked)
+    notes = []
+    for note in store.clips():
+        if note.address in here:
+            notes.append(note)
+        elif note.address.startswith(searched) and not note.gone:
+            with contextlib.suppress(OSError):  # a disk that is full
+                store.renew(replace(note, gone=True), run)
+        elif not note.gone:
+            notes.append(note)
+    return tuple(notes)
 
 
 def _work(plan: Plan, team: Team, ledger: Ledger, shown: Watch, log: Log) -> None:

@@ -181,7 +181,7 @@ def _is_done(before: Note, note: Note, job: ClipJob, settings: Settings, store: 
 
 def _renewed(before: Note, note: Note, settings: Settings, store: Store) -> Note:
     """Keep what an earlier call found; a clip that was merely touched need not be read again."""
-    renewed = replace(before, stamp=note.stamp, settled=note.settled)
+    renewed = replace(before, stamp=note.stamp, settled=note.settled, gone=False)
     if renewed != before:
         with contextlib.suppress(OSError):
             store.renew(renewed, settings.run)

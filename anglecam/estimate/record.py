@@ -88,7 +88,8 @@ def record_from_series(
     Raises
     ------
     InputError
-        Where fewer than `LEAST_FRAMES` frames are measured, or they follow each other more slowly than `SLOWEST`.
+        Where fewer than `LEAST_FRAMES` frames are measured, or they follow each other more slowly than `SLOWEST`, or
+        all of them lie before the command's first change.
     """
     ok = series.ok
     if ok.sum() < LEAST_FRAMES:
@@ -96,11 +97,18 @@ def record_from_series(
     interval = float(np.median(np.diff(series.time[ok])))
     if interval > SLOWEST:
         raise InputError(f"{series.name}: its frames are {interval:.3g} s apart; are times in seconds?")
+    change = None if command is None else command.first_change()
+    last = float(series.time[ok][-1])
+    if change is not None and change > last:
+        raise InputError(
+            f"{series.name}: its command first changes at {change:.4g} s, after the last measured frame at {last:.4g} s"
+            "; are its times seconds on the clip's clock?"
+        )
     cross = None
     if series.mouth_px is not None and series.pivot_px is not None:
         lever = np.hypot(*(series.mouth_px - series.pivot_px)[ok].T)
         cross = lever / np.mean(lever) - 1.0 if np.all(np.isfinite(lever)) else None
-    acts = command is not None and (command.first_change() is not None or (zero_known and command.angle[0] != 0.0))
+    acts = command is not None and (change is not None or (zero_known and command.angle[0] != 0.0))
     record = Record(
         series.name,
         series.time[ok],

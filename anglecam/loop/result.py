@@ -122,7 +122,7 @@ def sentence(verdict: Verdict) -> str:
     if verdict.verdict == "unexplained":
         return (
             f"Something is missing (the model errs by {before} on recordings that it was not fitted to), and none "
-            f"of the effects that anglecam knows explains it."
+            f"of the effects that anglecam knows surely explains it."
         )
     first, *others = [_cause(a.effect, a.alias_set[1:]) for a in verdict.accepted]
     causes = "; ".join([first, *(cause[0].lower() + cause[1:] for cause in others)])

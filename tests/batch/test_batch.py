@@ -187,6 +187,12 @@ def test_the_index_goes_on_telling_of_other_folders_and_forgets_what_is_no_longe
     assert len(rows(out)) == 3  # a clip's folder was not searched
     run_batch([str(mon)], out, QUIET)
     assert list(rows(out)) == [f"{mon}/a.avi", f"{tue}/a.avi"]
+    run_batch([str(tue)], out, QUIET)
+    assert list(rows(out)) == [f"{mon}/a.avi", f"{tue}/a.avi"]  # whatever is asked for next
+    (mon / "b.avi").write_bytes((mon / "a.avi").read_bytes())
+    run_batch([str(mon)], out, QUIET)
+    run_batch([str(tue)], out, QUIET)
+    assert list(rows(out)) == [f"{mon}/a.avi", f"{mon}/b.avi", f"{tue}/a.avi"]
 
 
 def test_wrong_calls_are_exit_status_2_and_do_nothing(tmp_path):
