@@ -60,9 +60,11 @@ def main(
     for seed in track(range(seeds), console=console):
         for name in names:
             try:
-                found[name].append(nearest(name, seed))
+                one = nearest(name, seed)
             except ValueError as error:  # no size of the effect does it
                 console.print(f"{name}, seed {seed}: {error}")
+            else:
+                found[name].append(one)
     table = Table("case", "nearest", "d, median", "d, least", "right first at best", title="What noise allows")
     for name, pairs in found.items():
         d = [one for _, one in pairs]
