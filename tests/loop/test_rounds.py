@@ -1,0 +1,29 @@
+"""What is small enough in a film to be the measurement's own."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from anglecam.loop.rounds import faintest
+
+CAMERA = 2e-4
+
+
+@pytest.mark.parametrize(
+    ("left", "phi", "times"),
+    [
+        (CAMERA, 0.0, 1.0),  # all of the stated uncertainty scatters from frame to frame
+        (0.6 * CAMERA, 0.0, 1.6),  # the other 0.8 of it does not, and might follow the motion
+        (CAMERA, 0.8, 1.6),  # nor does what resembles the frame before
+        (0.0, 0.0, 2.0),
+        (5.0 * CAMERA, 0.0, 1.0),
+    ],
+)
+def test_a_first_effect_must_do_twice_what_may_follow_the_motion_and_the_whole_uncertainty(left, phi, times):
+    task = SimpleNamespace(camera=CAMERA)
+    first = SimpleNamespace(unseen=SimpleNamespace(rmse=0.0))
+    assert faintest(task, first, SimpleNamespace(rmse=left, phi=phi)) == pytest.approx(times * CAMERA)
+    coarse = SimpleNamespace(unseen=SimpleNamespace(rmse=1e4 * CAMERA))
+    assert faintest(task, coarse, SimpleNamespace(rmse=left, phi=phi)) == pytest.approx(50.0 * CAMERA)
