@@ -138,12 +138,15 @@ class Plan:
 
 def _plan(sources: Sequence[Source], asked: Sequence[str], store: Store, run: str, options: Options) -> Plan:
     here = {source.address for source in sources}
-    earlier = _still_there(here, asked, store, run)
+    searched = tuple(join(normalised(one), "") for one in asked)
+    remembered = tuple(store.clips())
+    earlier = _still_there(remembered, here, searched, store, run)
     found = find_sessions(sources)
     places = session_places([(folder, root) for folder, root, _ in found])
     sessions = tuple(SessionJob(folder, places[folder], clips, options.close) for folder, _, clips in found)
     in_session = {clip for job in sessions for clip in job.clips}
-    taken = {note.place for note in earlier if note.address not in here and note.row.series}
+    elsewhere = (note for note in remembered if note.address not in here and not note.address.startswith(searched))
+    taken = {note.place for note in elsewhere if note.row.series}
     for job in sessions:  # where the loop writes series that are free of what the camera did
         taken |= {"/".join(filter(None, (job.place, CORRECTED, stem(clip)))) for clip in job.clips}
     clip_place = clip_places(sources, taken)
@@ -151,11 +154,12 @@ def _plan(sources: Sequence[Source], asked: Sequence[str], store: Store, run: st
     return Plan(clips, sessions, earlier)
 
 
-def _still_there(here: set[str], asked: Sequence[str], store: Store, run: str) -> tuple[Note, ...]:
+def _still_there(
+    remembered: Sequence[Note], here: set[str], searched: tuple[str, ...], store: Store, run: str
+) -> tuple[Note, ...]:
     """Return what is remembered of clips, but for those that a folder of this call or of one before holds no longer."""
-    searched = tuple(join(normalised(one), "") for one in asked)
     notes = []
-    for note in store.clips():
+    for note in remembered:
         if note.address in here:
             notes.append(note)
         elif note.address.startswith(searched) and not note.gone:
