@@ -58,6 +58,7 @@ def test_the_page_tells_the_verdict(write, dragged, verdict, svgs):
     assert f"{np.degrees(found.before_held_out.rmse):.4f}" in page
     assert sentence(found) in page
     assert "Nothing more needs to be filmed" not in page
+    assert ("comes nearest, but not surely. If it is at work" in page) == (verdict == "unexplained")
     assert ("What would have been seen" in page) == (verdict == "nothing_missing")
     assert "a <b> & c" in page
     assert "a <b>" not in text  # a session's name is text, not markup
