@@ -115,7 +115,10 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
             retry_failed=options.retry_failed,
             time_limit=options.time_limit,
         )
-        plan = _plan(sources, asked, Store(out), run, options)
+        plan = _plan(sources, asked, Store(out), options)
+        for note in plan.gone:
+            with contextlib.suppress(OSError):  # a disk that is full
+                Store(out).renew(replace(note, gone=True), run)
         ledger = Ledger(settings, plan.earlier, plan.sessions)
         with _team(settings, options) as team, watch(len(sources), len(plan.sessions), quiet=options.quiet) as shown:
             try:
@@ -134,40 +137,27 @@ class Plan:
     sessions: tuple[SessionJob, ...]
     earlier: tuple[Note, ...]
     """What earlier calls did, here and in other folders."""
+    gone: tuple[Note, ...]
+    """Of clips that a folder of this call holds no longer."""
 
 
-def _plan(sources: Sequence[Source], asked: Sequence[str], store: Store, run: str, options: Options) -> Plan:
+def _plan(sources: Sequence[Source], asked: Sequence[str], store: Store, options: Options) -> Plan:
     here = {source.address for source in sources}
     searched = tuple(join(normalised(one), "") for one in asked)
-    remembered = tuple(store.clips())
-    earlier = _still_there(remembered, here, searched, store, run)
+    notes = list(store.clips())
+    lost = [n for n in notes if n.address not in here and n.address.startswith(searched)]
+    elsewhere = [n for n in notes if n.address not in here and not n.address.startswith(searched)]
+    earlier = (*(n for n in notes if n.address in here), *(n for n in elsewhere if not n.gone))
     found = find_sessions(sources)
     places = session_places([(folder, root) for folder, root, _ in found])
     sessions = tuple(SessionJob(folder, places[folder], clips, options.close) for folder, _, clips in found)
     in_session = {clip for job in sessions for clip in job.clips}
-    elsewhere = (note for note in remembered if note.address not in here and not note.address.startswith(searched))
     taken = {note.place for note in elsewhere if note.row.series}
     for job in sessions:  # where the loop writes series that are free of what the camera did
         taken |= {"/".join(filter(None, (job.place, CORRECTED, stem(clip)))) for clip in job.clips}
     clip_place = clip_places(sources, taken)
     clips = tuple(ClipJob(s.address, clip_place[s.address], s.address in in_session) for s in sources)
-    return Plan(clips, sessions, earlier)
-
-
-def _still_there(
-    remembered: Sequence[Note], here: set[str], searched: tuple[str, ...], store: Store, run: str
-) -> tuple[Note, ...]:
-    """Return what is remembered of clips, but for those that a folder of this call or of one before holds no longer."""
-    notes = []
-    for note in remembered:
-        if note.address in here:
-            notes.append(note)
-        elif note.address.startswith(searched) and not note.gone:
-            with contextlib.suppress(OSError):  # a disk that is full
-                store.renew(replace(note, gone=True), run)
-        elif not note.gone:
-            notes.append(note)
-    return tuple(notes)
+    return Plan(clips, sessions, earlier, tuple(n for n in lost if not n.gone))
 
 
 def _work(plan: Plan, team: Team, ledger: Ledger, shown: Watch, log: Log) -> None:

@@ -189,10 +189,14 @@ def test_the_index_goes_on_telling_of_other_folders_and_forgets_what_is_no_longe
     assert list(rows(out)) == [f"{mon}/a.avi", f"{tue}/a.avi"]
     run_batch([str(tue)], out, QUIET)
     assert list(rows(out)) == [f"{mon}/a.avi", f"{tue}/a.avi"]  # whatever is asked for next
+    (tue / "b.avi").write_bytes((tue / "a.avi").read_bytes())
+    run_batch([str(tue)], out, QUIET)
     (mon / "b.avi").write_bytes((mon / "a.avi").read_bytes())
     run_batch([str(mon)], out, QUIET)
     run_batch([str(tue)], out, QUIET)
-    assert list(rows(out)) == [f"{mon}/a.avi", f"{mon}/b.avi", f"{tue}/a.avi"]
+    found = [row["series"] for row in rows(out).values()]
+    assert found == ["a.angles.csv", "b.angles.csv", "tue/a.angles.csv", "tue/b.angles.csv"]
+    assert all((out / series).exists() for series in found)  # what is gone keeps its results' place
 
 
 def test_wrong_calls_are_exit_status_2_and_do_nothing(tmp_path):

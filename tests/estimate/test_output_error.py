@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -110,6 +110,8 @@ class TwoAlike:
 def test_what_hangs_together_with_a_parameter_on_its_bound_is_as_unsure_as_the_bound_leaves_it():
     rng, sigma, time = np.random.default_rng(0), 0.2, np.arange(0.0, 9.0, 1.0 / 15.0)
     exact = TwoAlike().predict(np.array([1.0, 0.9]), time, None, None)
+    columns = np.column_stack([np.sin(time), np.sin(1.05 * time)])
+    unbounded = sigma * np.sqrt(np.linalg.inv(columns.T @ columns)[0, 0])
     model, unsure, sure = TwoAlike(), [], []
     for _ in range(200):
         angle = exact + sigma * rng.standard_normal(len(time))
@@ -117,6 +119,8 @@ def test_what_hangs_together_with_a_parameter_on_its_bound_is_as_unsure_as_the_b
         fit = fit_output_error(model, [measured], [np.array([1.0, 0.5])], own=[np.zeros(2)])
         if fit.parameters[1] > 1.0 - 1e-6:
             assert np.isnan(fit.sigma[1])
+            # no surer without the bound; the noise is known to 6 %
+            assert np.sqrt(fit.covariance[0, 0]) < 1.2 * unbounded
             unsure.append((fit.parameters[0] - 1.0) / fit.sigma[0])
             sure.append((fit.parameters[0] - 1.0) / (sigma / np.linalg.norm(np.sin(time))))
     assert len(unsure) > 30
@@ -124,18 +128,22 @@ def test_what_hangs_together_with_a_parameter_on_its_bound_is_as_unsure_as_the_b
     assert np.mean(np.abs(sure) < 1.96) < 0.7  # as if the bound were the truth
 
 
+@dataclass(frozen=True)
 class RunsAway:
-    """The angle grows with time, and beyond a certain rate it has no number."""
+    """The angle grows with time, and beyond a certain rate it runs away."""
+
+    beyond: float
 
     states, names = 2, ("rate",)
     lower, upper, scales, to_file = np.full(1, -np.inf), np.full(1, np.inf), np.ones(1), np.ones(1)
 
     def predict(self, parameters, time, command, state, view=None):
-        return parameters[0] * time if parameters[0] <= 1.0 else np.full(len(time), np.nan)
+        return parameters[0] * time if parameters[0] <= 1.0 else np.full(len(time), self.beyond)
 
 
-def test_a_start_beside_which_the_plant_runs_away_costs_nothing():
+@pytest.mark.parametrize("beyond", [np.nan, 1e240])  # it has no number any more, or its square has none
+def test_a_start_beside_which_the_plant_runs_away_costs_nothing(beyond):
     time = np.arange(0.0, 2.0, 0.1)
     measured = Record("one", time, 0.5 * time, None, zero_known=True, sigma=np.full(len(time), 0.01))
-    fit = fit_output_error(RunsAway(), [measured], [np.ones(1)], own=[np.zeros(2)])
+    fit = fit_output_error(RunsAway(beyond), [measured], [np.ones(1)], own=[np.zeros(2)])
     assert fit.parameters == pytest.approx([0.5])
