@@ -25,22 +25,22 @@ from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
 import anglecam
-from anglecam.estimate.comparison import compare_models
-from anglecam.estimate.consistency import consistency, error_consistency, innovation_consistency, innovation_whiteness
-from anglecam.estimate.cramer_rao import cramer_rao_bound, parameter_covariance
 from anglecam.estimate.ekf import PAPER, EkfSettings, fit_ekf, settings_for
 from anglecam.estimate.kalman import SHARED
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.record import Record
-from anglecam.estimate.roots import poles_and_zeros
 from anglecam.estimate.smoothing import smooth
 from anglecam.identification import identify_records
 from anglecam.rig import Rig
 from anglecam.session import Command
 from anglecam.simulate.plant import Plant
 from anglecam.simulate.third_order import ThirdOrder
+from support.comparison import compare_models
+from support.consistency import consistency, error_consistency, innovation_consistency, innovation_whiteness
+from support.cramer_rao import cramer_rao_bound, parameter_covariance
 from support.motion import Plant as TruePlant
 from support.motion import Recording
+from support.roots import poles_and_zeros
 from support.series import record
 from support.transfer import SYS2, SYS2_DENOMINATOR, SYS2_NUMERATOR, respond
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from anglecam.estimate.consistency import consistency, error_consistency, innovation_consistency, innovation_whiteness
 from anglecam.estimate.ekf import EkfSettings, fit_ekf, settings_for
+from support.consistency import consistency, error_consistency, innovation_consistency, innovation_whiteness
 from support.motion import Plant as TruePlant
 from support.motion import Recording
 from support.series import noise, record

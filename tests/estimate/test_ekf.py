@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anglecam.estimate.cramer_rao import cramer_rao_bound
 from anglecam.estimate.ekf import PAPER, fit_ekf, settings_for
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.record import Record
@@ -16,6 +15,7 @@ from anglecam.identification import identify_records
 from anglecam.rig import Rig
 from anglecam.session import Command
 from anglecam.simulate.plant import Plant
+from support.cramer_rao import cramer_rao_bound
 from support.motion import Plant as TruePlant
 from support.motion import Recording
 from support.series import record, session

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from anglecam.estimate.consistency import error_consistency
 from anglecam.estimate.ekf import fit_ekf, settings_for
 from anglecam.estimate.kalman import filter_record
 from anglecam.estimate.smoothing import smooth
+from support.consistency import error_consistency
 from support.motion import Plant as TruePlant
 from support.motion import Recording, move
 from support.series import record, session
