@@ -9,11 +9,11 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.record import Record
 from anglecam.errors import RigError
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import autoregression, noise_floor
 from anglecam.estimate.output_error import fit_output_error, predict_output_error
-from anglecam.estimate.record import Record
 from anglecam.estimate.start import start_parameters
 from anglecam.estimate.step_figures import NO_STEP, StepFigures, step_figures
 from anglecam.estimate.systematic import systematic_covariance

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.record import Record, record_from_series
 from anglecam.estimate.fit import Model
-from anglecam.estimate.record import Record, record_from_series
 from anglecam.estimate.step_figures import NO_STEP, StepFigures
 from anglecam.export import FittedModel
 from anglecam.neck.large_angle import LargeAngleNeck, acceleration, equilibrium, linearise

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from anglecam.data.record import Record, record_from_series
 from anglecam.errors import InputError, blame
-from anglecam.estimate.record import Record, record_from_series
 from anglecam.marks.angle import MeasuredTracks, measure_tracks
 from anglecam.marks.files import TRACKS_ENDINGS
 from anglecam.measurement import Measurement, measure_clip

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import UnivariateSpline
 
-from anglecam.estimate.crossings import HIGH, LOW, SETTLED, first_crossing, last_rise, settling
+from anglecam.data.step_figures import HIGH, LOW, SETTLED, first_crossing, last_rise, settling
 
 Floats = NDArray[np.float64]
 

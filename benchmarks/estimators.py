@@ -25,10 +25,10 @@ from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
 import anglecam
+from anglecam.data.record import Record
 from anglecam.estimate.ekf import PAPER, EkfSettings, fit_ekf, settings_for
 from anglecam.estimate.kalman import SHARED
 from anglecam.estimate.output_error import fit_output_error
-from anglecam.estimate.record import Record
 from anglecam.estimate.smoothing import smooth
 from anglecam.identification import identify_records
 from anglecam.rig import Rig

@@ -37,8 +37,8 @@ from numpy.typing import NDArray
 from scipy.linalg import logm
 
 import anglecam
+from anglecam.data.record import Record
 from anglecam.estimate.ekf import fit_ekf, settings_for
-from anglecam.estimate.record import Record
 from anglecam.identification import identify_records
 from anglecam.rig import Rig
 from anglecam.session import Command

@@ -45,7 +45,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from anglecam.estimate.record import Record
+from anglecam.data.record import Record
 from anglecam.loop.close import close_records
 from anglecam.session import Command
 from benchmarks.blind.sessions import HELD_OUT, session

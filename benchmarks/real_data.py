@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from scipy.io import loadmat
 from scipy.signal import butter, decimate, filtfilt
 
+from anglecam.data.record import Record
 from anglecam.effects import Effect, effect
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.output_error import fit_output_error, predict_output_error
-from anglecam.estimate.record import Record
 from anglecam.estimate.shooting import windows
 from anglecam.estimate.start import start_parameters
 from anglecam.files import write_atomically

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from anglecam import cli
-from anglecam.estimate.record import Record
+from anglecam.data.record import Record
 from anglecam.files import write_json
 from anglecam.neck.file import read_neck
 from anglecam.neck_systems import paper_systems, second_order, side_by_side

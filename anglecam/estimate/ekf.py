@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.record import Record
 from anglecam.estimate.kalman import SHARED, Filtered, filter_record
-from anglecam.estimate.record import Record
 from anglecam.estimate.smoothing import smooth_first_states
 from anglecam.simulate.plant import Plant
 

@@ -15,8 +15,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.record import Record
 from anglecam.effects import UNSEEN, View
-from anglecam.estimate.record import Record
 from anglecam.session import Command
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.estimate.record import Record
+from anglecam.data.record import Record
 
 Floats = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 from threadpoolctl import ThreadpoolController
 
+from anglecam.data.record import Record
 from anglecam.estimate.fit import Fit, Model, whiten
-from anglecam.estimate.record import Record
 
 Floats = NDArray[np.float64]
 

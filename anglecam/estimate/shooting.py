@@ -25,8 +25,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.record import LEAST_FRAMES, Record
 from anglecam.estimate.fit import Fit
-from anglecam.estimate.record import LEAST_FRAMES, Record
 
 Floats = NDArray[np.float64]
 

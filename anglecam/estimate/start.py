@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.estimate.record import Record
+from anglecam.data.record import Record
 from anglecam.simulate.plant import Plant
 
 Floats = NDArray[np.float64]

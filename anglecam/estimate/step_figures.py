@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.estimate.crossings import HIGH, LOW, first_crossing, settling
+from anglecam.data.step_figures import HIGH, LOW, first_crossing, settling
 from anglecam.estimate.fit import Model
 from anglecam.session import Command
 

@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from anglecam.data.record import Record
 from anglecam.effects import Effect
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise, autoregression, noise_floor
 from anglecam.estimate.output_error import fit_output_error, predict_output_error
-from anglecam.estimate.record import Record
 from anglecam.estimate.shooting import drifts, goes_astray, windows
 from anglecam.estimate.start import start_parameters
 from anglecam.loop.attribute import Candidate, fit_to_more, log_likelihood_gain, promising, rivals

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-from anglecam.estimate.record import Record
+from anglecam.data.record import Record
 from anglecam.session import Command
 
 Floats = NDArray[np.float64]

@@ -26,10 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from anglecam.data.record import Record
 from anglecam.effects import LEDGER
 from anglecam.estimate.fit import Fit, whiten
 from anglecam.estimate.noise import Noise
-from anglecam.estimate.record import Record
 from anglecam.files import write_atomically
 from anglecam.loop.commands import (
     LONGEST,

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
+from anglecam.data.record import Record
 from anglecam.estimate.fit import Fit, whiten
-from anglecam.estimate.record import Record
 from anglecam.loop.screen import Direction, absorbed_space
 from anglecam.loop.torques import torque_responses
 

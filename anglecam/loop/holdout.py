@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.record import Record
 from anglecam.errors import RigError
 from anglecam.estimate.fit import Fit, whiten
 from anglecam.estimate.output_error import fit_output_error, predict_output_error, predicted_angle
-from anglecam.estimate.record import Record
 
 Floats = NDArray[np.float64]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from anglecam.data.record import Record
 from anglecam.effects import Effect
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.output_error import fit_output_error
-from anglecam.estimate.record import Record
 from anglecam.simulate.plant import Plant
 
 

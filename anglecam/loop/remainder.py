@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.record import Record
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise
-from anglecam.estimate.record import Record
 
 Floats = NDArray[np.float64]
 

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import special
 
+from anglecam.data.record import Record
 from anglecam.effects import LEDGER, Effect
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise, autoregression
-from anglecam.estimate.record import Record
 from anglecam.loop.attribute import (
     Candidate,
     apart,

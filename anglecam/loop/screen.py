@@ -16,9 +16,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.record import Record
 from anglecam.effects import Effect
 from anglecam.estimate.fit import Fit, whiten
-from anglecam.estimate.record import Record
 from anglecam.loop.refit import plant_of
 from anglecam.simulate.plant import Plant
 

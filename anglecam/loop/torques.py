@@ -14,8 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.record import Record
 from anglecam.estimate.fit import Fit, whiten
-from anglecam.estimate.record import Record
 from anglecam.loop.refit import plant_of
 from anglecam.session import Command
 from anglecam.simulate.plant import Plant

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import newton
 
-from anglecam.estimate.crossings import HIGH, LOW, first_crossing, settling
+from anglecam.data.step_figures import HIGH, LOW, first_crossing, settling
 from anglecam.estimate.step_figures import NO_STEP, StepFigures
 from anglecam.neck.linear import LinearNeck
 from anglecam.neck.step import linear_step, linear_step_figures

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import companion
 from scipy.optimize import brentq
 
-from anglecam.estimate.crossings import HIGH, LOW, SETTLED
+from anglecam.data.step_figures import HIGH, LOW, SETTLED
 from anglecam.estimate.step_figures import NO_STEP, StepFigures
 
 Floats = NDArray[np.float64]

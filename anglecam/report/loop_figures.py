@@ -11,9 +11,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from anglecam.data.record import Record
 from anglecam.errors import printable
 from anglecam.estimate.fit import Fit
-from anglecam.estimate.record import Record
 from anglecam.loop.attribute import Candidate
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import SETTLE, Experiment

@@ -15,10 +15,10 @@ from matplotlib.axes import Axes
 from matplotlib.patches import FancyBboxPatch
 from numpy.typing import NDArray
 
+from anglecam.data.record import Record
 from anglecam.effects import Effect, Knots
 from anglecam.effects import effect as entry
 from anglecam.estimate.fit import Fit
-from anglecam.estimate.record import Record
 from anglecam.loop.close import Verdict
 from anglecam.loop.result import plain
 from anglecam.loop.rounds import applicable

@@ -1,1 +1,1 @@
-"""Pictures as arrays: from images to marks (mouth, pivot) in pixels. Nothing here knows about files or angles."""
+"""Images as arrays: from pixels to marks, pivots and rotations in pixels. Nothing here knows about files or angles."""

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from anglecam.data.record import Record
 from anglecam.effects import View
 from anglecam.estimate.output_error import fit_output_error
-from anglecam.estimate.record import Record
 from anglecam.session import Command
 from anglecam.simulate.plant import Plant
 from benchmarks.blind.drawn import magnified

@@ -270,7 +270,7 @@ DAMAGES: dict[str, Damage] = {
 def readers() -> dict[str, Reader]:
     """Return who reads each kind of file, as the commands do."""
     from anglecam.calibration import read_calibration
-    from anglecam.estimate.record import record_from_series
+    from anglecam.data.record import record_from_series
     from anglecam.export import read_model
     from anglecam.lens import lens_from_rig
     from anglecam.marks.angle import measure_tracks

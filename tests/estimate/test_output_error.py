@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from anglecam.data.record import Record
 from anglecam.estimate.output_error import fit_output_error, predict_output_error
-from anglecam.estimate.record import Record
 from anglecam.estimate.start import start_parameters
 from anglecam.identification import identify_records
 from anglecam.rig import Rig

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from anglecam.data.record import Record
 from anglecam.effects import effect
 from anglecam.estimate.output_error import fit_output_error
-from anglecam.estimate.record import Record
 from anglecam.estimate.shooting import drifts, goes_astray, windows
 from anglecam.session import Command
 from anglecam.simulate.plant import Plant

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import yaml
 
+from anglecam.data.record import Record
 from anglecam.effects import effect
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise
 from anglecam.estimate.output_error import fit_output_error
-from anglecam.estimate.record import Record
 from anglecam.estimate.start import start_parameters
 from anglecam.loop.attribute import fit_with
 from anglecam.loop.commands import candidate_commands, limits_of

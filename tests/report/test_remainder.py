@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from anglecam.data.record import Record
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise
-from anglecam.estimate.record import Record
 from anglecam.loop.remainder import leftover_torque
 from anglecam.simulate.plant import Plant
 from support.series import noise

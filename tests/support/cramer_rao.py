@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.record import Record
 from anglecam.estimate.fit import Fit, Model
 from anglecam.estimate.output_error import fit_output_error
-from anglecam.estimate.record import Record
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.estimate.record import Record
+from anglecam.data.record import Record
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.neck.parameters import PAPER
 from anglecam.neck.statics import slack_limit

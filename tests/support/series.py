@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.estimate.record import Record
+from anglecam.data.record import Record
 from anglecam.session import Command
 from support.motion import Plant, Recording, command_rows, move
 
