@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from anglecam.angles import Angles
 from anglecam.budget import worst_case
-from anglecam.rig import Rig
-from anglecam.series import CONTRACT_RADII_PX, OK, AngleSeries
-from anglecam.session import Command
+from anglecam.io.rig import Rig
+from anglecam.io.series_csv import CONTRACT_RADII_PX, OK, AngleSeries
+from anglecam.io.session import Command
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.budget import PlaceErrors, angle_sigma, place_errors
+from anglecam.io.rig import Rig
+from anglecam.io.session import Command
 from anglecam.lens import Lens
 from anglecam.registration import Registered
-from anglecam.rig import Rig
-from anglecam.session import Command
 from anglecam.shutter import mean_off_middle
 from anglecam.sighting import Sighting
 from anglecam.uncertainty import Tilt

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import RigError
-from anglecam.files import read_text, write_atomically
+from anglecam.io.files import read_text, write_atomically
 
 Floats = NDArray[np.float64]
 

@@ -20,10 +20,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressC
 from anglecam import __version__
 from anglecam.batch.cli import batch
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
-from anglecam.exchange import Also, write_also
-from anglecam.neck_cli import app as neck
-from anglecam.rig import Rig, read_rig
-from anglecam.session import (
+from anglecam.io.netcdf_parquet import Also, write_also
+from anglecam.io.rig import Rig, read_rig
+from anglecam.io.session import (
     Session,
     command_beside,
     find_clips,
@@ -32,12 +31,13 @@ from anglecam.session import (
     recording_name,
     rig_beside,
 )
+from anglecam.neck_cli import app as neck
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
     from anglecam.identification import Estimator
-    from anglecam.marks.angle import MeasuredTracks
     from anglecam.measurement import Measurement
+    from anglecam.measurement.tracks import MeasuredTracks
     from anglecam.recordings import Measured
 
 app = typer.Typer(
@@ -131,7 +131,7 @@ def budget(
     rig: RigFile = None,
 ) -> None:
     """Say what the angle's uncertainty is made of: NAME.budget.json and a page for each clip."""
-    from anglecam.marks.angle import MeasuredTracks
+    from anglecam.measurement.tracks import MeasuredTracks
     from anglecam.report.budget_page import budget_table, write_budget
 
     declared = read_rig(rig) if rig else None
@@ -191,7 +191,7 @@ def identify(
 ) -> None:
     """Fit a model to a session: model.json, and model.mat for MATLAB."""
     from anglecam.identification import ESTIMATORS
-    from anglecam.neck.file import read_neck
+    from anglecam.io.neck_file import read_neck
     from anglecam.report.summary import model_table
     from anglecam.session_results import identify_session
 
@@ -313,7 +313,7 @@ def _expand(
 
 def _film(source: Path, measurement: Measurement | MeasuredTracks) -> Path:
     """Return the film to draw an overlay on."""
-    from anglecam.marks.angle import MeasuredTracks
+    from anglecam.measurement.tracks import MeasuredTracks
 
     if not isinstance(measurement, MeasuredTracks):
         return source

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
-from anglecam.files import write_json
-from anglecam.marks.angle import MeasuredTracks
+from anglecam.io.files import write_json
+from anglecam.io.series_csv import write_series
+from anglecam.io.session import SERIES_ENDING, Command
 from anglecam.measurement import Measurement
+from anglecam.measurement.tracks import MeasuredTracks
 from anglecam.report.figures import plot_series
 from anglecam.response import Response, responses, responses_as_dicts
-from anglecam.series import write_series
-from anglecam.session import SERIES_ENDING, Command
 from anglecam.sync import offset_of, on_clip_clock
 
 

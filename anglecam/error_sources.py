@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.angles import Angles
+from anglecam.io.rig import Rig
+from anglecam.io.series_csv import OK
 from anglecam.measurement import Measurement
 from anglecam.registration import Registered
-from anglecam.rig import Rig
-from anglecam.series import OK
 from anglecam.uncertainty import ErrorSources, Neutral
 
 Floats = NDArray[np.float64]

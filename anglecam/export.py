@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from scipy import io
 
 from anglecam.errors import InputError
-from anglecam.files import read_json
 from anglecam.identification import Identified
+from anglecam.io.files import read_json
 from anglecam.neck.large_angle import linearise
 from anglecam.simulate.large_angle import QUANTITIES, LargeAngle
 

@@ -17,8 +17,8 @@ from anglecam.estimate.output_error import fit_output_error, predict_output_erro
 from anglecam.estimate.start import start_parameters
 from anglecam.estimate.step_figures import NO_STEP, StepFigures, step_figures
 from anglecam.estimate.systematic import systematic_covariance
+from anglecam.io.rig import Rig
 from anglecam.neck.large_angle import LargeAngleNeck, linearise
-from anglecam.rig import Rig
 from anglecam.simulate.large_angle import DEFAULT, FREE_SWING, LargeAngle
 from anglecam.simulate.plant import Plant
 from anglecam.simulate.third_order import ThirdOrder

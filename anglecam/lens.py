@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from anglecam.calibration import Calibration, read_calibration
 from anglecam.errors import InputError, RigError
-from anglecam.rig import Rig
+from anglecam.io.rig import Rig
 
 Floats = NDArray[np.float64]
 

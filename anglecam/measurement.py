@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from anglecam.angle_series import series_of_angles, why_zero_is_elsewhere
 from anglecam.angles import Angles, coarse_angles, turns
 from anglecam.fine_angles import fine_angles
+from anglecam.io.rig import Rig
+from anglecam.io.series_csv import OK, AngleSeries
+from anglecam.io.session import Command, recording_name
 from anglecam.registration import Registered, Start, register_clip
-from anglecam.rig import Rig
-from anglecam.series import OK, AngleSeries
-from anglecam.session import Command, recording_name
 from anglecam.shutter import measurement_time
 from anglecam.sight_clip import sight_clip
 from anglecam.sight_head import sight_head

@@ -16,7 +16,7 @@ import typer
 from rich.table import Table
 
 from anglecam.errors import RigError
-from anglecam.files import json_text, write_json
+from anglecam.io.files import json_text, write_json
 from anglecam.terminal import make_folder, screen
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def kinematics(
     as_json: Json = False,
 ) -> None:
     """Work out four-bar and turning mechanism: Table 3, limits, commands of wanted nods."""
-    from anglecam.neck.file import read_neck
+    from anglecam.io.neck_file import read_neck
     from anglecam.report.neck_figures import kinematics_figure, turning_figure
     from anglecam.report.neck_numbers import kinematics_numbers
     from anglecam.report.neck_tables import kinematics_tables
@@ -75,7 +75,7 @@ def statics(
     as_json: Json = False,
 ) -> None:
     """Hold spring against weight: balance, pretension, the servo's torque."""
-    from anglecam.neck.file import read_neck
+    from anglecam.io.neck_file import read_neck
     from anglecam.report.neck_figures import statics_figure
     from anglecam.report.neck_numbers import statics_numbers
     from anglecam.report.neck_tables import statics_tables
@@ -103,7 +103,7 @@ def response(
     Eqs. (28) and (31), SYS1 and SYS2, as in Figs. 10, 11, 14 and 15.
     """
     from anglecam.export import read_model
-    from anglecam.neck.file import read_neck
+    from anglecam.io.neck_file import read_neck
     from anglecam.neck_systems import driven_record, first_step, fitted_system, paper_systems, side_by_side
     from anglecam.report.neck_loop_figures import series_figure, step_figure
     from anglecam.report.neck_loop_numbers import response_numbers
@@ -156,7 +156,7 @@ def design(
 
     From a, b, c to what the neck is made of, and from a wish to another neck.
     """
-    from anglecam.neck.file import read_neck
+    from anglecam.io.neck_file import read_neck
     from anglecam.neck.linear import linear_neck
     from anglecam.neck.pd_tuning import ADULT
     from anglecam.neck.synthesis import Wish, synthesise
@@ -204,7 +204,7 @@ def pd(
 
     Eq. (37) and Fig. 16: of SYS2, of a fitted model, or with --neck of that neck.
     """
-    from anglecam.neck.file import read_neck
+    from anglecam.io.neck_file import read_neck
     from anglecam.neck.pd import PdGains, close_loop, gains_table
     from anglecam.neck.pd_tuning import tune_pd
     from anglecam.neck_procedure import chosen_plant, default_gains, simulated_loop, wanted_nod
@@ -249,7 +249,7 @@ def sensitivity(neck: NeckFile = None, out: Out = None, as_json: Json = False) -
 
     Fig. 9 a-f and normalised sensitivities.
     """
-    from anglecam.neck.file import read_neck
+    from anglecam.io.neck_file import read_neck
     from anglecam.neck.sensitivity import figure_9, sensitivities
     from anglecam.report.neck_figures import sensitivity_figure
     from anglecam.report.neck_numbers import sensitivity_numbers

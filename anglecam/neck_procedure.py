@@ -1,6 +1,6 @@
 """The seven steps of the paper's design procedure in a row, from what a user gives to what each step takes.
 
-1 a mechanism (`anglecam.neck.file`), 2 a person's nod (`wanted_nod`, `wish_of`), 3 a motion (`identified_motion`), 4
+1 a mechanism (`anglecam.io.neck_file`), 2 a person's nod (`wanted_nod`, `wish_of`), 3 a motion (`identified_motion`), 4
 and 5 what is known and each route through Eqs. (34)-(35) (`routes_of`), 6 a neck that explains it (`explain`), 7 its
 control (`chosen_plant`, `default_gains`, `simulated_loop`).
 """
@@ -17,6 +17,7 @@ import numpy as np
 
 from anglecam.errors import InputError
 from anglecam.export import SECOND_ORDER, read_model, transfer_function
+from anglecam.io.neck_file import Neck
 from anglecam.neck.design import (
     Relations,
     by_inertia,
@@ -25,7 +26,6 @@ from anglecam.neck.design import (
     explained_neck,
     identified,
 )
-from anglecam.neck.file import Neck
 from anglecam.neck.joint import Joint
 from anglecam.neck.large_angle import LargeAngleNeck, acceleration
 from anglecam.neck.linear import linear_neck

@@ -9,12 +9,12 @@ from pathlib import Path
 
 from anglecam.data.record import Record, record_from_series
 from anglecam.errors import InputError, blame
-from anglecam.marks.angle import MeasuredTracks, measure_tracks
-from anglecam.marks.files import TRACKS_ENDINGS
+from anglecam.io.rig import Rig
+from anglecam.io.series_csv import AngleSeries, read_series, write_series
+from anglecam.io.session import SERIES_ENDING, Command, Recording, Session
+from anglecam.io.tracks.files import TRACKS_ENDINGS
 from anglecam.measurement import Measurement, measure_clip
-from anglecam.rig import Rig
-from anglecam.series import AngleSeries, read_series, write_series
-from anglecam.session import SERIES_ENDING, Command, Recording, Session
+from anglecam.measurement.tracks import MeasuredTracks, measure_tracks
 from anglecam.sync import note_on, offsets, on_clip_clock
 from anglecam.uncorrected import uncorrected
 
@@ -111,7 +111,7 @@ def measure_session(
     Parameters
     ----------
     session : Session
-        From `anglecam.session.read_session`.
+        From `anglecam.io.session.read_session`.
     out : Path, optional
         Folder to write ``NAME.angles.csv`` of every measured recording to.
     progress : callable
@@ -149,7 +149,7 @@ def gather_session(session: Session, series_of: Callable[[Recording], tuple[Angl
     Parameters
     ----------
     session : Session
-        From `anglecam.session.read_session`.
+        From `anglecam.io.session.read_session`.
     series_of : callable
         From a recording to its series and, where its file ends too early, how much of it could be read.
 

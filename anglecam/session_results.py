@@ -8,8 +8,10 @@ from pathlib import Path
 
 from anglecam.errors import RigError
 from anglecam.export import fitted_model, transfer_as_dict, write_mat
-from anglecam.files import write_json
 from anglecam.identification import Estimator, Identified, declared_start, identify_records
+from anglecam.io.files import write_json
+from anglecam.io.series_csv import CORRECTED, write_series
+from anglecam.io.session import SERIES_ENDING, Session
 from anglecam.loop.close import Verdict, close_records
 from anglecam.loop.correct import corrected
 from anglecam.loop.experiment import Experiment
@@ -18,8 +20,6 @@ from anglecam.loop.result import next_experiment, verdict_as_dict, write_next_co
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.recordings import Measured, Shown
 from anglecam.report.page import write_report
-from anglecam.series import CORRECTED, write_series
-from anglecam.session import SERIES_ENDING, Session
 from anglecam.terminal import make_folder
 
 
@@ -42,7 +42,7 @@ def identify_session(
     Parameters
     ----------
     opened : Session
-        From `anglecam.session.read_session`.
+        From `anglecam.io.session.read_session`.
     measured : Measured
         Its recordings.
     out : Path
@@ -85,7 +85,7 @@ def close_session(
     Parameters
     ----------
     opened : Session
-        From `anglecam.session.read_session`.
+        From `anglecam.io.session.read_session`.
     measured : Measured
         Its recordings.
     shown : Shown

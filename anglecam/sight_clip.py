@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import InputError
+from anglecam.io.rig import Rig
+from anglecam.io.series_csv import OK
 from anglecam.lens import Lens, lens_from_rig
-from anglecam.rig import Rig
-from anglecam.series import OK
 from anglecam.sight_head import sight_head
 from anglecam.sighting import Sighting, find_pivot, frames_to_keep, why_truncated
 from anglecam.video.frames import Image, Sample, inspect_clip, read_frames, sample_frames

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.io.rig import Rig
 from anglecam.lens import Lens
-from anglecam.rig import Rig
 from anglecam.video.frames import ClipInfo, Image, Sample
 from anglecam.vision.circle import Circle
 from anglecam.vision.median import median_picture

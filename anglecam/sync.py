@@ -15,8 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from anglecam.errors import RigError
-from anglecam.rig import Rig
-from anglecam.session import Command
+from anglecam.io.rig import Rig
+from anglecam.io.session import Command
 from anglecam.shutter import measurement_time
 from anglecam.video.frames import inspect_clip, read_frames
 from anglecam.vision.lamp import lit_between, patch_levels

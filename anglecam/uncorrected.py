@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.series import AngleSeries
+from anglecam.io.series_csv import AngleSeries
 
 Floats = NDArray[np.float64]
 

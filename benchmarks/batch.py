@@ -44,7 +44,7 @@ import sys, cv2
 from pathlib import Path
 from anglecam.measurement import measure_clip
 from anglecam.clip_results import write_measurement
-from anglecam.session import rig_beside
+from anglecam.io.session import rig_beside
 cv2.setNumThreads(1)
 for clip in sorted(Path(sys.argv[1]).glob("*.avi")):
     write_measurement(measure_clip(clip, rig_beside(clip)), None, Path(sys.argv[2]))

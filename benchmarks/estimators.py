@@ -31,8 +31,8 @@ from anglecam.estimate.kalman import SHARED
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.smoothing import smooth
 from anglecam.identification import identify_records
-from anglecam.rig import Rig
-from anglecam.session import Command
+from anglecam.io.rig import Rig
+from anglecam.io.session import Command
 from anglecam.simulate.plant import Plant
 from anglecam.simulate.third_order import ThirdOrder
 from support.comparison import compare_models

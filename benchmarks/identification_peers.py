@@ -40,8 +40,8 @@ import anglecam
 from anglecam.data.record import Record
 from anglecam.estimate.ekf import fit_ekf, settings_for
 from anglecam.identification import identify_records
-from anglecam.rig import Rig
-from anglecam.session import Command
+from anglecam.io.rig import Rig
+from anglecam.io.session import Command
 from support.transfer import SYS2_DENOMINATOR, SYS2_NUMERATOR, respond
 
 Floats = NDArray[np.float64]

@@ -22,9 +22,9 @@ import numpy as np
 import yaml
 
 from anglecam.calibration import Calibration, write_calibration
+from anglecam.io.rig import read_rig
+from anglecam.io.session import read_command
 from anglecam.measurement import measure_clip
-from anglecam.rig import read_rig
-from anglecam.session import read_command
 from anglecam.video.frames import read_frames
 from synth.motion import move
 from synth.session import render

@@ -33,7 +33,7 @@ import numpy as np
 from throughput import film
 
 import anglecam
-from anglecam.rig import Rig
+from anglecam.io.rig import Rig
 from anglecam.video.frames import read_frames
 from synth.spec.picture import Rig as TrueRig
 

@@ -46,8 +46,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from anglecam.data.record import Record
+from anglecam.io.session import Command
 from anglecam.loop.close import close_records
-from anglecam.session import Command
 from benchmarks.blind.sessions import HELD_OUT, session
 
 Floats = NDArray[np.float64]

@@ -30,11 +30,11 @@ from anglecam.estimate.fit import Fit
 from anglecam.estimate.output_error import fit_output_error, predict_output_error
 from anglecam.estimate.shooting import windows
 from anglecam.estimate.start import start_parameters
-from anglecam.files import write_atomically
+from anglecam.io.files import write_atomically
+from anglecam.io.session import read_session
 from anglecam.loop.close import close_records
 from anglecam.loop.holdout import Prediction, predict_unseen, split_records
 from anglecam.recordings import measure_session
-from anglecam.session import read_session
 from anglecam.simulate.plant import Plant
 
 Floats = NDArray[np.float64]

@@ -28,8 +28,8 @@ from typing import Any
 import av
 import yaml
 
+from anglecam.io.rig import Rig
 from anglecam.measurement import measure_clip
-from anglecam.rig import Rig
 from anglecam.video.frames import read_frames
 from synth.render import workers
 from synth.session import render

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from anglecam.cli import main
-from anglecam.series import COLUMNS, AngleSeries, write_series
+from anglecam.io.series_csv import COLUMNS, AngleSeries, write_series
 from support import broken
 from support.drawn import Look, Plant, Recording, draw_session
 from support.series import session as make_records

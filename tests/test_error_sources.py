@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from anglecam.error_sources import error_sources
+from anglecam.io.rig import read_rig
+from anglecam.io.session import read_command
 from anglecam.measurement import measure_clip
 from anglecam.registration import Registered, register_clip
-from anglecam.rig import read_rig
-from anglecam.session import read_command
 from anglecam.sight_clip import sight_clip
 from anglecam.uncertainty import angle_draws, courses
 from support.drawn import Look, Recording, draw_session

@@ -22,12 +22,12 @@ from anglecam.export import (
     unit_of,
     write_mat,
 )
-from anglecam.files import write_json
 from anglecam.identification import identify_records
+from anglecam.io.files import write_json
+from anglecam.io.rig import Rig
+from anglecam.io.series_csv import AngleSeries, write_series
+from anglecam.io.session import Command
 from anglecam.neck.large_angle import LargeAngleNeck
-from anglecam.rig import Rig
-from anglecam.series import AngleSeries, write_series
-from anglecam.session import Command
 from anglecam.simulate.large_angle import LargeAngle
 from support.motion import Plant
 from support.series import session

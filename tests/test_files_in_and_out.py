@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from anglecam.errors import InputError, RigError
+from anglecam.io.rig import Marks, Rig, read_rig
+from anglecam.io.series_csv import COLUMNS, AngleSeries, read_series, write_series
+from anglecam.io.session import Command, find_measurable, read_command, read_session
 from anglecam.recordings import measure_session
-from anglecam.rig import Marks, Rig, read_rig
-from anglecam.series import COLUMNS, AngleSeries, read_series, write_series
-from anglecam.session import Command, find_measurable, read_command, read_session
 from support import broken
 
 

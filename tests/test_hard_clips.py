@@ -12,9 +12,9 @@ import pytest
 import yaml
 
 from anglecam.calibration import Calibration, write_calibration
+from anglecam.io.rig import read_rig
+from anglecam.io.session import read_command
 from anglecam.measurement import Measurement, measure_clip
-from anglecam.rig import read_rig
-from anglecam.session import read_command
 from synth.motion import move
 from synth.session import render
 from synth.spec import read_spec

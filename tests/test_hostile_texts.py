@@ -13,12 +13,12 @@ import pytest
 from anglecam.calibration import read_calibration
 from anglecam.errors import AnglecamError, InputError, RigError
 from anglecam.export import read_model
-from anglecam.marks.files import read_tracks
-from anglecam.neck.file import read_neck
+from anglecam.io.neck_file import read_neck
+from anglecam.io.rig import read_rig
+from anglecam.io.series_csv import read_series
+from anglecam.io.session import command_beside, read_command, rig_beside
+from anglecam.io.tracks.files import read_tracks
 from anglecam.neck.pd_tuning import nod_from_responses
-from anglecam.rig import read_rig
-from anglecam.series import read_series
-from anglecam.session import command_beside, read_command, rig_beside
 
 READERS = {
     "rig.yaml": read_rig,
@@ -176,7 +176,7 @@ def test_a_hostile_table_is_one_short_line(tmp_path, text, says):
 
 
 def test_a_table_may_have_a_million_rows_and_no_more(tmp_path, monkeypatch):
-    monkeypatch.setattr("anglecam.series._MOST_ROWS", 5)
+    monkeypatch.setattr("anglecam.io.series_csv._MOST_ROWS", 5)
     path = tmp_path / "a.command.csv"
     path.write_text("time_s,command_deg\n" + "".join(f"{k},0\n" for k in range(5)))
     assert len(read_command(path).time) == 5

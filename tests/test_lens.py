@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from anglecam.calibration import Calibration, read_calibration, write_calibration
 from anglecam.errors import InputError, RigError
+from anglecam.io.rig import Rig, read_rig
 from anglecam.lens import Lens, lens_from_rig
-from anglecam.rig import Rig, read_rig
 from anglecam.shutter import mean_off_middle, measurement_time
 
 SIZE = (640, 480)

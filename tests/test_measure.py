@@ -10,9 +10,9 @@ import pytest
 
 from anglecam.budget import angle_sigma, place_errors, worst_case, worst_case_both_ends
 from anglecam.errors import InputError
+from anglecam.io.rig import Mouth, Pivot, Rig, read_rig
+from anglecam.io.session import Command, read_command
 from anglecam.measurement import measure_clip
-from anglecam.rig import Mouth, Pivot, Rig, read_rig
-from anglecam.session import Command, read_command
 from anglecam.sight_clip import sight_clip
 from support import broken
 from support.drawn import Look, Recording, draw_frames, draw_session, write_clip

@@ -12,12 +12,12 @@ import pytest
 
 from anglecam import cli
 from anglecam.data.record import Record
-from anglecam.files import write_json
-from anglecam.neck.file import read_neck
+from anglecam.io.files import write_json
+from anglecam.io.neck_file import read_neck
+from anglecam.io.series_csv import AngleSeries, write_series
+from anglecam.io.session import Command
 from anglecam.neck_systems import paper_systems, second_order, side_by_side
 from anglecam.report.neck_tables import with_sigma
-from anglecam.series import AngleSeries, write_series
-from anglecam.session import Command
 from support.motion import Plant
 from support.series import session
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from anglecam.errors import InputError, printable
-from anglecam.exchange import Also, write_also
-from anglecam.files import write_atomically, write_whole
+from anglecam.io.files import write_atomically, write_whole
+from anglecam.io.netcdf_parquet import Also, write_also
+from anglecam.io.series_csv import AngleSeries, read_series, write_series
 from anglecam.report.figures import plot_series
-from anglecam.series import AngleSeries, read_series, write_series
 from support.drawn import Look, draw_frames, write_clip
 
 COMMAND = "from anglecam.cli import main; main()"

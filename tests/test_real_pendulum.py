@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from anglecam.io.rig import Mouth, Pivot, Rig
 from anglecam.measurement import measure_clip
-from anglecam.rig import Mouth, Pivot, Rig
 
 FOLDER = Path(__file__).parents[2] / "shared" / "real" / "pendulum-red-ball"
 FRAME_S = 1 / 24

@@ -13,10 +13,10 @@ from anglecam.errors import RigError
 from anglecam.estimate.noise import DISTANCE, Noise
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.systematic import full_sigma
+from anglecam.io.rig import Rig, Sync
+from anglecam.io.session import Command, read_command, read_session, rig_beside
 from anglecam.measurement import measure_clip
 from anglecam.recordings import measure_session
-from anglecam.rig import Rig, Sync
-from anglecam.session import Command, read_command, read_session, rig_beside
 from anglecam.simulate.plant import Plant
 from anglecam.sync import AGREED, offsets
 from anglecam.vision.lamp import lit_between

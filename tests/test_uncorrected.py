@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anglecam.series import AngleSeries
+from anglecam.io.series_csv import AngleSeries
 from anglecam.uncorrected import uncorrected
 
 TIME = np.arange(240) / 30.0

@@ -19,15 +19,15 @@ from typing import Any
 import cv2
 import numpy as np
 
-from anglecam.batch.kept import keep_series, read_kept
 from anglecam.batch.row import cannot_write
 from anglecam.clip_results import write_measurement
 from anglecam.errors import AnglecamError, InputError, RigError, blame
+from anglecam.io.rig import read_rig
+from anglecam.io.series_csv import AngleSeries
+from anglecam.io.series_npz import keep_series, read_kept
+from anglecam.io.session import Recording, command_beside, read_session, rig_beside
 from anglecam.measurement import Measurement, measure_clip
 from anglecam.recordings import gather_session, measure_recording, shown_to_loop
-from anglecam.rig import read_rig
-from anglecam.series import AngleSeries
-from anglecam.session import Recording, command_beside, read_session, rig_beside
 from anglecam.video.frames import inspect_clip
 
 _GRACE_S = 60.0

@@ -18,7 +18,7 @@ from typing import Any
 
 from anglecam.batch.identity import Stamp
 from anglecam.batch.row import Row
-from anglecam.files import json_text
+from anglecam.io.files import json_text
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,8 @@ from anglecam.batch.sessions import SessionJob, do_session, find_sessions
 from anglecam.batch.sources import Source, find_sources
 from anglecam.batch.work import ClipJob, Settings, do_clip
 from anglecam.errors import AnglecamError, RigError
-from anglecam.rig import read_rig
-from anglecam.series import CORRECTED
+from anglecam.io.rig import read_rig
+from anglecam.io.series_csv import CORRECTED
 from anglecam.terminal import make_folder
 
 Job = ClipJob | SessionJob

@@ -18,8 +18,8 @@ from anglecam.batch.row import FAILED, cannot_write
 from anglecam.batch.sources import Source
 from anglecam.batch.work import Settings, fetch_beside, require_same_batch, time_allowed, told, unfinished
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
-from anglecam.marks.files import find_tracks
-from anglecam.session import CLIP_ENDINGS, COMMAND_ENDING, SERIES_ENDING
+from anglecam.io.session import CLIP_ENDINGS, COMMAND_ENDING, SERIES_ENDING
+from anglecam.io.tracks.files import find_tracks
 
 _LEAST_TIME_S = 3600.0
 """For fitting, and for the bootstraps of the loop."""

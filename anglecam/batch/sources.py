@@ -14,7 +14,7 @@ from pathlib import Path
 
 from anglecam.batch.address import asking, is_remote, join, name, normalised, parent, store
 from anglecam.errors import AnglecamError, InputError, RigError
-from anglecam.session import CLIP_ENDINGS
+from anglecam.io.session import CLIP_ENDINGS
 
 _MAGIC = frozenset("*?[")
 

@@ -23,7 +23,7 @@ from anglecam.batch.notes import Note, Store
 from anglecam.batch.process import Lost, MeasuringProcess
 from anglecam.batch.row import FAILED, OK, TRUNCATED, Row, cannot_write
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
-from anglecam.session import COMMAND_ENDING
+from anglecam.io.session import COMMAND_ENDING
 
 _LEAST_TIME_S = 600.0
 _TIME_PER_BYTE_S = 1e-5

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from anglecam.effects import UNSEEN, View
 from anglecam.errors import InputError
-from anglecam.series import AngleSeries
-from anglecam.session import Command
+from anglecam.io.series_csv import AngleSeries
+from anglecam.io.session import Command
 
 Floats = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.record import Record
 from anglecam.effects import UNSEEN, View
-from anglecam.session import Command
+from anglecam.io.session import Command
 
 Floats = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
-from anglecam.session import Command
+from anglecam.io.session import Command
 from anglecam.simulate.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, SOURCES, WIDTH, integrate
 from anglecam.simulate.plant import MAX_STEP
 

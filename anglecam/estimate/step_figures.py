@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.step_figures import HIGH, LOW, first_crossing, settling
 from anglecam.estimate.fit import Model
-from anglecam.session import Command
+from anglecam.io.session import Command
 
 Floats = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from anglecam.data.record import Record
-from anglecam.session import Command
+from anglecam.io.session import Command
 
 Floats = NDArray[np.float64]
 

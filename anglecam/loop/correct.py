@@ -8,7 +8,7 @@ import numpy as np
 
 from anglecam.effects import Knots, View
 from anglecam.estimate.fit import Fit
-from anglecam.series import AngleSeries
+from anglecam.io.series_csv import AngleSeries
 from anglecam.simulate.plant import Plant
 
 ROUNDS = 20

@@ -30,7 +30,8 @@ from anglecam.data.record import Record
 from anglecam.effects import LEDGER
 from anglecam.estimate.fit import Fit, whiten
 from anglecam.estimate.noise import Noise
-from anglecam.files import write_atomically
+from anglecam.io.files import write_atomically
+from anglecam.io.session import Command
 from anglecam.loop.commands import (
     LONGEST,
     Candidate,
@@ -39,7 +40,6 @@ from anglecam.loop.commands import (
     candidate_releases,
 )
 from anglecam.loop.refit import plant_of
-from anglecam.session import Command
 from anglecam.simulate.plant import Plant
 
 Floats = NDArray[np.float64]
@@ -185,7 +185,7 @@ def separating_experiment(fits: Sequence[Fit], records: Sequence[Record], noise:
 
 
 def write_command(command: Command, path: Path) -> None:
-    """Write ``NAME.command.csv``, as `anglecam.session.read_command` reads it: ``time_s,command_deg``."""
+    """Write ``NAME.command.csv``, as `anglecam.io.session.read_command` reads it: ``time_s,command_deg``."""
     with write_atomically(path) as stream:
         stream.write("time_s,command_deg\n")
         for time, angle in zip(command.time, np.degrees(command.angle), strict=True):

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from anglecam.data.record import Record
 from anglecam.estimate.fit import Fit, whiten
+from anglecam.io.session import Command
 from anglecam.loop.refit import plant_of
-from anglecam.session import Command
 from anglecam.simulate.plant import Plant
 
 Floats = NDArray[np.float64]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import InputError
-from anglecam.files import read_json
+from anglecam.io.files import read_json
 from anglecam.neck.constraints import Constraint, least
 from anglecam.neck.pd import ClosedLoop, PdGains, close_loop, rest_gain
 

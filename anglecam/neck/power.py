@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from anglecam.errors import InputError
-from anglecam.series import read_columns, require_increasing
+from anglecam.io.series_csv import read_columns, require_increasing
 
 Floats = NDArray[np.float64]
 

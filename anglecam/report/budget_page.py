@@ -14,12 +14,12 @@ from rich.table import Table
 from anglecam import __version__
 from anglecam.clip_budget import PAPER, Budget, FrameBudget, budget_as_dict, budget_of, implied_lever, pixel_bound
 from anglecam.error_sources import error_sources
-from anglecam.files import write_atomically, write_json
 from anglecam.gum import Propagated
+from anglecam.io.files import write_atomically, write_json
+from anglecam.io.rig import Rig
 from anglecam.measurement import Measurement
 from anglecam.report.figure8 import Scene, figure8
 from anglecam.report.figures import AFTER, BEFORE, FAINT, MEASURED, STYLE, _svg
-from anglecam.rig import Rig
 from anglecam.video.frames import read_frames
 
 _HUES = ("#1f6f8b", "#c4432b", "#d39b23", "#6a4c93", "#3d7a4a", "#8a939c", "#b5651d", "#2b6cff", "#444b53")

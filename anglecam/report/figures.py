@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from anglecam.errors import printable
-from anglecam.series import AngleSeries
+from anglecam.io.series_csv import AngleSeries
 
 Floats = NDArray[np.float64]
 

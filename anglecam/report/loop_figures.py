@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from anglecam.data.record import Record
 from anglecam.errors import printable
 from anglecam.estimate.fit import Fit
+from anglecam.io.series_csv import AngleSeries
+from anglecam.io.session import Command
 from anglecam.loop.attribute import Candidate
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import SETTLE, Experiment
@@ -21,8 +23,6 @@ from anglecam.loop.holdout import Prediction
 from anglecam.loop.remainder import Remainder
 from anglecam.loop.result import plain
 from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, STYLE, _svg
-from anglecam.series import AngleSeries
-from anglecam.session import Command
 from anglecam.simulate.plant import Plant
 
 Floats = NDArray[np.float64]

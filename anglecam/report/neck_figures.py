@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from anglecam.io.neck_file import Neck
 from anglecam.neck.command_table import STRAIGHT, nod_limits, table_3
-from anglecam.neck.file import Neck
 from anglecam.neck.fourbar import head_angle
 from anglecam.neck.power import PowerLog, PowerUse
 from anglecam.neck.sensitivity import Figure9

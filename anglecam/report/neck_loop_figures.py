@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from anglecam.io.session import Command
 from anglecam.neck.design import Relations
 from anglecam.neck.joint import Joint
 from anglecam.neck.linear import LinearNeck
@@ -22,7 +23,6 @@ from anglecam.neck_procedure import Plant
 from anglecam.neck_systems import SideBySide, System
 from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, STYLE
 from anglecam.report.neck_figures import SERIES, mark_step, save
-from anglecam.session import Command
 
 Floats = NDArray[np.float64]
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from anglecam.estimate.step_figures import StepFigures
+from anglecam.io.neck_file import Neck
 from anglecam.neck.command_table import (
     STRAIGHT,
     command_of_nod,
@@ -20,7 +21,6 @@ from anglecam.neck.command_table import (
     table_3,
 )
 from anglecam.neck.damping import SAE_20_VISCOSITY
-from anglecam.neck.file import Neck
 from anglecam.neck.fourbar import head_angle, servo_angle
 from anglecam.neck.large_angle import holding_voltage
 from anglecam.neck.linear import linear_neck, passive_stiffness

@@ -11,8 +11,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from anglecam import __version__
 from anglecam.effects import effect
-from anglecam.files import write_atomically
 from anglecam.identification import Identified
+from anglecam.io.files import write_atomically
+from anglecam.io.series_csv import CORRECTED, AngleSeries
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.gate import Test
@@ -23,7 +24,6 @@ from anglecam.loop.result import NEXT_COMMAND, plain, sentence, size_of, split_u
 from anglecam.loop.rounds import applicable
 from anglecam.report import loop_figures as figures
 from anglecam.report.path_figure import path_figure
-from anglecam.series import CORRECTED, AngleSeries
 
 COLOURS = {"attributed": "#1f6f8b", "nothing_missing": "#3d7a4a", "unexplained": "#b5651d"}
 ESTIMATORS = {"ekf": "extended Kalman filter", "oe2": "output error"}

@@ -19,11 +19,11 @@ from anglecam.data.record import Record
 from anglecam.effects import Effect, Knots
 from anglecam.effects import effect as entry
 from anglecam.estimate.fit import Fit
+from anglecam.io.session import Command
 from anglecam.loop.close import Verdict
 from anglecam.loop.result import plain
 from anglecam.loop.rounds import applicable
 from anglecam.report.figures import AFTER, COMMAND, MEASURED, STYLE, _svg
-from anglecam.session import Command
 
 Floats = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from anglecam.identification import Identified
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.result import NEXT_COMMAND, describe, sentence
-from anglecam.marks.angle import MeasuredTracks
 from anglecam.measurement import Measurement
+from anglecam.measurement.tracks import MeasuredTracks
 from anglecam.response import Figure, Response
 
 

@@ -11,8 +11,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from anglecam.effects import UNSEEN, View
+from anglecam.io.session import Command
 from anglecam.neck.large_angle import LargeAngleNeck, linearise, restoring_tangent, restoring_torque
-from anglecam.session import Command
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.effects import UNSEEN, Effect, Knots, View
-from anglecam.session import Command
+from anglecam.io.session import Command
 from anglecam.simulate.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, WIDTH, integrate
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from anglecam.effects import UNSEEN, View
-from anglecam.session import Command
+from anglecam.io.session import Command
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.series import OK
+from anglecam.io.series_csv import OK
 from anglecam.vision.bodies import LEAST_TURN
 from anglecam.vision.keys import GROUPS
 from anglecam.vision.transforms import turn_of, turned

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.series import OK
+from anglecam.io.series_csv import OK
 from anglecam.video.frames import Frame, Image
 from anglecam.vision.bodies import FEWEST, LEAST_TURN, Features, describe, find_turning_body, locate
 from anglecam.vision.keys import Key, choose_keys, hold_against

@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from anglecam.data.record import Record
 from anglecam.effects import View
 from anglecam.estimate.output_error import fit_output_error
-from anglecam.session import Command
+from anglecam.io.session import Command
 from anglecam.simulate.plant import Plant
 from benchmarks.blind.drawn import magnified
 from synth.errors import SpecError

@@ -272,13 +272,13 @@ def readers() -> dict[str, Reader]:
     from anglecam.calibration import read_calibration
     from anglecam.data.record import record_from_series
     from anglecam.export import read_model
+    from anglecam.io.neck_file import read_neck
+    from anglecam.io.rig import Marks, Rig, read_rig
+    from anglecam.io.series_csv import read_series
+    from anglecam.io.session import read_command
     from anglecam.lens import lens_from_rig
-    from anglecam.marks.angle import measure_tracks
-    from anglecam.neck.file import read_neck
+    from anglecam.measurement.tracks import measure_tracks
     from anglecam.neck.pd_tuning import nod_from_responses
-    from anglecam.rig import Marks, Rig, read_rig
-    from anglecam.series import read_series
-    from anglecam.session import read_command
 
     marks = Rig(marks=Marks(mouth="lips", pivot="ear", rate_hz=30))
 

@@ -13,9 +13,9 @@ import pytest
 from anglecam.batch.run import Options, run_batch
 from anglecam.batch.sessions import SessionJob, _configuration
 from anglecam.batch.work import Settings
+from anglecam.io.series_csv import AngleSeries, write_series
+from anglecam.io.session import read_session
 from anglecam.recordings import measure_session
-from anglecam.series import AngleSeries, write_series
-from anglecam.session import read_session
 from anglecam.session_results import identify_session
 from support.motion import Plant
 from support.series import session as make_records

@@ -16,8 +16,8 @@ from anglecam.estimate.ekf import fit_ekf, settings_for
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.start import start_parameters
 from anglecam.identification import identify_records
-from anglecam.rig import Rig
-from anglecam.session import Command
+from anglecam.io.rig import Rig
+from anglecam.io.session import Command
 from anglecam.simulate.plant import Plant
 from anglecam.simulate.third_order import ThirdOrder
 from support.comparison import compare_models

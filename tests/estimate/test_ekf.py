@@ -12,8 +12,8 @@ from anglecam.estimate.ekf import PAPER, fit_ekf, settings_for
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.smoothing import smooth
 from anglecam.identification import identify_records
-from anglecam.rig import Rig
-from anglecam.session import Command
+from anglecam.io.rig import Rig
+from anglecam.io.session import Command
 from anglecam.simulate.plant import Plant
 from support.cramer_rao import cramer_rao_bound
 from support.motion import Plant as TruePlant

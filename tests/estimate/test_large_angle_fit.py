@@ -12,8 +12,8 @@ from anglecam.estimate.fit import Fit
 from anglecam.estimate.output_error import fit_output_error, predict_output_error
 from anglecam.estimate.start import start_parameters
 from anglecam.identification import identify_records
+from anglecam.io.rig import Rig
 from anglecam.neck.parameters import PAPER
-from anglecam.rig import Rig
 from anglecam.simulate.large_angle import LargeAngle
 from anglecam.simulate.plant import Plant
 from anglecam.simulate.third_order import ThirdOrder

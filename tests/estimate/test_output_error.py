@@ -11,7 +11,7 @@ from anglecam.data.record import Record
 from anglecam.estimate.output_error import fit_output_error, predict_output_error
 from anglecam.estimate.start import start_parameters
 from anglecam.identification import identify_records
-from anglecam.rig import Rig
+from anglecam.io.rig import Rig
 from anglecam.simulate.plant import Plant
 from support.motion import Plant as TruePlant
 from support.motion import Recording

@@ -9,7 +9,7 @@ from anglecam.data.record import Record
 from anglecam.effects import effect
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.shooting import drifts, goes_astray, windows
-from anglecam.session import Command
+from anglecam.io.session import Command
 from anglecam.simulate.plant import Plant
 
 TIME = np.arange(0.0, 20.0, 0.02)

@@ -10,7 +10,7 @@ from anglecam.estimate.noise import Noise
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.systematic import full_sigma
 from anglecam.identification import identify_records
-from anglecam.rig import Rig
+from anglecam.io.rig import Rig
 from anglecam.simulate.plant import Plant
 from support.motion import Plant as TruePlant
 from support.series import session

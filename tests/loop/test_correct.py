@@ -7,8 +7,8 @@ import pytest
 
 from anglecam.effects import View, effect
 from anglecam.estimate.fit import Fit
+from anglecam.io.series_csv import AngleSeries
 from anglecam.loop.correct import corrected
-from anglecam.series import AngleSeries
 from anglecam.simulate.plant import Plant
 
 TIME = np.linspace(0.0, 5.0, 151)

@@ -14,11 +14,11 @@ from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.start import start_parameters
+from anglecam.io.session import Command, read_command
 from anglecam.loop.attribute import fit_with
 from anglecam.loop.commands import candidate_commands, limits_of
 from anglecam.loop.experiment import ENOUGH, separating_experiment, write_command
 from anglecam.loop.screen import Forecast
-from anglecam.session import Command, read_command
 from anglecam.simulate.plant import Plant
 from synth.motion import move
 from synth.motion.command import command_rows

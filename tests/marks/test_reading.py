@@ -13,9 +13,9 @@ import pandas as pd
 import pytest
 
 from anglecam.errors import InputError
-from anglecam.marks.files import find_tracks, name_by_tool, read_tracks
-from anglecam.marks.names_in_pickle import read_names
-from anglecam.marks.tracks import choose_pair
+from anglecam.io.tracks.files import find_tracks, name_by_tool, read_tracks
+from anglecam.io.tracks.names_in_pickle import read_names
+from anglecam.io.tracks.tracks import choose_pair
 from support.tracked import SCORER, frame, write_deeplabcut, write_sleap
 
 RNG = np.random.default_rng(3)
@@ -145,7 +145,7 @@ def test_a_table_is_read_where_pandas_and_pytables_are_not(tmp_path):
     path = write_deeplabcut(tmp_path / "film.h5", POINTS[:, :1], SCORES[:, :1], names=NAMES)
     program = (
         "import sys, pathlib, pickle; sys.modules.update(pandas=None, tables=None)\n"
-        "from anglecam.marks.files import read_tracks; import h5py\n"
+        "from anglecam.io.tracks.files import read_tracks; import h5py\n"
         "pickle.load = pickle.loads = pickle.Unpickler = None\n"
         f"print(read_tracks(pathlib.Path({str(path)!r})).keypoints)"
     )

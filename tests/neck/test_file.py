@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from anglecam.errors import RigError
+from anglecam.io.neck_file import Bearing, NeckFile, read_neck
 from anglecam.neck.command_table import TABLE_3
 from anglecam.neck.damping import Film
-from anglecam.neck.file import Bearing, NeckFile, read_neck
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.neck.parameters import PAPER
 from anglecam.neck.turning import TurningMechanism

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from anglecam import neck_procedure as procedure
-from anglecam.neck.file import read_neck
+from anglecam.io.neck_file import read_neck
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.parameters import PAPER
 from anglecam.neck.pd import PdGains, close_loop, gains_table, sys2

@@ -12,13 +12,13 @@ import pytest
 from anglecam.effects import effect
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.identification import identify_records
+from anglecam.io.rig import Rig
+from anglecam.io.series_csv import AngleSeries
+from anglecam.io.session import Command, read_command
 from anglecam.loop.close import Accepted, close_records
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.result import next_experiment, sentence, split_unit, verdict_as_dict, write_next_command
 from anglecam.report.page import p_in_words, unseen_in_words, write_report
-from anglecam.rig import Rig
-from anglecam.series import AngleSeries
-from anglecam.session import Command, read_command
 from support.motion import Plant
 from support.series import session
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anglecam.io.session import Command
 from anglecam.neck.large_angle import LargeAngleNeck, linearise
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.parameters import PAPER
-from anglecam.session import Command
 from anglecam.simulate.large_angle import DEFAULT, QUANTITIES, LargeAngle
 from anglecam.simulate.plant import Plant
 from support.large_angle import COMMANDS, LABORATORY, TIME, command, true_angle

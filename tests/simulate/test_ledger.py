@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from anglecam.effects import LEDGER, UNSEEN, View, effect
-from anglecam.session import Command
+from anglecam.io.session import Command
 from anglecam.simulate.plant import Plant
 from synth.motion import command_rows, move
 from synth.spec import read_spec

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
+from anglecam.io.session import Command
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.neck.parameters import PAPER
 from anglecam.neck.statics import slack_limit
-from anglecam.session import Command
 from support.moved import NECK, spec_of
 from synth.motion import command_rows, move
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
-from anglecam.session import Command
+from anglecam.io.session import Command
 from support.motion import Plant, Recording, command_rows, move
 
 

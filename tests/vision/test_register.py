@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import yaml
 
+from anglecam.io.rig import Rig
 from anglecam.measurement import measure_clip
-from anglecam.rig import Rig
 from synth.session import render
 
 SPEC = {

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import InputError
-from anglecam.files import open_text, write_atomically
+from anglecam.io.files import open_text, write_atomically
 
 CORRECTED = "corrected"
 """Folder of a session's series without what the camera did."""

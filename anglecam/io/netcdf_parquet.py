@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from anglecam import __version__
 from anglecam.errors import printable
-from anglecam.files import write_whole
-from anglecam.series import AngleSeries, series_columns
+from anglecam.io.files import write_whole
+from anglecam.io.series_csv import AngleSeries, series_columns
 
 UNITS = {"s": "s", "deg": "degree", "px": "pixel"}
 """By the last part of a column's name."""

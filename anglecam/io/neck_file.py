@@ -16,8 +16,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from anglecam.declared import Declared, Finite, NotNegative, Positive, read_declared
 from anglecam.errors import RigError
+from anglecam.io.yaml_schema import Declared, Finite, NotNegative, Positive, read_declared
 from anglecam.neck.command_table import TABLE_3, CommandScale
 from anglecam.neck.damping import Film
 from anglecam.neck.design import known

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from anglecam.errors import InputError
-from anglecam.marks.hdf5 import as_text, read_array, read_texts
-from anglecam.marks.tracks import Tracks
+from anglecam.io.tracks.hdf5 import as_text, read_array, read_texts
+from anglecam.io.tracks.tracks import Tracks
 
 if TYPE_CHECKING:
     import h5py

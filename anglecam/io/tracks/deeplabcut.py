@@ -2,7 +2,7 @@
 
 The header names each column by scorer, (individual,) body part and coordinate: three rows, four with several animals.
 In HDF5 pandas writes one of two layouts. ``table``, DeepLabCut's own choice, has the numbers in blocks of a PyTables
-table and the columns' names as a pickled list, which is read without loading it (`anglecam.marks.names_in_pickle`);
+table and the columns' names as a pickled list, which is read without loading it (`anglecam.io.tracks.names_in_pickle`);
 ``fixed`` has both as plain arrays. Neither needs pandas or PyTables.
 """
 
@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import InputError
-from anglecam.files import open_text
-from anglecam.marks.hdf5 import as_text, read_array, read_texts
-from anglecam.marks.names_in_pickle import read_names
-from anglecam.marks.tracks import MOST_VALUES, Tracks, unique_in_order
+from anglecam.io.files import open_text
+from anglecam.io.tracks.hdf5 import as_text, read_array, read_texts
+from anglecam.io.tracks.names_in_pickle import read_names
+from anglecam.io.tracks.tracks import MOST_VALUES, Tracks, unique_in_order
 
 if TYPE_CHECKING:
     import h5py

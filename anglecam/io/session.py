@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import InputError, RigError
-from anglecam.marks.files import TRACKS_ENDINGS, find_tracks, name_by_tool
-from anglecam.rig import Rig, read_rig
-from anglecam.series import read_columns, require_increasing
+from anglecam.io.rig import Rig, read_rig
+from anglecam.io.series_csv import read_columns, require_increasing
+from anglecam.io.tracks.files import TRACKS_ENDINGS, find_tracks, name_by_tool
 
 CLIP_ENDINGS = (".avi", ".mp4", ".mkv", ".mov")
 SERIES_ENDING = ".angles.csv"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from anglecam.series import AngleSeries
+from anglecam.io.series_csv import AngleSeries
 
 PAIRS = ("picture_px", "marker_px", "own_turn", "lamp_s")
 

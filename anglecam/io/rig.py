@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from anglecam.declared import Declared, Finite, Positive, read_declared
+from anglecam.io.yaml_schema import Declared, Finite, Positive, read_declared
 
 Byte = Annotated[int, Field(ge=0, le=255)]
 SlantDeg = Annotated[float, Field(gt=-80, lt=80, allow_inf_nan=False)]

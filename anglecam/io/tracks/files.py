@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 
 from anglecam.errors import InputError
-from anglecam.files import open_text
-from anglecam.marks import deeplabcut, sleap
-from anglecam.marks.hdf5 import open_hdf5
-from anglecam.marks.tracks import Tracks
+from anglecam.io.files import open_text
+from anglecam.io.tracks import deeplabcut, sleap
+from anglecam.io.tracks.hdf5 import open_hdf5
+from anglecam.io.tracks.tracks import Tracks
 
 HDF5_ENDINGS = (".h5", ".hdf5")
 TRACKS_ENDINGS = (".csv", *HDF5_ENDINGS)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import pickletools
 from typing import Any, cast
 
-from anglecam.marks.hdf5 import as_text
+from anglecam.io.tracks.hdf5 import as_text
 
 _VALUES = {"UNICODE", "BINUNICODE", "SHORT_BINUNICODE", "STRING", "BINSTRING", "SHORT_BINSTRING", "INT", "BININT",
            "BININT1", "BININT2", "LONG", "LONG1"}  # fmt: skip

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.errors import InputError
-from anglecam.files import open_regular
-from anglecam.marks.tracks import MOST_VALUES
+from anglecam.io.files import open_regular
+from anglecam.io.tracks.tracks import MOST_VALUES
 
 if TYPE_CHECKING:
     import h5py

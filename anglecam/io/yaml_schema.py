@@ -9,7 +9,7 @@ import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from anglecam.errors import RigError
-from anglecam.files import read_text
+from anglecam.io.files import read_text
 
 _MOST_BYTES = 256 * 1024
 """A file that names a thousand recordings has a tenth of it."""

@@ -1,0 +1,1 @@
+"""Tracks of points that another program has found in a clip: DeepLabCut and SLEAP."""

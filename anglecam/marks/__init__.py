@@ -1,1 +1,0 @@
-"""Marks that another program has found in the clip, in place of our own vision: DeepLabCut and SLEAP."""
