@@ -20,8 +20,8 @@ from scipy import io
 from anglecam.errors import InputError
 from anglecam.identification import Identified
 from anglecam.io.files import read_json
+from anglecam.models.large_angle import QUANTITIES, LargeAngle
 from anglecam.neck.large_angle import linearise
-from anglecam.simulate.large_angle import QUANTITIES, LargeAngle
 
 if TYPE_CHECKING:
     import control

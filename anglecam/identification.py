@@ -15,13 +15,13 @@ from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import autoregression, noise_floor
 from anglecam.estimate.output_error import fit_output_error, predict_output_error
 from anglecam.estimate.start import start_parameters
-from anglecam.estimate.step_figures import NO_STEP, StepFigures, step_figures
 from anglecam.estimate.systematic import systematic_covariance
 from anglecam.io.rig import Rig
+from anglecam.models.large_angle import DEFAULT, FREE_SWING, LargeAngle
+from anglecam.models.plant import Plant
+from anglecam.models.third_order import ThirdOrder
+from anglecam.models.unit_step import NO_STEP, StepFigures, step_figures
 from anglecam.neck.large_angle import LargeAngleNeck, linearise
-from anglecam.simulate.large_angle import DEFAULT, FREE_SWING, LargeAngle
-from anglecam.simulate.plant import Plant
-from anglecam.simulate.third_order import ThirdOrder
 
 Floats = NDArray[np.float64]
 Estimator = Literal["ekf", "oe2", "oe3", "neck"]

@@ -19,18 +19,18 @@ from numpy.typing import NDArray
 
 from anglecam.data.record import Record, record_from_series
 from anglecam.estimate.fit import Model
-from anglecam.estimate.step_figures import NO_STEP, StepFigures
 from anglecam.export import FittedModel
 from anglecam.io.series_csv import read_series
 from anglecam.io.session import Command, command_beside, rig_beside
+from anglecam.models.large_angle import LargeAngle
+from anglecam.models.plant import Plant
+from anglecam.models.third_order import ThirdOrder
+from anglecam.models.unit_step import NO_STEP, StepFigures
 from anglecam.neck.large_angle import LargeAngleNeck, acceleration, equilibrium, linearise
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.pd import PdGains, simulate_pd, sys2
 from anglecam.neck.step import linear_step_figures
 from anglecam.response import responses
-from anglecam.simulate.large_angle import LargeAngle
-from anglecam.simulate.plant import Plant
-from anglecam.simulate.third_order import ThirdOrder
 
 Floats = NDArray[np.float64]
 

@@ -33,8 +33,8 @@ from anglecam.estimate.smoothing import smooth
 from anglecam.identification import identify_records
 from anglecam.io.rig import Rig
 from anglecam.io.session import Command
-from anglecam.simulate.plant import Plant
-from anglecam.simulate.third_order import ThirdOrder
+from anglecam.models.plant import Plant
+from anglecam.models.third_order import ThirdOrder
 from support.comparison import compare_models
 from support.consistency import consistency, error_consistency, innovation_consistency, innovation_whiteness
 from support.cramer_rao import cramer_rao_bound, parameter_covariance

@@ -34,8 +34,8 @@ from anglecam.io.files import write_atomically
 from anglecam.io.session import read_session
 from anglecam.loop.close import close_records
 from anglecam.loop.holdout import Prediction, predict_unseen, split_records
+from anglecam.models.plant import Plant
 from anglecam.recordings import measure_session
-from anglecam.simulate.plant import Plant
 
 Floats = NDArray[np.float64]
 

@@ -27,8 +27,8 @@ from anglecam.io.files import write_json
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import AngleSeries, write_series
 from anglecam.io.session import Command
+from anglecam.models.large_angle import LargeAngle
 from anglecam.neck.large_angle import LargeAngleNeck
-from anglecam.simulate.large_angle import LargeAngle
 from support.motion import Plant
 from support.series import session
 

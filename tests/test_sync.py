@@ -16,8 +16,8 @@ from anglecam.estimate.systematic import full_sigma
 from anglecam.io.rig import Rig, Sync
 from anglecam.io.session import Command, read_command, read_session, rig_beside
 from anglecam.measurement import measure_clip
+from anglecam.models.plant import Plant
 from anglecam.recordings import measure_session
-from anglecam.simulate.plant import Plant
 from anglecam.sync import AGREED, offsets
 from anglecam.vision.lamp import lit_between
 from synth.session import render

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from anglecam.data.record import Record
 from anglecam.estimate.kalman import SHARED, Filtered, filter_record
 from anglecam.estimate.smoothing import smooth_first_states
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 
 Floats = NDArray[np.float64]
 

@@ -28,7 +28,7 @@ PRESSED = 100.0
 
 
 class Model(Protocol):
-    """What can be fitted: `anglecam.simulate.plant.Plant` and `anglecam.simulate.third_order.ThirdOrder`."""
+    """What can be fitted: `anglecam.models.plant.Plant` and `anglecam.models.third_order.ThirdOrder`."""
 
     states: int
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from anglecam.data.record import Record
 from anglecam.io.session import Command
-from anglecam.simulate.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, SOURCES, WIDTH, integrate
-from anglecam.simulate.plant import MAX_STEP
+from anglecam.models.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, SOURCES, WIDTH, integrate
+from anglecam.models.plant import MAX_STEP
 
 Floats = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 
 Floats = NDArray[np.float64]
 

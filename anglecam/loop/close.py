@@ -27,7 +27,7 @@ from anglecam.loop.holdout import Gain, Prediction, compare, predict_unseen, spl
 from anglecam.loop.refit import effects_of, left_of, recoloured, with_last, without
 from anglecam.loop.rounds import SURE, Round, Task, applicable, candidates_of, look, smallest, trace
 from anglecam.loop.screen import changes, directions, forecasts
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 
 CONTRADICTED = 3.0
 """A model that errs this many times more on what was held out than on what was fitted lacks something there, or one of

@@ -9,7 +9,7 @@ import numpy as np
 from anglecam.effects import Knots, View
 from anglecam.estimate.fit import Fit
 from anglecam.io.series_csv import AngleSeries
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 
 ROUNDS = 20
 """Of a fixed point whose map differs from the identity by a few per cent: each gains more than a decimal."""

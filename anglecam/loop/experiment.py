@@ -40,7 +40,7 @@ from anglecam.loop.commands import (
     candidate_releases,
 )
 from anglecam.loop.refit import plant_of
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 
 Floats = NDArray[np.float64]
 Pair = tuple[str, str]

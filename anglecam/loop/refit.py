@@ -9,7 +9,7 @@ from anglecam.data.record import Record
 from anglecam.effects import Effect
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.output_error import fit_output_error
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 
 
 def effects_of(fit: Fit) -> tuple[Effect, ...]:

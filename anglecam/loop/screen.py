@@ -20,7 +20,7 @@ from anglecam.data.record import Record
 from anglecam.effects import Effect
 from anglecam.estimate.fit import Fit, whiten
 from anglecam.loop.refit import plant_of
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 
 Floats = NDArray[np.float64]
 

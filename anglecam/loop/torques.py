@@ -18,7 +18,7 @@ from anglecam.data.record import Record
 from anglecam.estimate.fit import Fit, whiten
 from anglecam.io.session import Command
 from anglecam.loop.refit import plant_of
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 
 Floats = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import newton
 
 from anglecam.data.step_figures import HIGH, LOW, first_crossing, settling
-from anglecam.estimate.step_figures import NO_STEP, StepFigures
+from anglecam.models.unit_step import NO_STEP, StepFigures
 from anglecam.neck.linear import LinearNeck
 from anglecam.neck.step import linear_step, linear_step_figures
 
@@ -119,7 +119,7 @@ def linear_plant(neck: LinearNeck) -> control.TransferFunction:
 
 
 def third_order_plant(parameters: Sequence[float]) -> control.TransferFunction:
-    """Return the plant of `anglecam.simulate.third_order.ThirdOrder`'s parameters: d2, d1, d0, n2, n1, n0."""
+    """Return the plant of `anglecam.models.third_order.ThirdOrder`'s parameters: d2, d1, d0, n2, n1, n0."""
     return control.tf(list(parameters[3:]), [1.0, *parameters[:3]])
 
 

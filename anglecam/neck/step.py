@@ -16,7 +16,7 @@ from scipy.linalg import companion
 from scipy.optimize import brentq
 
 from anglecam.data.step_figures import HIGH, LOW, SETTLED
-from anglecam.estimate.step_figures import NO_STEP, StepFigures
+from anglecam.models.unit_step import NO_STEP, StepFigures
 
 Floats = NDArray[np.float64]
 

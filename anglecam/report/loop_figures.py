@@ -22,8 +22,8 @@ from anglecam.loop.experiment import SETTLE, Experiment
 from anglecam.loop.holdout import Prediction
 from anglecam.loop.remainder import Remainder
 from anglecam.loop.result import plain
+from anglecam.models.plant import Plant
 from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, STYLE, _svg
-from anglecam.simulate.plant import Plant
 
 Floats = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ from anglecam.loop.attribute import fit_with, promising
 from anglecam.loop.holdout import split_records
 from anglecam.loop.rounds import applicable
 from anglecam.loop.screen import changes, directions, forecasts
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 from benchmarks.blind.attribution import CASES, SIGMA_DEG
 from benchmarks.blind.drawn import draw
 from benchmarks.blind.sessions import HELD_OUT, scaled, session, spec_of

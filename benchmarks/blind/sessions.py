@@ -21,7 +21,7 @@ from anglecam.data.record import Record
 from anglecam.effects import View
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.io.session import Command
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 from benchmarks.blind.drawn import magnified
 from synth.errors import SpecError
 from synth.spec import Spec

@@ -5,7 +5,7 @@ import pytest
 
 from anglecam.effects import effect
 from anglecam.estimate.output_error import fit_output_error
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 from benchmarks.blind.drawn import ALL, OUTSIDE, draw, magnified
 from benchmarks.blind.drawn_films import film_spec, write_case
 from benchmarks.blind.films import read_case

@@ -14,7 +14,7 @@ from anglecam.estimate.smoothing import smooth
 from anglecam.identification import identify_records
 from anglecam.io.rig import Rig
 from anglecam.io.session import Command
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 from support.cramer_rao import cramer_rao_bound
 from support.motion import Plant as TruePlant
 from support.motion import Recording

@@ -13,10 +13,10 @@ from anglecam.estimate.output_error import fit_output_error, predict_output_erro
 from anglecam.estimate.start import start_parameters
 from anglecam.identification import identify_records
 from anglecam.io.rig import Rig
+from anglecam.models.large_angle import LargeAngle
+from anglecam.models.plant import Plant
+from anglecam.models.third_order import ThirdOrder
 from anglecam.neck.parameters import PAPER
-from anglecam.simulate.large_angle import LargeAngle
-from anglecam.simulate.plant import Plant
-from anglecam.simulate.third_order import ThirdOrder
 from support.large_angle import COMMANDS, LABORATORY, noisy, true_angle
 
 SIGMA_DEG = 0.2

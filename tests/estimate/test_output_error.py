@@ -12,7 +12,7 @@ from anglecam.estimate.output_error import fit_output_error, predict_output_erro
 from anglecam.estimate.start import start_parameters
 from anglecam.identification import identify_records
 from anglecam.io.rig import Rig
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 from support.motion import Plant as TruePlant
 from support.motion import Recording
 from support.series import noise, record, session

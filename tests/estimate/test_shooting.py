@@ -10,7 +10,7 @@ from anglecam.effects import effect
 from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.shooting import drifts, goes_astray, windows
 from anglecam.io.session import Command
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 
 TIME = np.arange(0.0, 20.0, 0.02)
 SWING = Plant((effect("gravity_geometry"),), driven=False)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anglecam.estimate.step_figures import step_figures
-from anglecam.simulate.plant import Plant
-from anglecam.simulate.third_order import ThirdOrder
+from anglecam.models.plant import Plant
+from anglecam.models.third_order import ThirdOrder
+from anglecam.models.unit_step import step_figures
 
 
 def test_sys1_overshoots_by_11_5_percent():

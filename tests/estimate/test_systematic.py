@@ -11,7 +11,7 @@ from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.systematic import full_sigma
 from anglecam.identification import identify_records
 from anglecam.io.rig import Rig
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 from support.motion import Plant as TruePlant
 from support.series import session
 

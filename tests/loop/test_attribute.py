@@ -12,7 +12,7 @@ from anglecam.loop.attribute import SLOW, Candidate, apart, fit_beneath, fit_wit
 from anglecam.loop.holdout import split_records
 from anglecam.loop.rounds import Task, candidates_of, look
 from anglecam.loop.screen import changes, directions, forecasts
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 from benchmarks.blind.drawn import draw
 from benchmarks.blind.sessions import HELD_OUT, session
 

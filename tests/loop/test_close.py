@@ -13,7 +13,7 @@ from anglecam.loop.close import close_records
 from anglecam.loop.holdout import Prediction, predict_unseen, split_records
 from anglecam.loop.result import sentence, verdict_as_dict
 from anglecam.loop.rounds import applicable
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 from benchmarks.blind.sessions import session as drawn_session
 from support.motion import Plant as TruePlant
 from support.series import session

@@ -9,7 +9,7 @@ from anglecam.effects import View, effect
 from anglecam.estimate.fit import Fit
 from anglecam.io.series_csv import AngleSeries
 from anglecam.loop.correct import corrected
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 
 TIME = np.linspace(0.0, 5.0, 151)
 NOD = np.radians(25.0) * np.sin(3.0 * TIME)

@@ -19,7 +19,7 @@ from anglecam.loop.attribute import fit_with
 from anglecam.loop.commands import candidate_commands, limits_of
 from anglecam.loop.experiment import ENOUGH, separating_experiment, write_command
 from anglecam.loop.screen import Forecast
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 from synth.motion import move
 from synth.motion.command import command_rows
 from synth.spec import Spec, read_spec

@@ -12,7 +12,7 @@ from anglecam.loop.gate import test_residual as _test_residual  # pytest would t
 from anglecam.loop.holdout import split_records
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.loop.torques import torque_responses
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 from benchmarks.blind.sessions import HELD_OUT, session
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from anglecam.effects import effect
+from anglecam.models.plant import Plant
 from anglecam.report.path_figure import curve_of
-from anglecam.simulate.plant import Plant
 from support.motion import Plant as TruePlant
 from support.series import session
 

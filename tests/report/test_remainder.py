@@ -9,7 +9,7 @@ from anglecam.data.record import Record
 from anglecam.estimate.fit import Fit
 from anglecam.estimate.noise import Noise
 from anglecam.loop.remainder import leftover_torque
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 from support.series import noise
 
 A, B = 26.0, 524.0

@@ -7,14 +7,14 @@ import sys
 
 import numpy as np
 
-from anglecam.simulate import integrator
-from anglecam.simulate.plant import Plant
+from anglecam.models import integrator
+from anglecam.models.plant import Plant
 
 RUN = "Plant(driven=False).predict(np.array([26.0, 524.0]), np.arange(9) / 30, None, np.array([0.1, 0.0]))"
 ELSEWHERE = f"""
 import numpy as np
-from anglecam.simulate.integrator import integrate
-from anglecam.simulate.plant import Plant
+from anglecam.models.integrator import integrate
+from anglecam.models.plant import Plant
 {RUN}
 print(sum(integrate.stats.cache_hits.values()), sum(integrate.stats.cache_misses.values()))
 """

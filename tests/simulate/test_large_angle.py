@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from anglecam.io.session import Command
+from anglecam.models.large_angle import DEFAULT, QUANTITIES, LargeAngle
+from anglecam.models.plant import Plant
 from anglecam.neck.large_angle import LargeAngleNeck, linearise
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.parameters import PAPER
-from anglecam.simulate.large_angle import DEFAULT, QUANTITIES, LargeAngle
-from anglecam.simulate.plant import Plant
 from support.large_angle import COMMANDS, LABORATORY, TIME, command, true_angle
 
 REST = np.zeros(2)

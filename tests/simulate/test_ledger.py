@@ -11,7 +11,7 @@ import yaml
 
 from anglecam.effects import LEDGER, UNSEEN, View, effect
 from anglecam.io.session import Command
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 from synth.motion import command_rows, move
 from synth.spec import read_spec
 

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from anglecam.effects import LEDGER, effect
 from anglecam.effects.effect import PORTS
 from anglecam.io.session import Command
-from anglecam.simulate.plant import Plant
+from anglecam.models.plant import Plant
 from support.motion import Plant as TruePlant
 from support.motion import Recording, command_rows, move
 

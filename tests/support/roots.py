@@ -55,7 +55,7 @@ def roots_with_sigma(coefficients: Floats, covariance: Floats) -> Roots:
 
 
 def poles_and_zeros(parameters: Floats, covariance: Floats) -> tuple[Roots, Roots]:
-    """Return poles and zeros of `anglecam.simulate.third_order.ThirdOrder`, the form of SYS2, Eq. (36).
+    """Return poles and zeros of `anglecam.models.third_order.ThirdOrder`, the form of SYS2, Eq. (36).
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from scipy.signal import residue
 SYS2_NUMERATOR = 47.3859 * np.array([1.0, 56.8, 980.1])
 SYS2_DENOMINATOR = np.polymul([1.0, 13.22], [1.0, 12.29, 149.0])
 SYS2 = np.array([*SYS2_DENOMINATOR[1:], *SYS2_NUMERATOR])
-"""Eq. (36) in the parameters of `anglecam.simulate.third_order.ThirdOrder`."""
+"""Eq. (36) in the parameters of `anglecam.models.third_order.ThirdOrder`."""
 
 
 def respond(

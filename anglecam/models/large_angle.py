@@ -17,7 +17,7 @@ from anglecam.neck.large_angle import LargeAngleNeck, linearise, restoring_tange
 Floats = NDArray[np.float64]
 
 MAX_STEP = 0.004
-"""s; see `anglecam.simulate.plant.MAX_STEP`."""
+"""s; see `anglecam.models.plant.MAX_STEP`."""
 NODES = 512
 """Angles at which the torque is tabulated with its tangent: a cubic between them errs by less than 2e-7 N·m, and within
 1° of a linkage's toggle by less than 2e-5 N·m."""
@@ -251,7 +251,7 @@ class LargeAngle:
         return self.run(parameters, time, command, state)[:, 0]
 
     def run(self, parameters: Floats, time: Floats, command: Command | None, state: Floats) -> Floats:
-        """Run the neck freely from an initial state; see `anglecam.simulate.plant.Plant.run`.
+        """Run the neck freely from an initial state; see `anglecam.models.plant.Plant.run`.
 
         The command, rad, becomes the input voltage C_i·command, Eq. (29). Angle and rate are not finite from where the
         head would leave the reach of its linkage.

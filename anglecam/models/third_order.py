@@ -94,7 +94,7 @@ class ThirdOrder:
     def predict(
         self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNSEEN
     ) -> Floats:
-        """Run the plant freely from an initial state; see `anglecam.simulate.plant.Plant.run`."""
+        """Run the plant freely from an initial state; see `anglecam.models.plant.Plant.run`."""
         switches = np.zeros(1) if command is None else command.time
         values = np.zeros(1) if command is None else command.angle
         numerator = parameters[3:] if self.driven else np.zeros(3)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from anglecam.effects import UNSEEN, Effect, Knots, View
 from anglecam.io.session import Command
-from anglecam.simulate.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, WIDTH, integrate
+from anglecam.models.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, WIDTH, integrate
 
 Floats = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""Forward models: from parameters and a command to the angle over time."""
