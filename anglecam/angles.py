@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.budget import PlaceErrors, angle_sigma, place_errors
+from anglecam.camera.lens import Lens
+from anglecam.camera.shutter import mean_off_middle
 from anglecam.io.rig import Rig
 from anglecam.io.session import Command
-from anglecam.lens import Lens
 from anglecam.registration import Registered
-from anglecam.shutter import mean_off_middle
 from anglecam.sighting import Sighting
 from anglecam.uncertainty import Tilt
 from anglecam.vision.one_centre import RigidMotion

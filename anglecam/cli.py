@@ -161,8 +161,8 @@ def calibrate(
     board: Annotated[str, typer.Option("--board", help="Inner corners, COLUMNSxROWS.")] = "9x6",
 ) -> None:
     """Find camera matrix and lens distortion from a chessboard: NAME.calibration.yaml and a figure."""
-    from anglecam.calibrate import calibrate_clip
-    from anglecam.calibration import write_calibration
+    from anglecam.camera.calibrate import calibrate_clip
+    from anglecam.camera.calibration import write_calibration
     from anglecam.report.calibration_figure import plot_calibration
 
     try:

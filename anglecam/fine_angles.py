@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.angles import Angles, neutral_of
+from anglecam.camera.shutter import mean_off_middle
 from anglecam.io.rig import Rig
 from anglecam.io.session import Command
 from anglecam.registration import Registered
-from anglecam.shutter import mean_off_middle
 from anglecam.vision.pivot import Pivot
 
 Floats = NDArray[np.float64]

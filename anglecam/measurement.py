@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 
 from anglecam.angle_series import series_of_angles, why_zero_is_elsewhere
 from anglecam.angles import Angles, coarse_angles, turns
+from anglecam.camera.shutter import measurement_time
 from anglecam.fine_angles import fine_angles
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import OK, AngleSeries
 from anglecam.io.session import Command, recording_name
 from anglecam.registration import Registered, Start, register_clip
-from anglecam.shutter import measurement_time
 from anglecam.sight_clip import sight_clip
 from anglecam.sight_head import sight_head
 from anglecam.sighting import Sighting
 from anglecam.sync import DARK, note_on, offset_of, on_clip_clock, see_lamp
-from anglecam.video.rereading import decoded_once
+from anglecam.video.film import decoded_once
 from anglecam.vision.own_turn import own_turn
 
 Floats = NDArray[np.float64]

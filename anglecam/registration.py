@@ -1,7 +1,7 @@
 """The fine pass over a clip: how the head is turned in every frame, from all that is rigid on it.
 
 Two more readings of the file: one keeps the frames from which the head is learnt, the other finds its turn in every
-frame, one frame at a time, so that memory does not grow with the clip beyond what `anglecam.video.rereading` keeps.
+frame, one frame at a time, so that memory does not grow with the clip beyond what `anglecam.video.film` keeps.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from anglecam.lens import Lens
+from anglecam.camera.lens import Lens
 from anglecam.video.frames import Image, inspect_clip, read_frames
 from anglecam.vision.learning import learn
 from anglecam.vision.noise import pixel_noise

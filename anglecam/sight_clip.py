@@ -15,10 +15,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.camera.lens import Lens, lens_from_rig
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import OK
-from anglecam.lens import Lens, lens_from_rig
 from anglecam.sight_head import sight_head
 from anglecam.sighting import Sighting, find_pivot, frames_to_keep, why_truncated
 from anglecam.video.frames import Image, Sample, inspect_clip, read_frames, sample_frames

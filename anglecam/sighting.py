@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.camera.lens import Lens
 from anglecam.io.rig import Rig
-from anglecam.lens import Lens
 from anglecam.video.frames import ClipInfo, Image, Sample
 from anglecam.vision.circle import Circle
 from anglecam.vision.median import median_picture
@@ -137,7 +137,7 @@ def _reconciled(marker: Marker | None, circle: Circle | None, lens: Lens) -> tup
 
     In a tilted view what stands at another height turns about another centre, beside the pivot's along the parallax:
     there the marker says little about the centre that the mouth turns about. And without a focal length perspective
-    moves the centre of the mouth's circle, unseen (`anglecam.lens`).
+    moves the centre of the mouth's circle, unseen (`anglecam.camera.lens`).
     """
     if marker is not None and not lens.is_identity:
         J = lens.jacobian(marker.centre_px)

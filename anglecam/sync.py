@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
+from anglecam.camera.shutter import measurement_time
 from anglecam.errors import RigError
 from anglecam.io.rig import Rig
 from anglecam.io.session import Command
-from anglecam.shutter import measurement_time
 from anglecam.video.frames import inspect_clip, read_frames
 from anglecam.vision.lamp import lit_between, patch_levels
 

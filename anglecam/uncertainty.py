@@ -32,7 +32,7 @@ Draw = Callable[[np.random.Generator, int], Floats]
 
 @dataclass(frozen=True)
 class Tilt:
-    """A view that was declared to be slanted, and how sure that is; see `anglecam.lens`."""
+    """A view that was declared to be slanted, and how sure that is; see `anglecam.camera.lens`."""
 
     angle: float
     """Between the line of sight and the axis of rotation, undone in the angles, rad."""

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from anglecam.calibration import Calibration, write_calibration
+from anglecam.camera.calibration import Calibration, write_calibration
 from anglecam.io.rig import read_rig
 from anglecam.io.session import read_command
 from anglecam.measurement import measure_clip

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from anglecam import calibrate
-from anglecam.calibrate import calibrate_clip
+from anglecam.camera import calibrate
+from anglecam.camera.calibrate import calibrate_clip
+from anglecam.camera.chessboard import find_corners
+from anglecam.camera.lens import Lens
 from anglecam.errors import InputError
-from anglecam.lens import Lens
 from anglecam.report.calibration_figure import plot_calibration
-from anglecam.vision.chessboard import find_corners
 from support.board import BoardCamera, board_picture, film_board, poses, write_pictures
 
 CAMERA = BoardCamera(k1=-0.15)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from anglecam.calibration import Calibration, write_calibration
+from anglecam.camera.calibration import Calibration, write_calibration
 from anglecam.io.rig import read_rig
 from anglecam.io.session import read_command
 from anglecam.measurement import Measurement, measure_clip

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from anglecam.calibration import read_calibration
+from anglecam.camera.calibration import read_calibration
 from anglecam.errors import AnglecamError, InputError, RigError
 from anglecam.export import read_model
 from anglecam.io.neck_file import read_neck
@@ -120,7 +120,7 @@ def test_a_calibration_nested_without_end_does_not_end_the_process(tmp_path, kin
     path = tmp_path / "lens.yaml"
     path.write_text(DEEP[kind])
     code = (
-        "import sys\nfrom pathlib import Path\nfrom anglecam.calibration import read_calibration\n"
+        "import sys\nfrom pathlib import Path\nfrom anglecam.camera.calibration import read_calibration\n"
         "from anglecam.errors import RigError\n"
         "try:\n    read_calibration(Path(sys.argv[1]))\nexcept RigError as refusal:\n    print(refusal)"
     )

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from anglecam.calibration import Calibration, read_calibration, write_calibration
+from anglecam.camera.calibration import Calibration, read_calibration, write_calibration
+from anglecam.camera.lens import Lens, lens_from_rig
+from anglecam.camera.shutter import mean_off_middle, measurement_time
 from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Rig, read_rig
-from anglecam.lens import Lens, lens_from_rig
-from anglecam.shutter import mean_off_middle, measurement_time
 
 SIZE = (640, 480)
 PIVOT = np.array([240.0, 300.0])

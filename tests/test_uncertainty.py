@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from anglecam.budget import PlaceErrors, angle_sigma
-from anglecam.lens import Lens
+from anglecam.camera.lens import Lens
 from anglecam.uncertainty import ErrorSources, Tilt, angle_draws, courses
 from support.nod import COVARIANCE, PIVOT, REST, N, nod_sources
 

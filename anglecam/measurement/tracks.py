@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 from anglecam.angle_series import series_of_angles, why_zero_is_elsewhere
 from anglecam.angles import Angles, angles_of_places
 from anglecam.budget import PlaceErrors
+from anglecam.camera.lens import lens_from_rig
+from anglecam.camera.shutter import measurement_time
 from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Marks, Rig
 from anglecam.io.series_csv import OK, AngleSeries
 from anglecam.io.session import Command, clip_beside, recording_name
 from anglecam.io.tracks.files import read_tracks
 from anglecam.io.tracks.tracks import choose_pair
-from anglecam.lens import lens_from_rig
-from anglecam.shutter import measurement_time
 from anglecam.video.frames import inspect_clip, read_frames
 from anglecam.vision.pivot import Pivot
 

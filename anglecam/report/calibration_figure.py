@@ -8,9 +8,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from anglecam.calibrate import BoardCalibration
+from anglecam.camera.calibrate import BoardCalibration
+from anglecam.camera.lens import Lens
 from anglecam.errors import printable
-from anglecam.lens import Lens
 from anglecam.report.figures import AFTER, FAINT, MEASURED, STYLE
 
 _ARROW_SHARE = 0.05

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from anglecam.errors import InputError
 from anglecam.threads import native_threads
 from anglecam.video.container import is_cut_short
+from anglecam.video.film import reread
 from anglecam.video.opening import LONGEST_S, MOST_FRAMES, open_film
-from anglecam.video.rereading import reread
 
 Image = NDArray[Any]
 """Bytes, but cv2's type hints do not know it."""

@@ -1,6 +1,6 @@
 """Where the head is rigid and has edges: its best tiles, and what a frame shows of them.
 
-All is told in the plane of motion (`anglecam.lens`), in which the head turns without changing its shape. A point of
+All is told in the plane of motion (`anglecam.camera.lens`), in which the head turns without changing its shape. A point of
 the head z nearer to the camera than the pivot turns, in a tilted view, about a centre of its own, z·parallax beside
 the pivot's: a tile has a height.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from anglecam.lens import Lens
+from anglecam.camera.lens import Lens
 from anglecam.video.frames import Image
 from anglecam.vision.median import median_picture
 from anglecam.vision.patch import Views

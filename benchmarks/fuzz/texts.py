@@ -269,14 +269,14 @@ DAMAGES: dict[str, Damage] = {
 
 def readers() -> dict[str, Reader]:
     """Return who reads each kind of file, as the commands do."""
-    from anglecam.calibration import read_calibration
+    from anglecam.camera.calibration import read_calibration
+    from anglecam.camera.lens import lens_from_rig
     from anglecam.data.record import record_from_series
     from anglecam.export import read_model
     from anglecam.io.neck_file import read_neck
     from anglecam.io.rig import Marks, Rig, read_rig
     from anglecam.io.series_csv import read_series
     from anglecam.io.session import read_command
-    from anglecam.lens import lens_from_rig
     from anglecam.measurement.tracks import measure_tracks
     from anglecam.neck.pd_tuning import nod_from_responses
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from anglecam.batch.run import Options, run_batch
-from anglecam.calibration import Calibration, write_calibration
+from anglecam.camera.calibration import Calibration, write_calibration
 from anglecam.errors import RigError
 from support.tiny import results, tiny_lab
 

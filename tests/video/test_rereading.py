@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from anglecam.errors import InputError
-from anglecam.video import rereading
+from anglecam.video import film as rereading
+from anglecam.video.film import decoded_once, reread
 from anglecam.video.frames import read_frames, sample_frames
-from anglecam.video.rereading import decoded_once, reread
 from support.drawn import Look, draw_frames, write_clip
 
 FILM = Path("film.avi")

@@ -15,11 +15,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.calibration import Calibration
+from anglecam.camera.calibration import Calibration
+from anglecam.camera.chessboard import find_corners
 from anglecam.errors import InputError
+from anglecam.video.film import decoded_once
 from anglecam.video.frames import inspect_clip, read_frames
-from anglecam.video.rereading import decoded_once
-from anglecam.vision.chessboard import find_corners
 
 Floats = NDArray[np.float64]
 

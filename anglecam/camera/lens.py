@@ -31,7 +31,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from anglecam.calibration import Calibration, read_calibration
+from anglecam.camera.calibration import Calibration, read_calibration
 from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Rig
 

@@ -1,0 +1,1 @@
+"""The camera: its calibration, lens, tilt and shutter."""
