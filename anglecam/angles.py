@@ -18,8 +18,8 @@ from anglecam.io.session import Command
 from anglecam.registration import Registered
 from anglecam.sighting import Sighting
 from anglecam.uncertainty import Tilt
-from anglecam.vision.one_centre import RigidMotion
-from anglecam.vision.pivot import Pivot
+from anglecam.vision.pivot.marker import Pivot
+from anglecam.vision.pivot.one_centre import RigidMotion
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

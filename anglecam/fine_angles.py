@@ -16,7 +16,7 @@ from anglecam.camera.shutter import mean_off_middle
 from anglecam.io.rig import Rig
 from anglecam.io.session import Command
 from anglecam.registration import Registered
-from anglecam.vision.pivot import Pivot
+from anglecam.vision.pivot.marker import Pivot
 
 Floats = NDArray[np.float64]
 

@@ -26,7 +26,7 @@ from anglecam.sight_head import sight_head
 from anglecam.sighting import Sighting
 from anglecam.sync import DARK, note_on, offset_of, on_clip_clock, see_lamp
 from anglecam.video.film import decoded_once
-from anglecam.vision.own_turn import own_turn
+from anglecam.vision.mark.outline_turn import own_turn
 
 Floats = NDArray[np.float64]
 

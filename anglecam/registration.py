@@ -16,11 +16,11 @@ from threadpoolctl import threadpool_limits
 
 from anglecam.camera.lens import Lens
 from anglecam.video.frames import Image, inspect_clip, read_frames
-from anglecam.vision.learning import learn
-from anglecam.vision.noise import pixel_noise
-from anglecam.vision.pivot import Pivot
-from anglecam.vision.register import LOST, Look, Turn, find_turn, nearest_fit
-from anglecam.vision.tiles import Glimpse, choose_tiles, plane_of
+from anglecam.vision.image.noise import pixel_noise
+from anglecam.vision.pivot.marker import Pivot
+from anglecam.vision.registration.fit import LOST, Look, Turn, find_turn, nearest_fit
+from anglecam.vision.registration.learn import learn
+from anglecam.vision.registration.tiles import Glimpse, choose_tiles, plane_of
 
 Floats = NDArray[np.float64]
 

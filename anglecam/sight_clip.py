@@ -22,13 +22,13 @@ from anglecam.io.series_csv import OK
 from anglecam.sight_head import sight_head
 from anglecam.sighting import Sighting, find_pivot, frames_to_keep, why_truncated
 from anglecam.video.frames import Image, Sample, inspect_clip, read_frames, sample_frames
-from anglecam.vision.noise import pixel_noise
-from anglecam.vision.pivot import Marker, Pivot
-from anglecam.vision.search import Found, find_mouth
-from anglecam.vision.segment import Region, find_regions
-from anglecam.vision.steady import LOST, CameraMove, Steady
-from anglecam.vision.steady_learning import learn_steady
-from anglecam.vision.track import Track, follow_mouth
+from anglecam.vision.image.noise import pixel_noise
+from anglecam.vision.mark.search import Found, find_mouth
+from anglecam.vision.mark.segment import Region, find_regions
+from anglecam.vision.mark.track import Track, follow_mouth
+from anglecam.vision.pivot.marker import Marker, Pivot
+from anglecam.vision.stabilise.background_motion import LOST, CameraMove, Steady
+from anglecam.vision.stabilise.learn import learn_steady
 
 Floats = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from anglecam.io.rig import Rig
 from anglecam.io.series_csv import OK
 from anglecam.sighting import Sighting, find_pivot, frames_to_keep, why_truncated
 from anglecam.video.frames import inspect_clip, read_frames, sample_frames
-from anglecam.vision.circle import Circle
-from anglecam.vision.noise import pixel_noise
-from anglecam.vision.rigid import follow_head
+from anglecam.vision.image.noise import pixel_noise
+from anglecam.vision.pivot.circle import Circle
+from anglecam.vision.rigid_body.rigid import follow_head
 
 
 def sight_head(path: Path, rig: Rig) -> Sighting | str:

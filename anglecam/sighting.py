@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from anglecam.camera.lens import Lens
 from anglecam.io.rig import Rig
 from anglecam.video.frames import ClipInfo, Image, Sample
-from anglecam.vision.circle import Circle
-from anglecam.vision.median import median_picture
-from anglecam.vision.one_centre import RigidMotion
-from anglecam.vision.pivot import Marker, Pivot, choose_pivot, find_marker
-from anglecam.vision.segment import Region
-from anglecam.vision.steady import CameraMove
+from anglecam.vision.image.median import median_picture
+from anglecam.vision.mark.segment import Region
+from anglecam.vision.pivot.circle import Circle
+from anglecam.vision.pivot.marker import Marker, Pivot, choose_pivot, find_marker
+from anglecam.vision.pivot.one_centre import RigidMotion
+from anglecam.vision.stabilise.background_motion import CameraMove
 
 Floats = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from anglecam.errors import RigError
 from anglecam.io.rig import Rig
 from anglecam.io.session import Command
 from anglecam.video.frames import inspect_clip, read_frames
-from anglecam.vision.lamp import lit_between, patch_levels
+from anglecam.vision.image.lamp import lit_between, patch_levels
 
 Interval = tuple[float, float]
 

@@ -19,7 +19,7 @@ from anglecam.measurement import measure_clip
 from anglecam.models.plant import Plant
 from anglecam.recordings import measure_session
 from anglecam.sync import AGREED, offsets
-from anglecam.vision.lamp import lit_between
+from anglecam.vision.image.lamp import lit_between
 from synth.session import render
 
 RESTS = (0.81, 0.82, 0.83)

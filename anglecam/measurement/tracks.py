@@ -24,7 +24,7 @@ from anglecam.io.session import Command, clip_beside, recording_name
 from anglecam.io.tracks.files import read_tracks
 from anglecam.io.tracks.tracks import choose_pair
 from anglecam.video.frames import inspect_clip, read_frames
-from anglecam.vision.pivot import Pivot
+from anglecam.vision.pivot.marker import Pivot
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -14,7 +14,7 @@ from matplotlib.patheffects import Normal, Stroke
 from numpy.typing import NDArray
 
 from anglecam.report.figures import STYLE, _svg
-from anglecam.vision.colour import FULL, NONE, learn_colour
+from anglecam.vision.mark.colour import FULL, NONE, learn_colour
 
 Image = NDArray[Any]
 """Bytes, but cv2's type hints do not know it."""

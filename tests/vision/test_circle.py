@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from anglecam.vision.circle import circle_through, fit_circle
+from anglecam.vision.pivot.circle import circle_through, fit_circle
 
 
 def _arc(half_deg, n, rng, noise=0.03, centre=(214.5, 301.3), radius=170.0):

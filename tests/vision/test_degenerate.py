@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from anglecam.vision.circle import fit_circle
-from anglecam.vision.scenery import find_scenery
+from anglecam.vision.pivot.circle import fit_circle
+from anglecam.vision.stabilise.scenery import find_scenery
 
 
 def test_a_path_that_is_all_but_a_line_has_no_circle():

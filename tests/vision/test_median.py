@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from anglecam.vision.median import median_picture
+from anglecam.vision.image.median import median_picture
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.float32, np.float64])

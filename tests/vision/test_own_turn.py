@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from anglecam.vision.own_turn import own_turn
-from anglecam.vision.segment import Region
+from anglecam.vision.mark.outline_turn import own_turn
+from anglecam.vision.mark.segment import Region
 
 TURN = np.radians(np.concatenate([np.linspace(-15, 15, 60), np.linspace(15, -15, 60)]))
 

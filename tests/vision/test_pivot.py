@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 import pytest
 
-from anglecam.vision.circle import fit_circle
-from anglecam.vision.pivot import Marker, choose_pivot, find_marker
+from anglecam.vision.pivot.circle import fit_circle
+from anglecam.vision.pivot.marker import Marker, choose_pivot, find_marker
 
 DARK_DISC, BRIGHT_DISC = [(7, 20)], [(12, 240)]
 BLACK_RING, WHITE_RING = [(12, 245), (8, 20), (4, 245)], [(13, 15), (9, 240), (5, 15)]

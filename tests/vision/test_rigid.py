@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from anglecam.video.frames import Frame, read_frames
-from anglecam.vision.rigid import follow_head
+from anglecam.vision.rigid_body.rigid import follow_head
 from support.drawn import Look, draw_frames
 from synth.session import render
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anglecam.vision.colour import ColourModel
-from anglecam.vision.segment import find_regions
+from anglecam.vision.mark.colour import ColourModel
+from anglecam.vision.mark.segment import find_regions
 
 RED = ColourModel(np.array([0.0, 0.0, 1 / 255]), 0.0, 0.01, np.array([0.0, 0.0, 255.0]), np.zeros(2))
 """The fraction of mouth is the red channel."""

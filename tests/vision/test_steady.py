@@ -6,8 +6,8 @@ import pytest
 import yaml
 
 from anglecam.video.frames import read_frames, sample_frames
-from anglecam.vision.steady import CameraMove
-from anglecam.vision.steady_learning import learn_steady, shakes
+from anglecam.vision.stabilise.background_motion import CameraMove
+from anglecam.vision.stabilise.learn import learn_steady, shakes
 from support.drawn import Look, draw_frames
 from synth.session import render
 

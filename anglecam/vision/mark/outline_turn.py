@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.vision.segment import Region
+from anglecam.vision.mark.segment import Region
 
 Floats = NDArray[np.float64]
 

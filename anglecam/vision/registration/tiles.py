@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from anglecam.camera.lens import Lens
 from anglecam.video.frames import Image
-from anglecam.vision.median import median_picture
-from anglecam.vision.patch import Views
-from anglecam.vision.transforms import turned
+from anglecam.vision.image.median import median_picture
+from anglecam.vision.image.transforms import turned
+from anglecam.vision.registration.appearance import Views
 
 Floats = NDArray[np.float64]
 

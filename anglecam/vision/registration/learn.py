@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.vision.grouping import group_neighbours
-from anglecam.vision.patch import Fit, Patches, Views, compare, joined, learn_patch, levelled
-from anglecam.vision.pivot import Pivot
-from anglecam.vision.register import HIDDEN, Look, covered, scatter
-from anglecam.vision.tiles import SIDE_PX, Glimpse, Plane, Tiles, look_at
-from anglecam.vision.transforms import turned
+from anglecam.vision.image.clusters import group_neighbours
+from anglecam.vision.image.transforms import turned
+from anglecam.vision.pivot.marker import Pivot
+from anglecam.vision.registration.appearance import Fit, Patches, Views, compare, joined, learn_patch, levelled
+from anglecam.vision.registration.fit import HIDDEN, Look, covered, scatter
+from anglecam.vision.registration.tiles import SIDE_PX, Glimpse, Plane, Tiles, look_at
 
 Floats = NDArray[np.float64]
 
@@ -118,7 +118,7 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
     glimpses : sequence of Glimpse
         Frames at turns that differ.
     tiles : Tiles
-        From `anglecam.vision.tiles.choose_tiles`.
+        From `anglecam.vision.registration.tiles.choose_tiles`.
     plane : Plane
         What lies where.
     pivot : Pivot

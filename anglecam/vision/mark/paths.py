@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.vision.carried import carried_share
-from anglecam.vision.circle import circle_through
-from anglecam.vision.patches import Patches
+from anglecam.vision.mark.blobs import Patches
+from anglecam.vision.mark.carried import carried_share
+from anglecam.vision.pivot.circle import circle_through
 
 Image = NDArray[Any]
 """Bytes, but cv2's type hints do not know it."""

@@ -15,9 +15,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.vision.colour import ColourModel, chroma_of, hue_contrast, learn_colour
-from anglecam.vision.patches import cut_out
-from anglecam.vision.paths import Track, moving_track, resting_track
+from anglecam.vision.mark.blobs import cut_out
+from anglecam.vision.mark.colour import ColourModel, chroma_of, hue_contrast, learn_colour
+from anglecam.vision.mark.paths import Track, moving_track, resting_track
 
 Image = NDArray[Any]
 """Bytes, but cv2's type hints do not know it."""

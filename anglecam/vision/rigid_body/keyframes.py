@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.video.frames import Image
-from anglecam.vision.bodies import FEWEST, LEAST_TURN, find_body
-from anglecam.vision.grouping import group_neighbours
-from anglecam.vision.transforms import fit_rigid, inverse, moved, turn_of
+from anglecam.vision.image.clusters import group_neighbours
+from anglecam.vision.image.transforms import fit_rigid, inverse, moved, turn_of
+from anglecam.vision.rigid_body.bodies import FEWEST, LEAST_TURN, find_body
 
 Floats = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
 """The head's turn from all that is rigid on it: many small patches, each learnt from the clip itself.
 
 A coarse angle, good to a few hundredths of a pixel, lets the frames be turned back onto one another. What then stands
-still is the head; where it has edges, it has information. The best tiles are learnt (`anglecam.vision.patch`), and each
+still is the head; where it has edges, it has information. The best tiles are learnt (`anglecam.vision.registration.appearance`), and each
 frame's turn is the one at which they fit best, by Gauss and Newton, weighted by their noise.
 
 What the tiles say of one turn scatters more than their pixels' noise alone would make it: codecs err in blocks, light
@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.video.frames import Image
-from anglecam.vision.patch import Fit, Patches, compare
-from anglecam.vision.tiles import SIDE_PX, Glimpse, Plane, look_at
-from anglecam.vision.transforms import turned
+from anglecam.vision.image.transforms import turned
+from anglecam.vision.registration.appearance import Fit, Patches, compare
+from anglecam.vision.registration.tiles import SIDE_PX, Glimpse, Plane, look_at
 
 Floats = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def find_turn(look: Look, glimpse: Glimpse, before: Image | None = None) -> Turn
     Parameters
     ----------
     look : Look
-        From `anglecam.vision.learning.learn`.
+        From `anglecam.vision.registration.learn.learn`.
     glimpse : Glimpse
         With the coarse turn, and the pivot on the same ground as ``look.pivot_px``.
     before : ndarray, optional
@@ -163,7 +163,7 @@ def nearest_fit(look: Look, glimpse: Glimpse, reach_px: float) -> Glimpse:
     Parameters
     ----------
     look : Look
-        From `anglecam.vision.learning.learn`.
+        From `anglecam.vision.registration.learn.learn`.
     glimpse : Glimpse
         With a turn that may be wrong.
     reach_px : float

@@ -1,8 +1,8 @@
 """How the camera moved in every frame, from scenery that stands still.
 
 What a tile of the scenery looks like between its pixels is learnt from a few frames as a fine spline
-(`anglecam.vision.steady_learning`): a camera that shakes puts its edges at a different place within the pixels in every
-frame. Any other frame is followed roughly first (`anglecam.vision.scenery`); then its shift and roll are those at which
+(`anglecam.vision.stabilise.learn`): a camera that shakes puts its edges at a different place within the pixels in every
+frame. Any other frame is followed roughly first (`anglecam.vision.stabilise.scenery`); then its shift and roll are those at which
 tiles and frame fit best, by Gauss and Newton. The frame is never interpolated, so nothing locks to the pixels.
 
 How much more the tiles disagree than their noise would make them, direction by direction, widens the uncertainty.
@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.video.frames import Image
-from anglecam.vision.patch import Patches, Views, compare
-from anglecam.vision.scenery import Scenery, locate
-from anglecam.vision.transforms import turned
-from anglecam.vision.windows import SIDE_PX, carried, follow, level
+from anglecam.vision.image.transforms import turned
+from anglecam.vision.registration.appearance import Patches, Views, compare
+from anglecam.vision.stabilise.scenery import Scenery, locate
+from anglecam.vision.stabilise.windows import SIDE_PX, carried, follow, level
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ _SPOILT = 4.0
 """Times its usual mean square that all tiles may misfit in a frame."""
 _COPY = 0.13
 """What a codec's copies hide of a motion, as a share of that whose change of the picture equals the tiles' misfit (see
-`anglecam.vision.register`); all tiles alike, so that they cannot tell."""
+`anglecam.vision.registration.fit`); all tiles alike, so that they cannot tell."""
 MARGIN_PX = 2
 """About a tile, so that a rolled one is seen whole."""
 

@@ -51,7 +51,7 @@ def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gai
     Parameters
     ----------
     offsets, values, starts : ndarray
-        Of the views, see `anglecam.vision.patch.Views`.
+        Of the views, see `anglecam.vision.registration.appearance.Views`.
     turns : ndarray
         (views,) rad.
     pivot, corner : ndarray
@@ -178,7 +178,7 @@ def turn_equations(offsets, values, starts, turns, pivots, corners, side, looks,
     Returns
     -------
     tuple of ndarray
-        What `anglecam.vision.patch.Fit` holds, in its order.
+        What `anglecam.vision.registration.appearance.Fit` holds, in its order.
     """
     views, planes, n = len(turns), looks.shape[1], looks.shape[2]
     normals, gradients = np.zeros((views, 3, 3)), np.zeros((views, 3))

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.vision.colour import FULL, NONE, ColourModel
+from anglecam.vision.mark.colour import FULL, NONE, ColourModel
 
 Image = NDArray[Any]
 """Bytes, but cv2's type hints do not know it."""

@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.vision.circle import Circle
+from anglecam.vision.pivot.circle import Circle
 
 Image = NDArray[Any]
 """Bytes, but cv2's type hints do not know it."""

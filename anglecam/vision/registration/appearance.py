@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from anglecam.vision.spline_kernels import gain_equations, normal_equations, turn_equations
+from anglecam.vision.registration.kernels import gain_equations, normal_equations, turn_equations
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.io.series_csv import OK
-from anglecam.vision.bodies import LEAST_TURN
-from anglecam.vision.keys import GROUPS
-from anglecam.vision.transforms import turn_of, turned
+from anglecam.vision.image.transforms import turn_of, turned
+from anglecam.vision.rigid_body.bodies import LEAST_TURN
+from anglecam.vision.rigid_body.keyframes import GROUPS
 
 Floats = NDArray[np.float64]
 

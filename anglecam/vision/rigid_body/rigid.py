@@ -1,8 +1,8 @@
 """The turn of a rigid head with no mark on it: what moves as one body, and turns, is the head.
 
-A few frames, spread over the clip, teach what turns (`anglecam.vision.bodies`). Those at different turns are kept as
+A few frames, spread over the clip, teach what turns (`anglecam.vision.rigid_body.bodies`). Those at different turns are kept as
 keys. Every frame of the clip is turned back onto the nearest key and what is left is followed
-(`anglecam.vision.keys`). Each frame is held against a key and not against the frame before it, so errors do not add up
+(`anglecam.vision.rigid_body.keyframes`). Each frame is held against a key and not against the frame before it, so errors do not add up
 however long the clip.
 """
 
@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from anglecam.io.series_csv import OK
 from anglecam.video.frames import Frame, Image
-from anglecam.vision.bodies import FEWEST, LEAST_TURN, Features, describe, find_turning_body, locate
-from anglecam.vision.keys import Key, choose_keys, hold_against
-from anglecam.vision.one_centre import Placed, RigidMotion, pose_information, turn_about_one_centre
-from anglecam.vision.transforms import inverse, moved, turn_of
+from anglecam.vision.image.transforms import inverse, moved, turn_of
+from anglecam.vision.pivot.one_centre import Placed, RigidMotion, pose_information, turn_about_one_centre
+from anglecam.vision.rigid_body.bodies import FEWEST, LEAST_TURN, Features, describe, find_turning_body, locate
+from anglecam.vision.rigid_body.keyframes import Key, choose_keys, hold_against
 
 Floats = NDArray[np.float64]
 

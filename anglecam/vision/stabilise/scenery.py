@@ -1,6 +1,6 @@
 """Which parts of the picture are scenery, and how they move where the camera does not stand still.
 
-Small windows with edges are followed from the first of a few frames into the others (`anglecam.vision.windows`). The
+Small windows with edges are followed from the first of a few frames into the others (`anglecam.vision.stabilise.windows`). The
 scenery is the group of windows that keep their places among one another in all frames: one shift and one roll a frame
 carry them all. A nodding head keeps its shape too; of such groups the one that turns less is the scenery.
 """
@@ -15,8 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.video.frames import Image
-from anglecam.vision.noise import pixel_noise
-from anglecam.vision.windows import GATE_PX, carried, find_windows, fit_motion, follow, level, metric_of, squared_gates
+from anglecam.vision.image.noise import pixel_noise
+from anglecam.vision.stabilise.windows import (
+    GATE_PX,
+    carried,
+    find_windows,
+    fit_motion,
+    follow,
+    level,
+    metric_of,
+    squared_gates,
+)
 
 Floats = NDArray[np.float64]
 

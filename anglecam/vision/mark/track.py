@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.vision.circle import Circle, fit_circle
-from anglecam.vision.search import Found
-from anglecam.vision.segment import Region
+from anglecam.vision.mark.search import Found
+from anglecam.vision.mark.segment import Region
+from anglecam.vision.pivot.circle import Circle, fit_circle
 
 Floats = NDArray[np.float64]
 

@@ -15,11 +15,21 @@ from scipy.ndimage import convolve1d
 from threadpoolctl import threadpool_limits
 
 from anglecam.video.frames import Image
-from anglecam.vision.patch import STEP_PX, Patches, compare, joined, learn_patch, levelled
-from anglecam.vision.scenery import Scenery, find_scenery
-from anglecam.vision.steady import HIDDEN, MARGIN_PX, Cuts, Steady, brightness, cut, free_of, solve, views_of
-from anglecam.vision.transforms import turned
-from anglecam.vision.windows import SIDE_PX, level
+from anglecam.vision.image.transforms import turned
+from anglecam.vision.registration.appearance import STEP_PX, Patches, compare, joined, learn_patch, levelled
+from anglecam.vision.stabilise.background_motion import (
+    HIDDEN,
+    MARGIN_PX,
+    Cuts,
+    Steady,
+    brightness,
+    cut,
+    free_of,
+    solve,
+    views_of,
+)
+from anglecam.vision.stabilise.scenery import Scenery, find_scenery
+from anglecam.vision.stabilise.windows import SIDE_PX, level
 
 Floats = NDArray[np.float64]
 

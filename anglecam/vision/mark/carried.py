@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.vision.transforms import turned
+from anglecam.vision.image.transforms import turned
 
 Image = NDArray[Any]
 Floats = NDArray[np.float64]

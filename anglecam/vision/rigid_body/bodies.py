@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.video.frames import Image
-from anglecam.vision.transforms import fit_rigid, moved, turn_of, turned
+from anglecam.vision.image.transforms import fit_rigid, moved, turn_of, turned
 
 Floats = NDArray[np.float64]
 

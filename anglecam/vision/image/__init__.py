@@ -1,0 +1,1 @@
+"""What the other rooms do with pixels: transforms, noise, medians, clusters."""

@@ -1,0 +1,1 @@
+"""Find and follow the declared mark: colour, segmentation, blobs, tracking."""

@@ -1,0 +1,1 @@
+"""Follow a rigid body that carries no mark."""
