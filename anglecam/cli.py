@@ -36,7 +36,7 @@ from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
     from anglecam.identification import Estimator
-    from anglecam.measurement import Measurement
+    from anglecam.measurement.clip import Measurement
     from anglecam.measurement.tracks import MeasuredTracks
     from anglecam.recordings import Measured
 

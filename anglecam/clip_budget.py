@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.budget import worst_case, worst_case_both_ends
 from anglecam.gum import Combined, Comparison, Propagated, combine, compare, propagate
 from anglecam.io.series_csv import CONTRACT_RADII_PX
+from anglecam.measurement.sigma import worst_case, worst_case_both_ends
 from anglecam.uncertainty import Course, ErrorSources, angle_draws, courses
 
 Floats = NDArray[np.float64]

@@ -9,11 +9,11 @@ import numpy as np
 from anglecam.io.files import write_json
 from anglecam.io.series_csv import write_series
 from anglecam.io.session import SERIES_ENDING, Command
-from anglecam.measurement import Measurement
+from anglecam.measurement.clip import Measurement
+from anglecam.measurement.clock_sync import offset_of, on_clip_clock
+from anglecam.measurement.step_response import Response, responses, responses_as_dicts
 from anglecam.measurement.tracks import MeasuredTracks
 from anglecam.report.figures import plot_series
-from anglecam.response import Response, responses, responses_as_dicts
-from anglecam.sync import offset_of, on_clip_clock
 
 
 def write_measurement(

@@ -7,11 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.angles import Angles
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import OK
-from anglecam.measurement import Measurement
-from anglecam.registration import Registered
+from anglecam.measurement.angles import Angles
+from anglecam.measurement.clip import Measurement
+from anglecam.measurement.registration_pass import Registered
 from anglecam.uncertainty import ErrorSources, Neutral
 
 Floats = NDArray[np.float64]
@@ -22,7 +22,7 @@ _MARKER_DOF = 10.0
 _MAD_EFFICIENCY = 0.37
 """Of a median absolute deviation as an estimate of a normal spread."""
 _FEWEST_REPEATS = 20
-"""Below, noise is taken from the pixels (`anglecam.budget.place_errors`)."""
+"""Below, noise is taken from the pixels (`anglecam.measurement.sigma.place_errors`)."""
 
 
 def error_sources(measured: Measurement, rig: Rig) -> ErrorSources:
@@ -109,7 +109,7 @@ def _by_registration(
 ) -> tuple[Floats, Floats, Floats, Floats | None, Neutral]:
     """Return registration, pull, noise of the mouth where the head was not found, mouth on head, and neutral.
 
-    Everything is what `anglecam.angles.fine_angles` made sigma of. A declared neutral leaves the mean over all frames
+    Everything is what `anglecam.measurement.angles.fine_angles` made sigma of. A declared neutral leaves the mean over all frames
     in its place, and what the line itself stands on: the mouth's place on the head.
     """
     sigma, pull = found.sigma[rows], found.pull[rows]

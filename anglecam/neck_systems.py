@@ -22,6 +22,7 @@ from anglecam.estimate.fit import Model
 from anglecam.export import FittedModel
 from anglecam.io.series_csv import read_series
 from anglecam.io.session import Command, command_beside, rig_beside
+from anglecam.measurement.step_response import responses
 from anglecam.models.large_angle import LargeAngle
 from anglecam.models.plant import Plant
 from anglecam.models.third_order import ThirdOrder
@@ -30,7 +31,6 @@ from anglecam.neck.large_angle import LargeAngleNeck, acceleration, equilibrium,
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.pd import PdGains, simulate_pd, sys2
 from anglecam.neck.step import linear_step_figures
-from anglecam.response import responses
 
 Floats = NDArray[np.float64]
 

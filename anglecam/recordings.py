@@ -13,10 +13,10 @@ from anglecam.io.rig import Rig
 from anglecam.io.series_csv import AngleSeries, read_series, write_series
 from anglecam.io.session import SERIES_ENDING, Command, Recording, Session
 from anglecam.io.tracks.files import TRACKS_ENDINGS
-from anglecam.measurement import Measurement, measure_clip
+from anglecam.measurement.clip import Measurement, measure_clip
+from anglecam.measurement.clock_sync import note_on, offsets, on_clip_clock
 from anglecam.measurement.tracks import MeasuredTracks, measure_tracks
-from anglecam.sync import note_on, offsets, on_clip_clock
-from anglecam.uncorrected import uncorrected
+from anglecam.measurement.uncorrected import uncorrected
 
 
 @dataclass(frozen=True)

@@ -181,7 +181,7 @@ def courses(sources: ErrorSources) -> tuple[Course, ...]:
     -------
     tuple of Course
         Independent of each other, without those that are zero throughout. The root of the sum of the squares of
-        those ``in_sigma`` is the series' sigma, `anglecam.budget.angle_sigma`.
+        those ``in_sigma`` is the series' sigma, `anglecam.measurement.sigma.angle_sigma`.
     """
     s = sources
     n, lever = len(s.time), s.lever_px

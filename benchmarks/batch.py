@@ -42,7 +42,7 @@ SINGLE = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL"
 BARE = """
 import sys, cv2
 from pathlib import Path
-from anglecam.measurement import measure_clip
+from anglecam.measurement.clip import measure_clip
 from anglecam.clip_results import write_measurement
 from anglecam.io.session import rig_beside
 cv2.setNumThreads(1)

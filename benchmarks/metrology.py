@@ -24,7 +24,7 @@ import yaml
 from anglecam.camera.calibration import Calibration, write_calibration
 from anglecam.io.rig import read_rig
 from anglecam.io.session import read_command
-from anglecam.measurement import measure_clip
+from anglecam.measurement.clip import measure_clip
 from anglecam.video.frames import read_frames
 from synth.motion import move
 from synth.session import render

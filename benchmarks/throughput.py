@@ -29,7 +29,7 @@ import av
 import yaml
 
 from anglecam.io.rig import Rig
-from anglecam.measurement import measure_clip
+from anglecam.measurement.clip import measure_clip
 from anglecam.video.frames import read_frames
 from synth.render import workers
 from synth.session import render

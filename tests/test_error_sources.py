@@ -11,9 +11,9 @@ import pytest
 from anglecam.error_sources import error_sources
 from anglecam.io.rig import read_rig
 from anglecam.io.session import read_command
-from anglecam.measurement import measure_clip
-from anglecam.registration import Registered, register_clip
-from anglecam.sight_clip import sight_clip
+from anglecam.measurement.clip import measure_clip
+from anglecam.measurement.mark_pass import sight_clip
+from anglecam.measurement.registration_pass import Registered, register_clip
 from anglecam.uncertainty import angle_draws, courses
 from support.drawn import Look, Recording, draw_session
 
@@ -70,8 +70,8 @@ def test_a_measured_clips_terms_join_to_its_sigma(clip, sighted, registered, mon
         "always": registered,
         "now and then": lambda *arguments: _now_and_then(registered(*arguments)),
     }
-    monkeypatch.setattr(import_module("anglecam.measurement"), "sight_clip", sighted)
-    monkeypatch.setattr(import_module("anglecam.measurement"), "register_clip", readings[head])
+    monkeypatch.setattr(import_module("anglecam.measurement.clip"), "sight_clip", sighted)
+    monkeypatch.setattr(import_module("anglecam.measurement.clip"), "register_clip", readings[head])
     if neutral == "declared":
         rig = rig.model_copy(update={"neutral": -12.0})
     measured = measure_clip(path, rig, command if neutral == "rest" else None)

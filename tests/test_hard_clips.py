@@ -14,7 +14,7 @@ import yaml
 from anglecam.camera.calibration import Calibration, write_calibration
 from anglecam.io.rig import read_rig
 from anglecam.io.session import read_command
-from anglecam.measurement import Measurement, measure_clip
+from anglecam.measurement.clip import Measurement, measure_clip
 from synth.motion import move
 from synth.session import render
 from synth.spec import read_spec

@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from anglecam.budget import angle_sigma, place_errors, worst_case, worst_case_both_ends
 from anglecam.errors import InputError
 from anglecam.io.rig import Mouth, Pivot, Rig, read_rig
 from anglecam.io.session import Command, read_command
-from anglecam.measurement import measure_clip
-from anglecam.sight_clip import sight_clip
+from anglecam.measurement.clip import measure_clip
+from anglecam.measurement.mark_pass import sight_clip
+from anglecam.measurement.sigma import angle_sigma, place_errors, worst_case, worst_case_both_ends
 from support import broken
 from support.drawn import Look, Recording, draw_frames, draw_session, write_clip
 

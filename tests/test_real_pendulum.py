@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from anglecam.io.rig import Mouth, Pivot, Rig
-from anglecam.measurement import measure_clip
+from anglecam.measurement.clip import measure_clip
 
 FOLDER = Path(__file__).parents[2] / "shared" / "real" / "pendulum-red-ball"
 FRAME_S = 1 / 24

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from anglecam.response import responses
+from anglecam.measurement.step_response import responses
 from support.series import noise
 from synth.motion.nod import nod
 from synth.spec.commands import Nod

@@ -15,10 +15,10 @@ from anglecam.estimate.output_error import fit_output_error
 from anglecam.estimate.systematic import full_sigma
 from anglecam.io.rig import Rig, Sync
 from anglecam.io.session import Command, read_command, read_session, rig_beside
-from anglecam.measurement import measure_clip
+from anglecam.measurement.clip import measure_clip
+from anglecam.measurement.clock_sync import AGREED, offsets
 from anglecam.models.plant import Plant
 from anglecam.recordings import measure_session
-from anglecam.sync import AGREED, offsets
 from anglecam.vision.image.lamp import lit_between
 from synth.session import render
 

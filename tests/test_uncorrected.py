@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from anglecam.io.series_csv import AngleSeries
-from anglecam.uncorrected import uncorrected
+from anglecam.measurement.uncorrected import uncorrected
 
 TIME = np.arange(240) / 30.0
 ANGLE = np.radians(14.0) * np.sin(2.0 * TIME) * np.cos(0.7 * TIME)

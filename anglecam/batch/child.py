@@ -26,7 +26,7 @@ from anglecam.io.rig import read_rig
 from anglecam.io.series_csv import AngleSeries
 from anglecam.io.series_npz import keep_series, read_kept
 from anglecam.io.session import Recording, command_beside, read_session, rig_beside
-from anglecam.measurement import Measurement, measure_clip
+from anglecam.measurement.clip import Measurement, measure_clip
 from anglecam.recordings import gather_session, measure_recording, shown_to_loop
 from anglecam.video.frames import inspect_clip
 

@@ -1,6 +1,6 @@
 """From two tracked points to the angle in every frame: other eyes than ours, the same angle.
 
-Zero, direction, bounds and how errors travel are those of `anglecam.angles`; only the places and what is known of
+Zero, direction, bounds and how errors travel are those of `anglecam.measurement.angles`; only the places and what is known of
 their errors are made here.
 """
 
@@ -12,9 +12,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.angle_series import series_of_angles, why_zero_is_elsewhere
-from anglecam.angles import Angles, angles_of_places
-from anglecam.budget import PlaceErrors
 from anglecam.camera.lens import lens_from_rig
 from anglecam.camera.shutter import measurement_time
 from anglecam.errors import InputError, RigError
@@ -23,6 +20,9 @@ from anglecam.io.series_csv import OK, AngleSeries
 from anglecam.io.session import Command, clip_beside, recording_name
 from anglecam.io.tracks.files import read_tracks
 from anglecam.io.tracks.tracks import choose_pair
+from anglecam.measurement.angles import Angles, angles_of_places
+from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
+from anglecam.measurement.sigma import PlaceErrors
 from anglecam.video.frames import inspect_clip, read_frames
 from anglecam.vision.pivot.marker import Pivot
 

@@ -17,7 +17,7 @@ from anglecam.error_sources import error_sources
 from anglecam.gum import Propagated
 from anglecam.io.files import write_atomically, write_json
 from anglecam.io.rig import Rig
-from anglecam.measurement import Measurement
+from anglecam.measurement.clip import Measurement
 from anglecam.report.figure8 import Scene, figure8
 from anglecam.report.figures import AFTER, BEFORE, FAINT, MEASURED, STYLE, _svg
 from anglecam.video.frames import read_frames

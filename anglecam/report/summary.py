@@ -12,9 +12,9 @@ from anglecam.identification import Identified
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.result import NEXT_COMMAND, describe, sentence
-from anglecam.measurement import Measurement
+from anglecam.measurement.clip import Measurement
+from anglecam.measurement.step_response import Figure, Response
 from anglecam.measurement.tracks import MeasuredTracks
-from anglecam.response import Figure, Response
 
 
 def series_table(measurements: Sequence[Measurement | MeasuredTracks]) -> Table:

@@ -204,7 +204,7 @@ def _parts(ending: str, film: bytes) -> list[tuple[int, int]]:
 def readers() -> dict[str, Reader]:
     """Return the one reader of clips."""
     from anglecam.io.rig import Rig
-    from anglecam.measurement import measure_clip
+    from anglecam.measurement.clip import measure_clip
 
     cv2.setNumThreads(1)
     av.logging.set_level(av.logging.PANIC)

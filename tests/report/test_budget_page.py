@@ -12,7 +12,7 @@ from rich.console import Console
 
 from anglecam.io.rig import read_rig
 from anglecam.io.session import read_command
-from anglecam.measurement import measure_clip
+from anglecam.measurement.clip import measure_clip
 from anglecam.report.budget_page import budget_table, write_budget
 from anglecam.report.figure8 import touching_point
 from support.drawn import Look, Recording, draw_session

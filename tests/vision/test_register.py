@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from anglecam.io.rig import Rig
-from anglecam.measurement import measure_clip
+from anglecam.measurement.clip import measure_clip
 from synth.session import render
 
 SPEC = {

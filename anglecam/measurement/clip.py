@@ -1,7 +1,7 @@
 """From a clip to the angle in every frame: coarse by the mouth's place, fine by the whole head.
 
-`anglecam.sight_clip` finds mouth and pivot. Where more of the head than the mouth is rigid and has edges,
-`anglecam.registration` reads on and finds the turn from all of it; the more certain of the two is taken.
+`anglecam.measurement.mark_pass` finds mouth and pivot. Where more of the head than the mouth is rigid and has edges,
+`anglecam.measurement.registration_pass` reads on and finds the turn from all of it; the more certain of the two is taken.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.angle_series import series_of_angles, why_zero_is_elsewhere
-from anglecam.angles import Angles, coarse_angles, turns
 from anglecam.camera.shutter import measurement_time
-from anglecam.fine_angles import fine_angles
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import OK, AngleSeries
 from anglecam.io.session import Command, recording_name
-from anglecam.registration import Registered, Start, register_clip
-from anglecam.sight_clip import sight_clip
-from anglecam.sight_head import sight_head
-from anglecam.sighting import Sighting
-from anglecam.sync import DARK, note_on, offset_of, on_clip_clock, see_lamp
+from anglecam.measurement.angles import Angles, coarse_angles, turns
+from anglecam.measurement.clock_sync import DARK, note_on, offset_of, on_clip_clock, see_lamp
+from anglecam.measurement.detections import Sighting
+from anglecam.measurement.fine_angles import fine_angles
+from anglecam.measurement.mark_pass import sight_clip
+from anglecam.measurement.registration_pass import Registered, Start, register_clip
+from anglecam.measurement.rigid_body_pass import sight_head
+from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.video.film import decoded_once
 from anglecam.vision.mark.outline_turn import own_turn
 

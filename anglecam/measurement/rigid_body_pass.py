@@ -9,7 +9,7 @@ import numpy as np
 from anglecam.camera.lens import lens_from_rig
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import OK
-from anglecam.sighting import Sighting, find_pivot, frames_to_keep, why_truncated
+from anglecam.measurement.detections import Sighting, find_pivot, frames_to_keep, why_truncated
 from anglecam.video.frames import inspect_clip, read_frames, sample_frames
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.circle import Circle

@@ -11,11 +11,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.angles import Angles, neutral_of
 from anglecam.camera.shutter import mean_off_middle
 from anglecam.io.rig import Rig
 from anglecam.io.session import Command
-from anglecam.registration import Registered
+from anglecam.measurement.angles import Angles, neutral_of
+from anglecam.measurement.registration_pass import Registered
 from anglecam.vision.pivot.marker import Pivot
 
 Floats = NDArray[np.float64]

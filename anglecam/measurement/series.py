@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.angles import Angles
-from anglecam.budget import worst_case
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import CONTRACT_RADII_PX, OK, AngleSeries
 from anglecam.io.session import Command
+from anglecam.measurement.angles import Angles
+from anglecam.measurement.sigma import worst_case
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

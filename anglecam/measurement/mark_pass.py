@@ -19,8 +19,8 @@ from anglecam.camera.lens import Lens, lens_from_rig
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import OK
-from anglecam.sight_head import sight_head
-from anglecam.sighting import Sighting, find_pivot, frames_to_keep, why_truncated
+from anglecam.measurement.detections import Sighting, find_pivot, frames_to_keep, why_truncated
+from anglecam.measurement.rigid_body_pass import sight_head
 from anglecam.video.frames import Image, Sample, inspect_clip, read_frames, sample_frames
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.mark.search import Found, find_mouth
