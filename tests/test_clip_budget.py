@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from anglecam.clip_budget import budget_as_dict, budget_of, implied_lever, pixel_bound
+from anglecam.budget.clip import budget_as_dict, budget_of, implied_lever, pixel_bound
 from support.nod import N, nod_sources
 
 

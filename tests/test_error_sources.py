@@ -8,13 +8,13 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from anglecam.error_sources import error_sources
+from anglecam.budget.collect import error_sources
+from anglecam.budget.terms import angle_draws, courses
 from anglecam.io.rig import read_rig
 from anglecam.io.session import read_command
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.mark_pass import sight_clip
 from anglecam.measurement.registration_pass import Registered, register_clip
-from anglecam.uncertainty import angle_draws, courses
 from support.drawn import Look, Recording, draw_session
 
 LOST = slice(5, None, 9)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from anglecam.gum import Term, combine, compare, numerical_tolerance, propagate, shortest_interval, widening
+from anglecam.budget.gum import Term, combine, compare, numerical_tolerance, propagate, shortest_interval, widening
 
 
 def _term(contribution, dof=math.inf, distribution="normal"):

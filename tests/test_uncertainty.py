@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anglecam.budget.terms import ErrorSources, Tilt, angle_draws, courses
 from anglecam.camera.lens import Lens
 from anglecam.measurement.sigma import PlaceErrors, angle_sigma
-from anglecam.uncertainty import ErrorSources, Tilt, angle_draws, courses
 from support.nod import COVARIANCE, PIVOT, REST, N, nod_sources
 
 

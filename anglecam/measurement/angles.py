@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.budget.terms import Tilt
 from anglecam.camera.lens import Lens
 from anglecam.camera.shutter import mean_off_middle
 from anglecam.io.rig import Rig
@@ -17,7 +18,6 @@ from anglecam.io.session import Command
 from anglecam.measurement.detections import Sighting
 from anglecam.measurement.registration_pass import Registered
 from anglecam.measurement.sigma import PlaceErrors, angle_sigma, place_errors
-from anglecam.uncertainty import Tilt
 from anglecam.vision.pivot.marker import Pivot
 from anglecam.vision.pivot.one_centre import RigidMotion
 

@@ -12,9 +12,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from rich.table import Table
 
 from anglecam import __version__
-from anglecam.clip_budget import PAPER, Budget, FrameBudget, budget_as_dict, budget_of, implied_lever, pixel_bound
-from anglecam.error_sources import error_sources
-from anglecam.gum import Propagated
+from anglecam.budget.clip import PAPER, Budget, FrameBudget, budget_as_dict, budget_of, implied_lever, pixel_bound
+from anglecam.budget.collect import error_sources
+from anglecam.budget.gum import Propagated
 from anglecam.io.files import write_atomically, write_json
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import Measurement

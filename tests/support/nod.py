@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from anglecam.uncertainty import ErrorSources, Neutral
+from anglecam.budget.terms import ErrorSources, Neutral
 
 N = 80
 REST = np.arange(N) < 15

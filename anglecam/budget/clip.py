@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.gum import Combined, Comparison, Propagated, combine, compare, propagate
+from anglecam.budget.gum import Combined, Comparison, Propagated, combine, compare, propagate
+from anglecam.budget.terms import Course, ErrorSources, angle_draws, courses
 from anglecam.io.series_csv import CONTRACT_RADII_PX
 from anglecam.measurement.sigma import worst_case, worst_case_both_ends
-from anglecam.uncertainty import Course, ErrorSources, angle_draws, courses
 
 Floats = NDArray[np.float64]
 

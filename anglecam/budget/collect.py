@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.budget.terms import ErrorSources, Neutral
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import OK
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.clip import Measurement
 from anglecam.measurement.registration_pass import Registered
-from anglecam.uncertainty import ErrorSources, Neutral
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

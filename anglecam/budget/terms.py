@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.gum import Distribution, Term, widening
+from anglecam.budget.gum import Distribution, Term, widening
 
 Floats = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Floats]
