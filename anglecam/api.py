@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from anglecam.errors import InputError
-from anglecam.identification import Estimator, Identified, declared_start, identify_records
+from anglecam.identification.identify import Estimator, Identified, declared_start, identify_records
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import AngleSeries
 from anglecam.io.session import Session, command_beside, read_session, rig_beside
@@ -48,7 +48,7 @@ def identify(session: str | Path, estimator: Estimator = "oe2") -> Identified:
     session : path
         A folder of clips or angle series, with commands or without.
     estimator : {'ekf', 'oe2', 'oe3'}
-        See `anglecam.identification.identify_records`.
+        See `anglecam.identification.identify.identify_records`.
 
     Returns
     -------

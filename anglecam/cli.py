@@ -35,7 +35,7 @@ from anglecam.neck_cli import app as neck
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
-    from anglecam.identification import Estimator
+    from anglecam.identification.identify import Estimator
     from anglecam.measurement.clip import Measurement
     from anglecam.measurement.tracks import MeasuredTracks
     from anglecam.recordings import Measured
@@ -190,7 +190,7 @@ def identify(
     ] = None,
 ) -> None:
     """Fit a model to a session: model.json, and model.mat for MATLAB."""
-    from anglecam.identification import ESTIMATORS
+    from anglecam.identification.identify import ESTIMATORS
     from anglecam.io.neck_file import read_neck
     from anglecam.report.summary import model_table
     from anglecam.session_results import identify_session

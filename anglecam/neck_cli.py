@@ -102,7 +102,7 @@ def response(
 
     Eqs. (28) and (31), SYS1 and SYS2, as in Figs. 10, 11, 14 and 15.
     """
-    from anglecam.export import read_model
+    from anglecam.identification.export import read_model
     from anglecam.io.neck_file import read_neck
     from anglecam.neck_systems import driven_record, first_step, fitted_system, paper_systems, side_by_side
     from anglecam.report.neck_loop_figures import series_figure, step_figure

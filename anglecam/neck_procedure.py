@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from anglecam.errors import InputError
-from anglecam.export import SECOND_ORDER, read_model, transfer_function
+from anglecam.identification.export import SECOND_ORDER, read_model, transfer_function
 from anglecam.io.neck_file import Neck
 from anglecam.neck.design import (
     Relations,

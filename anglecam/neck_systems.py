@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record, record_from_series
-from anglecam.estimate.fit import Model
-from anglecam.export import FittedModel
+from anglecam.identification.export import FittedModel
+from anglecam.identification.fit import Model
 from anglecam.io.series_csv import read_series
 from anglecam.io.session import Command, command_beside, rig_beside
 from anglecam.measurement.step_response import responses

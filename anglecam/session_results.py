@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from anglecam.errors import RigError
-from anglecam.export import fitted_model, transfer_as_dict, write_mat
-from anglecam.identification import Estimator, Identified, declared_start, identify_records
+from anglecam.identification.export import fitted_model, transfer_as_dict, write_mat
+from anglecam.identification.identify import Estimator, Identified, declared_start, identify_records
 from anglecam.io.files import write_json
 from anglecam.io.series_csv import CORRECTED, write_series
 from anglecam.io.session import SERIES_ENDING, Session
@@ -48,7 +48,7 @@ def identify_session(
     out : Path
         Folder for the files.
     estimator : {'ekf', 'oe2', 'oe3', 'neck'}
-        See `anglecam.identification.identify_records`.
+        See `anglecam.identification.identify.identify_records`.
     neck : LargeAngleNeck, optional
         What is known of the neck, for ``neck``.
 

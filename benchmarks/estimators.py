@@ -26,11 +26,11 @@ from numpy.typing import NDArray
 
 import anglecam
 from anglecam.data.record import Record
-from anglecam.estimate.ekf import PAPER, EkfSettings, fit_ekf, settings_for
-from anglecam.estimate.kalman import SHARED
-from anglecam.estimate.output_error import fit_output_error
-from anglecam.estimate.smoothing import smooth
-from anglecam.identification import identify_records
+from anglecam.identification.ekf import PAPER, EkfSettings, fit_ekf, settings_for
+from anglecam.identification.identify import identify_records
+from anglecam.identification.kalman import SHARED
+from anglecam.identification.output_error import fit_output_error
+from anglecam.identification.smoothing import smooth
 from anglecam.io.rig import Rig
 from anglecam.io.session import Command
 from anglecam.models.plant import Plant

@@ -38,8 +38,8 @@ from scipy.linalg import logm
 
 import anglecam
 from anglecam.data.record import Record
-from anglecam.estimate.ekf import fit_ekf, settings_for
-from anglecam.identification import identify_records
+from anglecam.identification.ekf import fit_ekf, settings_for
+from anglecam.identification.identify import identify_records
 from anglecam.io.rig import Rig
 from anglecam.io.session import Command
 from support.transfer import SYS2_DENOMINATOR, SYS2_NUMERATOR, respond

@@ -26,10 +26,10 @@ from scipy.signal import butter, decimate, filtfilt
 
 from anglecam.data.record import Record
 from anglecam.effects import Effect, effect
-from anglecam.estimate.fit import Fit
-from anglecam.estimate.output_error import fit_output_error, predict_output_error
-from anglecam.estimate.shooting import windows
-from anglecam.estimate.start import start_parameters
+from anglecam.identification.fit import Fit
+from anglecam.identification.initial_guess import start_parameters
+from anglecam.identification.multiple_shooting import windows
+from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.io.files import write_atomically
 from anglecam.io.session import read_session
 from anglecam.loop.close import close_records

@@ -11,7 +11,7 @@ from scipy import io, signal
 
 from anglecam import cli
 from anglecam.errors import InputError
-from anglecam.export import (
+from anglecam.identification.export import (
     FittedModel,
     fitted_large_angle,
     fitted_model,
@@ -22,7 +22,7 @@ from anglecam.export import (
     unit_of,
     write_mat,
 )
-from anglecam.identification import identify_records
+from anglecam.identification.identify import identify_records
 from anglecam.io.files import write_json
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import AngleSeries, write_series
@@ -155,7 +155,7 @@ def test_units_are_read_off_names(name, unit):
 
 
 def test_loading_the_exports_does_not_load_python_control():
-    code = "import sys, anglecam.cli, anglecam.export, json; print(json.dumps('control' in sys.modules))"
+    code = "import sys, anglecam.cli, anglecam.identification.export, json; print(json.dumps('control' in sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert json.loads(done.stdout) is False
 

@@ -12,7 +12,7 @@ import pytest
 
 from anglecam.camera.calibration import read_calibration
 from anglecam.errors import AnglecamError, InputError, RigError
-from anglecam.export import read_model
+from anglecam.identification.export import read_model
 from anglecam.io.neck_file import read_neck
 from anglecam.io.rig import read_rig
 from anglecam.io.series_csv import read_series

@@ -10,9 +10,9 @@ import yaml
 
 from anglecam.effects import effect
 from anglecam.errors import RigError
-from anglecam.estimate.noise import DISTANCE, Noise
-from anglecam.estimate.output_error import fit_output_error
-from anglecam.estimate.systematic import full_sigma
+from anglecam.identification.noise import DISTANCE, Noise
+from anglecam.identification.output_error import fit_output_error
+from anglecam.identification.systematic import full_sigma
 from anglecam.io.rig import Rig, Sync
 from anglecam.io.session import Command, read_command, read_session, rig_beside
 from anglecam.measurement.clip import measure_clip

@@ -14,8 +14,8 @@ from scipy import special
 
 from anglecam.data.record import Record
 from anglecam.effects import Effect
-from anglecam.estimate.fit import Fit
-from anglecam.estimate.output_error import first_state, fit_best_start, fit_output_error, output_error
+from anglecam.identification.fit import Fit
+from anglecam.identification.output_error import first_state, fit_best_start, fit_output_error, output_error
 from anglecam.loop.holdout import Prediction, predict_unseen
 from anglecam.loop.refit import effects_of, plant_of, without
 from anglecam.loop.screen import Forecast

@@ -16,11 +16,11 @@ from threadpoolctl import threadpool_limits
 
 from anglecam.data.record import Record
 from anglecam.effects import Effect
-from anglecam.estimate.fit import Fit
-from anglecam.estimate.noise import Noise, autoregression, noise_floor
-from anglecam.estimate.output_error import fit_output_error, predict_output_error
-from anglecam.estimate.shooting import drifts, goes_astray, windows
-from anglecam.estimate.start import start_parameters
+from anglecam.identification.fit import Fit
+from anglecam.identification.initial_guess import start_parameters
+from anglecam.identification.multiple_shooting import drifts, goes_astray, windows
+from anglecam.identification.noise import Noise, autoregression, noise_floor
+from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.loop.attribute import Candidate, fit_to_more, log_likelihood_gain, promising, rivals
 from anglecam.loop.gate import LEVEL, Gate
 from anglecam.loop.holdout import Gain, Prediction, compare, predict_unseen, split_records, typical

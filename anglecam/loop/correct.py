@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from anglecam.effects import Knots, View
-from anglecam.estimate.fit import Fit
+from anglecam.identification.fit import Fit
 from anglecam.io.series_csv import AngleSeries
 from anglecam.models.plant import Plant
 

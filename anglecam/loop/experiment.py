@@ -28,8 +28,8 @@ from scipy.optimize import least_squares
 
 from anglecam.data.record import Record
 from anglecam.effects import LEDGER
-from anglecam.estimate.fit import Fit, whiten
-from anglecam.estimate.noise import Noise
+from anglecam.identification.fit import Fit, whiten
+from anglecam.identification.noise import Noise
 from anglecam.io.files import write_atomically
 from anglecam.io.session import Command
 from anglecam.loop.commands import (

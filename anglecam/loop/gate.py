@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from anglecam.data.record import Record
-from anglecam.estimate.fit import Fit, whiten
+from anglecam.identification.fit import Fit, whiten
 from anglecam.loop.screen import Direction, absorbed_space
 from anglecam.loop.torques import torque_responses
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from anglecam.data.record import Record
 from anglecam.errors import RigError
-from anglecam.estimate.fit import Fit, whiten
-from anglecam.estimate.output_error import fit_output_error, predict_output_error, predicted_angle
+from anglecam.identification.fit import Fit, whiten
+from anglecam.identification.output_error import fit_output_error, predict_output_error, predicted_angle
 
 Floats = NDArray[np.float64]
 

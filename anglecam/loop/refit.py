@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from anglecam.data.record import Record
 from anglecam.effects import Effect
-from anglecam.estimate.fit import Fit
-from anglecam.estimate.output_error import fit_output_error
+from anglecam.identification.fit import Fit
+from anglecam.identification.output_error import fit_output_error
 from anglecam.models.plant import Plant
 
 

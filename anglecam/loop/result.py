@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from anglecam.effects import Effect, Parameter, effect
-from anglecam.estimate.output_error import predict_output_error
-from anglecam.estimate.systematic import full_sigma
+from anglecam.identification.output_error import predict_output_error
+from anglecam.identification.systematic import full_sigma
 from anglecam.loop.attribute import Candidate
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import Experiment, separating_experiment, write_command

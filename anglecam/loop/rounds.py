@@ -17,8 +17,8 @@ from scipy import special
 
 from anglecam.data.record import Record
 from anglecam.effects import LEDGER, Effect
-from anglecam.estimate.fit import Fit
-from anglecam.estimate.noise import Noise, autoregression
+from anglecam.identification.fit import Fit
+from anglecam.identification.noise import Noise, autoregression
 from anglecam.loop.attribute import (
     Candidate,
     apart,

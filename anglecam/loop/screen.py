@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.record import Record
 from anglecam.effects import Effect
-from anglecam.estimate.fit import Fit, whiten
+from anglecam.identification.fit import Fit, whiten
 from anglecam.loop.refit import plant_of
 from anglecam.models.plant import Plant
 

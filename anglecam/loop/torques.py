@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
-from anglecam.estimate.fit import Fit, whiten
+from anglecam.identification.fit import Fit, whiten
 from anglecam.io.session import Command
 from anglecam.loop.refit import plant_of
 from anglecam.models.plant import Plant

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.step_figures import HIGH, LOW, first_crossing, settling
-from anglecam.estimate.fit import Model
+from anglecam.identification.fit import Model
 from anglecam.io.session import Command
 
 Floats = NDArray[np.float64]

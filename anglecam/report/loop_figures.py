@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.record import Record
 from anglecam.errors import printable
-from anglecam.estimate.fit import Fit
+from anglecam.identification.fit import Fit
 from anglecam.io.series_csv import AngleSeries
 from anglecam.io.session import Command
 from anglecam.loop.attribute import Candidate

@@ -11,7 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from anglecam import __version__
 from anglecam.effects import effect
-from anglecam.identification import Identified
+from anglecam.identification.identify import Identified
 from anglecam.io.files import write_atomically
 from anglecam.io.series_csv import CORRECTED, AngleSeries
 from anglecam.loop.close import Verdict

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from anglecam.data.record import Record
 from anglecam.effects import Effect, Knots
 from anglecam.effects import effect as entry
-from anglecam.estimate.fit import Fit
+from anglecam.identification.fit import Fit
 from anglecam.io.session import Command
 from anglecam.loop.close import Verdict
 from anglecam.loop.result import plain

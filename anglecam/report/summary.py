@@ -8,7 +8,7 @@ import numpy as np
 from rich.table import Table
 
 from anglecam.errors import printable
-from anglecam.identification import Identified
+from anglecam.identification.identify import Identified
 from anglecam.loop.close import Verdict
 from anglecam.loop.experiment import Experiment
 from anglecam.loop.result import NEXT_COMMAND, describe, sentence

@@ -22,7 +22,7 @@ from rich.progress import track
 from rich.table import Table
 from scipy.stats import norm
 
-from anglecam.estimate.output_error import fit_output_error
+from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.attribute import fit_with, promising
 from anglecam.loop.holdout import split_records
 from anglecam.loop.rounds import applicable

@@ -16,7 +16,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from anglecam.estimate.systematic import full_sigma
+from anglecam.identification.systematic import full_sigma
 from anglecam.loop.close import Verdict
 from benchmarks.blind.drawn import LEDGER, Keys
 from benchmarks.blind.sessions import look

@@ -19,7 +19,7 @@ from pydantic import ValidationError
 
 from anglecam.data.record import Record
 from anglecam.effects import View
-from anglecam.estimate.output_error import fit_output_error
+from anglecam.identification.output_error import fit_output_error
 from anglecam.io.session import Command
 from anglecam.models.plant import Plant
 from benchmarks.blind.drawn import magnified

@@ -272,7 +272,7 @@ def readers() -> dict[str, Reader]:
     from anglecam.camera.calibration import read_calibration
     from anglecam.camera.lens import lens_from_rig
     from anglecam.data.record import record_from_series
-    from anglecam.export import read_model
+    from anglecam.identification.export import read_model
     from anglecam.io.neck_file import read_neck
     from anglecam.io.rig import Marks, Rig, read_rig
     from anglecam.io.series_csv import read_series

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from anglecam.effects import effect
-from anglecam.estimate.output_error import fit_output_error
+from anglecam.identification.output_error import fit_output_error
 from anglecam.models.plant import Plant
 from benchmarks.blind.drawn import ALL, OUTSIDE, draw, magnified
 from benchmarks.blind.drawn_films import film_spec, write_case

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from anglecam.estimate.ekf import EkfSettings, fit_ekf, settings_for
+from anglecam.identification.ekf import EkfSettings, fit_ekf, settings_for
 from support.consistency import consistency, error_consistency, innovation_consistency, innovation_whiteness
 from support.motion import Plant as TruePlant
 from support.motion import Recording

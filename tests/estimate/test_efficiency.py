@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from anglecam.data.record import Record
-from anglecam.estimate.ekf import fit_ekf, settings_for
-from anglecam.estimate.output_error import fit_output_error
-from anglecam.estimate.start import start_parameters
-from anglecam.identification import identify_records
+from anglecam.identification.ekf import fit_ekf, settings_for
+from anglecam.identification.identify import identify_records
+from anglecam.identification.initial_guess import start_parameters
+from anglecam.identification.output_error import fit_output_error
 from anglecam.io.rig import Rig
 from anglecam.io.session import Command
 from anglecam.models.plant import Plant

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from anglecam.errors import RigError
-from anglecam.estimate.fit import Fit
-from anglecam.estimate.output_error import fit_output_error, predict_output_error
-from anglecam.estimate.start import start_parameters
-from anglecam.identification import identify_records
+from anglecam.identification.fit import Fit
+from anglecam.identification.identify import identify_records
+from anglecam.identification.initial_guess import start_parameters
+from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.io.rig import Rig
 from anglecam.models.large_angle import LargeAngle
 from anglecam.models.plant import Plant

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from anglecam.data.record import Record
-from anglecam.estimate.output_error import fit_output_error, predict_output_error
-from anglecam.estimate.start import start_parameters
-from anglecam.identification import identify_records
+from anglecam.identification.identify import identify_records
+from anglecam.identification.initial_guess import start_parameters
+from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.io.rig import Rig
 from anglecam.models.plant import Plant
 from support.motion import Plant as TruePlant

@@ -7,8 +7,8 @@ import pytest
 
 from anglecam.data.record import Record
 from anglecam.effects import effect
-from anglecam.estimate.output_error import fit_output_error
-from anglecam.estimate.shooting import drifts, goes_astray, windows
+from anglecam.identification.multiple_shooting import drifts, goes_astray, windows
+from anglecam.identification.output_error import fit_output_error
 from anglecam.io.session import Command
 from anglecam.models.plant import Plant
 

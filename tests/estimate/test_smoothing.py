@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from anglecam.estimate.ekf import fit_ekf, settings_for
-from anglecam.estimate.kalman import filter_record
-from anglecam.estimate.smoothing import smooth
+from anglecam.identification.ekf import fit_ekf, settings_for
+from anglecam.identification.kalman import filter_record
+from anglecam.identification.smoothing import smooth
 from support.consistency import error_consistency
 from support.motion import Plant as TruePlant
 from support.motion import Recording, move

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from anglecam.effects import effect
-from anglecam.estimate.noise import Noise
-from anglecam.estimate.output_error import fit_output_error
-from anglecam.estimate.systematic import full_sigma
-from anglecam.identification import identify_records
+from anglecam.identification.identify import identify_records
+from anglecam.identification.noise import Noise
+from anglecam.identification.output_error import fit_output_error
+from anglecam.identification.systematic import full_sigma
 from anglecam.io.rig import Rig
 from anglecam.models.plant import Plant
 from support.motion import Plant as TruePlant

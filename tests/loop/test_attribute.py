@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from anglecam.effects import effect
-from anglecam.estimate.noise import DISTANCE, Noise
-from anglecam.estimate.output_error import fit_output_error
+from anglecam.identification.noise import DISTANCE, Noise
+from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.attribute import SLOW, Candidate, apart, fit_beneath, fit_with, log_likelihood_gain, rivals
 from anglecam.loop.holdout import split_records
 from anglecam.loop.rounds import Task, candidates_of, look

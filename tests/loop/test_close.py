@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from anglecam.errors import RigError
-from anglecam.estimate.output_error import fit_output_error
+from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.close import close_records
 from anglecam.loop.holdout import Prediction, predict_unseen, split_records
 from anglecam.loop.result import sentence, verdict_as_dict

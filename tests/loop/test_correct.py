@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anglecam.effects import View, effect
-from anglecam.estimate.fit import Fit
+from anglecam.identification.fit import Fit
 from anglecam.io.series_csv import AngleSeries
 from anglecam.loop.correct import corrected
 from anglecam.models.plant import Plant

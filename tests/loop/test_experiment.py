@@ -10,10 +10,10 @@ import yaml
 
 from anglecam.data.record import Record
 from anglecam.effects import effect
-from anglecam.estimate.fit import Fit
-from anglecam.estimate.noise import Noise
-from anglecam.estimate.output_error import fit_output_error
-from anglecam.estimate.start import start_parameters
+from anglecam.identification.fit import Fit
+from anglecam.identification.initial_guess import start_parameters
+from anglecam.identification.noise import Noise
+from anglecam.identification.output_error import fit_output_error
 from anglecam.io.session import Command, read_command
 from anglecam.loop.attribute import fit_with
 from anglecam.loop.commands import candidate_commands, limits_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anglecam.effects import effect
-from anglecam.estimate.output_error import fit_output_error
+from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.attribute import fit_with
 from anglecam.loop.gate import test_residual as _test_residual  # pytest would take it for a test of its own
 from anglecam.loop.holdout import split_records

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from anglecam.effects import effect
-from anglecam.estimate.output_error import fit_output_error
-from anglecam.identification import identify_records
+from anglecam.identification.identify import identify_records
+from anglecam.identification.output_error import fit_output_error
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import AngleSeries
 from anglecam.io.session import Command, read_command

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from anglecam.data.record import Record
-from anglecam.estimate.fit import Fit
-from anglecam.estimate.noise import Noise
+from anglecam.identification.fit import Fit
+from anglecam.identification.noise import Noise
 from anglecam.loop.remainder import leftover_torque
 from anglecam.models.plant import Plant
 from support.series import noise

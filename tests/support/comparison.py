@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
-from anglecam.estimate.fit import Fit
-from anglecam.estimate.output_error import predict_output_error
+from anglecam.identification.fit import Fit
+from anglecam.identification.output_error import predict_output_error
 
 Floats = NDArray[np.float64]
 

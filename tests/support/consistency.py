@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import special
 
-from anglecam.estimate.ekf import EkfEstimate
+from anglecam.identification.ekf import EkfEstimate
 
 Floats = NDArray[np.float64]
 

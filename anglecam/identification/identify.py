@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from anglecam.data.record import Record
 from anglecam.errors import RigError
-from anglecam.estimate.fit import Fit
-from anglecam.estimate.noise import autoregression, noise_floor
-from anglecam.estimate.output_error import fit_output_error, predict_output_error
-from anglecam.estimate.start import start_parameters
-from anglecam.estimate.systematic import systematic_covariance
+from anglecam.identification.fit import Fit
+from anglecam.identification.initial_guess import start_parameters
+from anglecam.identification.noise import autoregression, noise_floor
+from anglecam.identification.output_error import fit_output_error, predict_output_error
+from anglecam.identification.systematic import systematic_covariance
 from anglecam.io.rig import Rig
 from anglecam.models.large_angle import DEFAULT, FREE_SWING, LargeAngle
 from anglecam.models.plant import Plant
@@ -171,7 +171,10 @@ def declared_start(rig: Rig) -> Floats:
 
 
 def _by_filter(fit: Fit, records: Sequence[Record], start: Floats) -> tuple[Fit, Floats, Floats]:
-    from anglecam.estimate.ekf import fit_ekf, settings_for  # filterpy takes a second to load, which others are spared
+    from anglecam.identification.ekf import (  # filterpy takes a second to load, which others are spared
+        fit_ekf,
+        settings_for,
+    )
 
     noise = noise_floor(records)
     sigma = max(noise.sigma if noise else 0.0, fit.rmse)

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
-from anglecam.estimate.fit import Fit
-from anglecam.estimate.noise import Noise
+from anglecam.identification.fit import Fit
+from anglecam.identification.noise import Noise
 
 Floats = NDArray[np.float64]
 

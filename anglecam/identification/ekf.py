@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
-from anglecam.estimate.kalman import SHARED, Filtered, filter_record
-from anglecam.estimate.smoothing import smooth_first_states
+from anglecam.identification.kalman import SHARED, Filtered, filter_record
+from anglecam.identification.smoothing import smooth_first_states
 from anglecam.models.plant import Plant
 
 Floats = NDArray[np.float64]
@@ -62,7 +62,7 @@ class EkfEstimate:
     covariance: Floats
     """(3, 3), SI."""
     filtered: tuple[Filtered, ...]
-    """The last pass, recording by recording; `anglecam.estimate.smoothing.smooth` takes it."""
+    """The last pass, recording by recording; `anglecam.identification.smoothing.smooth` takes it."""
     passes: int
     """Passes made."""
     settled: bool

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import LEAST_FRAMES, Record
-from anglecam.estimate.fit import Fit
+from anglecam.identification.fit import Fit
 
 Floats = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.estimate.kalman import SHARED, Filtered, measured
+from anglecam.identification.kalman import SHARED, Filtered, measured
 
 Floats = NDArray[np.float64]
 

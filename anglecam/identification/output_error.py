@@ -18,7 +18,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from threadpoolctl import ThreadpoolController
 
 from anglecam.data.record import Record
-from anglecam.estimate.fit import Fit, Model, whiten
+from anglecam.identification.fit import Fit, Model, whiten
 
 Floats = NDArray[np.float64]
 

@@ -1,1 +1,0 @@
-"""From an angle series and its command to a model's parameters, with how sure they are."""
