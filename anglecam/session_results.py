@@ -14,9 +14,9 @@ from anglecam.io.series_csv import CORRECTED, write_series
 from anglecam.io.session import SERIES_ENDING, Session
 from anglecam.loop.close import Verdict, close_records
 from anglecam.loop.correct import corrected
-from anglecam.loop.experiment import Experiment
-from anglecam.loop.holdout import split_records
-from anglecam.loop.result import next_experiment, verdict_as_dict, write_next_command
+from anglecam.loop.cross_validation import split_records
+from anglecam.loop.loop_json import next_experiment, verdict_as_dict, write_next_command
+from anglecam.loop.next_experiment.design import Experiment
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.recordings import Measured, Shown
 from anglecam.report.page import write_report

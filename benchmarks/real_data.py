@@ -33,7 +33,7 @@ from anglecam.identification.output_error import fit_output_error, predict_outpu
 from anglecam.io.files import write_atomically
 from anglecam.io.session import read_session
 from anglecam.loop.close import close_records
-from anglecam.loop.holdout import Prediction, predict_unseen, split_records
+from anglecam.loop.cross_validation import Prediction, predict_unseen, split_records
 from anglecam.models.plant import Plant
 from anglecam.recordings import measure_session
 

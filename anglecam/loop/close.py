@@ -1,6 +1,6 @@
 """The loop: fit, test the residual, name the effect, add it, prove it on what was not fitted, and again.
 
-    base fit → rounds of `anglecam.loop.rounds` → verdict
+    base fit → rounds of `anglecam.loop.stepwise` → verdict
 
 What remains after the last round, and would still be seen, is ``unexplained``.
 """
@@ -21,12 +21,12 @@ from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.multiple_shooting import drifts, goes_astray, windows
 from anglecam.identification.noise import Noise, autoregression, noise_floor
 from anglecam.identification.output_error import fit_output_error, predict_output_error
-from anglecam.loop.attribute import Candidate, fit_to_more, log_likelihood_gain, promising, rivals
-from anglecam.loop.gate import LEVEL, Gate
-from anglecam.loop.holdout import Gain, Prediction, compare, predict_unseen, split_records, typical
+from anglecam.loop.candidates import Candidate, fit_to_more, log_likelihood_gain, promising, rivals
+from anglecam.loop.cross_validation import Gain, Prediction, compare, predict_unseen, split_records, typical
 from anglecam.loop.refit import effects_of, left_of, recoloured, with_last, without
-from anglecam.loop.rounds import SURE, Round, Task, applicable, candidates_of, look, smallest, trace
+from anglecam.loop.residual_test import LEVEL, Gate
 from anglecam.loop.screen import changes, directions, forecasts
+from anglecam.loop.stepwise import SURE, Round, Task, applicable, candidates_of, look, smallest, trace
 from anglecam.models.plant import Plant
 
 CONTRADICTED = 3.0

@@ -16,12 +16,12 @@ from anglecam.errors import printable
 from anglecam.identification.fit import Fit
 from anglecam.io.series_csv import AngleSeries
 from anglecam.io.session import Command
-from anglecam.loop.attribute import Candidate
+from anglecam.loop.candidates import Candidate
 from anglecam.loop.close import Verdict
-from anglecam.loop.experiment import SETTLE, Experiment
-from anglecam.loop.holdout import Prediction
+from anglecam.loop.cross_validation import Prediction
+from anglecam.loop.loop_json import plain
+from anglecam.loop.next_experiment.design import SETTLE, Experiment
 from anglecam.loop.remainder import Remainder
-from anglecam.loop.result import plain
 from anglecam.models.plant import Plant
 from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, STYLE, _svg
 

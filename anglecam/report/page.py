@@ -15,13 +15,13 @@ from anglecam.identification.identify import Identified
 from anglecam.io.files import write_atomically
 from anglecam.io.series_csv import CORRECTED, AngleSeries
 from anglecam.loop.close import Verdict
-from anglecam.loop.experiment import Experiment
-from anglecam.loop.gate import Test
-from anglecam.loop.holdout import LEFT_OUT, TURNS
+from anglecam.loop.cross_validation import LEFT_OUT, TURNS
+from anglecam.loop.loop_json import NEXT_COMMAND, plain, sentence, size_of, split_unit, with_uncertainty
+from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.refit import plant_of
 from anglecam.loop.remainder import leftover_torque
-from anglecam.loop.result import NEXT_COMMAND, plain, sentence, size_of, split_unit, with_uncertainty
-from anglecam.loop.rounds import applicable
+from anglecam.loop.residual_test import Test
+from anglecam.loop.stepwise import applicable
 from anglecam.report import loop_figures as figures
 from anglecam.report.path_figure import path_figure
 
@@ -68,9 +68,9 @@ def write_report(
     verdict : Verdict
         From `anglecam.loop.close.close_records`.
     result : dict
-        The same as ``loop.json`` holds it, from `anglecam.loop.result.verdict_as_dict`.
+        The same as ``loop.json`` holds it, from `anglecam.loop.loop_json.verdict_as_dict`.
     experiment : Experiment or None
-        What to record next, from `anglecam.loop.result.next_experiment`.
+        What to record next, from `anglecam.loop.loop_json.next_experiment`.
     series : sequence of AngleSeries
         What was measured.
     models : sequence of Identified

@@ -21,8 +21,8 @@ from anglecam.effects import effect as entry
 from anglecam.identification.fit import Fit
 from anglecam.io.session import Command
 from anglecam.loop.close import Verdict
-from anglecam.loop.result import plain
-from anglecam.loop.rounds import applicable
+from anglecam.loop.loop_json import plain
+from anglecam.loop.stepwise import applicable
 from anglecam.report.figures import AFTER, COMMAND, MEASURED, STYLE, _svg
 
 Floats = NDArray[np.float64]

@@ -10,8 +10,8 @@ from rich.table import Table
 from anglecam.errors import printable
 from anglecam.identification.identify import Identified
 from anglecam.loop.close import Verdict
-from anglecam.loop.experiment import Experiment
-from anglecam.loop.result import NEXT_COMMAND, describe, sentence
+from anglecam.loop.loop_json import NEXT_COMMAND, describe, sentence
+from anglecam.loop.next_experiment.design import Experiment
 from anglecam.measurement.clip import Measurement
 from anglecam.measurement.step_response import Figure, Response
 from anglecam.measurement.tracks import MeasuredTracks

@@ -23,10 +23,10 @@ from rich.table import Table
 from scipy.stats import norm
 
 from anglecam.identification.output_error import fit_output_error
-from anglecam.loop.attribute import fit_with, promising
-from anglecam.loop.holdout import split_records
-from anglecam.loop.rounds import applicable
+from anglecam.loop.candidates import fit_with, promising
+from anglecam.loop.cross_validation import split_records
 from anglecam.loop.screen import changes, directions, forecasts
+from anglecam.loop.stepwise import applicable
 from anglecam.models.plant import Plant
 from benchmarks.blind.attribution import CASES, SIGMA_DEG
 from benchmarks.blind.drawn import draw

@@ -8,10 +8,10 @@ import pytest
 from anglecam.effects import effect
 from anglecam.identification.noise import DISTANCE, Noise
 from anglecam.identification.output_error import fit_output_error
-from anglecam.loop.attribute import SLOW, Candidate, apart, fit_beneath, fit_with, log_likelihood_gain, rivals
-from anglecam.loop.holdout import split_records
-from anglecam.loop.rounds import Task, candidates_of, look
+from anglecam.loop.candidates import SLOW, Candidate, apart, fit_beneath, fit_with, log_likelihood_gain, rivals
+from anglecam.loop.cross_validation import split_records
 from anglecam.loop.screen import changes, directions, forecasts
+from anglecam.loop.stepwise import Task, candidates_of, look
 from anglecam.models.plant import Plant
 from benchmarks.blind.drawn import draw
 from benchmarks.blind.sessions import HELD_OUT, session

@@ -10,9 +10,9 @@ import pytest
 from anglecam.errors import RigError
 from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.close import close_records
-from anglecam.loop.holdout import Prediction, predict_unseen, split_records
-from anglecam.loop.result import sentence, verdict_as_dict
-from anglecam.loop.rounds import applicable
+from anglecam.loop.cross_validation import Prediction, predict_unseen, split_records
+from anglecam.loop.loop_json import sentence, verdict_as_dict
+from anglecam.loop.stepwise import applicable
 from anglecam.models.plant import Plant
 from benchmarks.blind.sessions import session as drawn_session
 from support.motion import Plant as TruePlant

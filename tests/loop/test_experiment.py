@@ -15,9 +15,9 @@ from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.noise import Noise
 from anglecam.identification.output_error import fit_output_error
 from anglecam.io.session import Command, read_command
-from anglecam.loop.attribute import fit_with
-from anglecam.loop.commands import candidate_commands, limits_of
-from anglecam.loop.experiment import ENOUGH, separating_experiment, write_command
+from anglecam.loop.candidates import fit_with
+from anglecam.loop.next_experiment.commands import candidate_commands, limits_of
+from anglecam.loop.next_experiment.design import ENOUGH, separating_experiment, write_command
 from anglecam.loop.screen import Forecast
 from anglecam.models.plant import Plant
 from synth.motion import move

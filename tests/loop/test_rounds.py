@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from anglecam.loop.rounds import faintest
+from anglecam.loop.stepwise import faintest
 
 CAMERA = 2e-4
 

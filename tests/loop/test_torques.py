@@ -7,11 +7,11 @@ import pytest
 
 from anglecam.effects import effect
 from anglecam.identification.output_error import fit_output_error
-from anglecam.loop.attribute import fit_with
-from anglecam.loop.gate import test_residual as _test_residual  # pytest would take it for a test of its own
-from anglecam.loop.holdout import split_records
+from anglecam.loop.candidates import fit_with
+from anglecam.loop.cross_validation import split_records
+from anglecam.loop.residual_test import test_residual as _test_residual  # pytest would take it for a test of its own
 from anglecam.loop.screen import changes, directions, forecasts
-from anglecam.loop.torques import torque_responses
+from anglecam.loop.state_torques import torque_responses
 from anglecam.models.plant import Plant
 from benchmarks.blind.sessions import HELD_OUT, session
 

@@ -16,8 +16,8 @@ from anglecam.io.rig import Rig
 from anglecam.io.series_csv import AngleSeries
 from anglecam.io.session import Command, read_command
 from anglecam.loop.close import Accepted, close_records
-from anglecam.loop.experiment import Experiment
-from anglecam.loop.result import next_experiment, sentence, split_unit, verdict_as_dict, write_next_command
+from anglecam.loop.loop_json import next_experiment, sentence, split_unit, verdict_as_dict, write_next_command
+from anglecam.loop.next_experiment.design import Experiment
 from anglecam.report.page import p_in_words, unseen_in_words, write_report
 from support.motion import Plant
 from support.series import session

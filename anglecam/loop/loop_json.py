@@ -10,10 +10,10 @@ import numpy as np
 from anglecam.effects import Effect, Parameter, effect
 from anglecam.identification.output_error import predict_output_error
 from anglecam.identification.systematic import full_sigma
-from anglecam.loop.attribute import Candidate
+from anglecam.loop.candidates import Candidate
 from anglecam.loop.close import Verdict
-from anglecam.loop.experiment import Experiment, separating_experiment, write_command
-from anglecam.loop.holdout import predict_unseen
+from anglecam.loop.cross_validation import predict_unseen
+from anglecam.loop.next_experiment.design import Experiment, separating_experiment, write_command
 
 MODEL_NAMES = ("a_per_s", "b_per_s2", "c_per_s2")
 NEXT_COMMAND = "next.command.csv"

@@ -32,7 +32,7 @@ from anglecam.identification.fit import Fit, whiten
 from anglecam.identification.noise import Noise
 from anglecam.io.files import write_atomically
 from anglecam.io.session import Command
-from anglecam.loop.commands import (
+from anglecam.loop.next_experiment.commands import (
     LONGEST,
     Candidate,
     beginning,

@@ -19,7 +19,7 @@ from anglecam.data.record import Record
 from anglecam.effects import LEDGER, Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.noise import Noise, autoregression
-from anglecam.loop.attribute import (
+from anglecam.loop.candidates import (
     Candidate,
     apart,
     fit_beneath,
@@ -29,9 +29,9 @@ from anglecam.loop.attribute import (
     promising,
     side_by_side,
 )
-from anglecam.loop.gate import Gate, test_residual
-from anglecam.loop.holdout import Prediction, compare, predict_unseen
+from anglecam.loop.cross_validation import Prediction, compare, predict_unseen
 from anglecam.loop.refit import effects_of, left_of, recoloured, without
+from anglecam.loop.residual_test import Gate, test_residual
 from anglecam.loop.screen import Change, Forecast, changes, directions, forecasts
 
 MOST_EFFECTS = 3

@@ -23,7 +23,7 @@ from scipy import special
 from anglecam.data.record import Record
 from anglecam.identification.fit import Fit, whiten
 from anglecam.loop.screen import Direction, absorbed_space
-from anglecam.loop.torques import torque_responses
+from anglecam.loop.state_torques import torque_responses
 
 Floats = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from anglecam.data.record import Record
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.output_error import first_state, fit_best_start, fit_output_error, output_error
-from anglecam.loop.holdout import Prediction, predict_unseen
+from anglecam.loop.cross_validation import Prediction, predict_unseen
 from anglecam.loop.refit import effects_of, plant_of, without
 from anglecam.loop.screen import Forecast
 from anglecam.threads import native_threads

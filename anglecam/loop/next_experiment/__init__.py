@@ -1,0 +1,1 @@
+"""The experiment that would separate models which the recordings cannot tell apart."""
