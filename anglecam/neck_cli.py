@@ -20,7 +20,7 @@ from anglecam.io.files import json_text, write_json
 from anglecam.terminal import make_folder, screen
 
 if TYPE_CHECKING:
-    from anglecam.report.neck_numbers import Numbers
+    from anglecam.neck_design.numbers import Numbers
 
 app = typer.Typer(
     help="The paper's design calculations: linkage, statics, responses, design, control, sensitivities, power.",
@@ -49,9 +49,9 @@ def kinematics(
 ) -> None:
     """Work out four-bar and turning mechanism: Table 3, limits, commands of wanted nods."""
     from anglecam.io.neck_file import read_neck
-    from anglecam.report.neck_figures import kinematics_figure, turning_figure
-    from anglecam.report.neck_numbers import kinematics_numbers
-    from anglecam.report.neck_tables import kinematics_tables
+    from anglecam.neck_design.figures import kinematics_figure, turning_figure
+    from anglecam.neck_design.numbers import kinematics_numbers
+    from anglecam.neck_design.tables import kinematics_tables
 
     if any(math.isnan(a) for a in angle or ()):
         raise RigError("--angle nan: not a number")
@@ -76,9 +76,9 @@ def statics(
 ) -> None:
     """Hold spring against weight: balance, pretension, the servo's torque."""
     from anglecam.io.neck_file import read_neck
-    from anglecam.report.neck_figures import statics_figure
-    from anglecam.report.neck_numbers import statics_numbers
-    from anglecam.report.neck_tables import statics_tables
+    from anglecam.neck_design.figures import statics_figure
+    from anglecam.neck_design.numbers import statics_numbers
+    from anglecam.neck_design.tables import statics_tables
 
     with _call(neck):
         made = read_neck(neck)
@@ -104,10 +104,10 @@ def response(
     """
     from anglecam.identification.export import read_model
     from anglecam.io.neck_file import read_neck
-    from anglecam.neck_systems import driven_record, first_step, fitted_system, paper_systems, side_by_side
-    from anglecam.report.neck_loop_figures import series_figure, step_figure
-    from anglecam.report.neck_loop_numbers import response_numbers
-    from anglecam.report.neck_loop_tables import response_tables
+    from anglecam.neck_design.loop_figures import series_figure, step_figure
+    from anglecam.neck_design.loop_numbers import response_numbers
+    from anglecam.neck_design.loop_tables import response_tables
+    from anglecam.neck_design.systems import driven_record, first_step, fitted_system, paper_systems, side_by_side
 
     with _call(neck):
         if not 0.0 < abs(step) < 180.0:
@@ -160,10 +160,10 @@ def design(
     from anglecam.neck.linear import linear_neck
     from anglecam.neck.pd_tuning import ADULT
     from anglecam.neck.synthesis import Wish, synthesise
-    from anglecam.neck_procedure import explain, identified_motion, routes_of, wish_of
-    from anglecam.report.neck_loop_figures import design_figure, synthesis_figure
-    from anglecam.report.neck_loop_numbers import design_numbers
-    from anglecam.report.neck_loop_tables import contradictions, design_tables
+    from anglecam.neck_design.loop_figures import design_figure, synthesis_figure
+    from anglecam.neck_design.loop_numbers import design_numbers
+    from anglecam.neck_design.loop_tables import contradictions, design_tables
+    from anglecam.neck_design.procedure import explain, identified_motion, routes_of, wish_of
 
     with _call(neck):
         made = read_neck(neck)
@@ -207,11 +207,11 @@ def pd(
     from anglecam.io.neck_file import read_neck
     from anglecam.neck.pd import PdGains, close_loop, gains_table
     from anglecam.neck.pd_tuning import tune_pd
-    from anglecam.neck_procedure import chosen_plant, default_gains, simulated_loop, wanted_nod
-    from anglecam.report.neck_demand import saturation_notes
-    from anglecam.report.neck_loop_figures import pd_figure, tuning_figure
-    from anglecam.report.neck_loop_numbers import pd_numbers
-    from anglecam.report.neck_loop_tables import pd_tables
+    from anglecam.neck_design.demand import saturation_notes
+    from anglecam.neck_design.loop_figures import pd_figure, tuning_figure
+    from anglecam.neck_design.loop_numbers import pd_numbers
+    from anglecam.neck_design.loop_tables import pd_tables
+    from anglecam.neck_design.procedure import chosen_plant, default_gains, simulated_loop, wanted_nod
 
     with _call(neck):
         if model is not None and neck is not None:
@@ -251,9 +251,9 @@ def sensitivity(neck: NeckFile = None, out: Out = None, as_json: Json = False) -
     """
     from anglecam.io.neck_file import read_neck
     from anglecam.neck.sensitivity import figure_9, sensitivities
-    from anglecam.report.neck_figures import sensitivity_figure
-    from anglecam.report.neck_numbers import sensitivity_numbers
-    from anglecam.report.neck_tables import sensitivity_tables
+    from anglecam.neck_design.figures import sensitivity_figure
+    from anglecam.neck_design.numbers import sensitivity_numbers
+    from anglecam.neck_design.tables import sensitivity_tables
 
     with _call(neck):
         parameters = read_neck(neck).parameters
@@ -277,9 +277,9 @@ def power(
     As in Figs. 12 and 13.
     """
     from anglecam.neck.power import power_use, read_power_log
-    from anglecam.report.neck_figures import power_figure
-    from anglecam.report.neck_numbers import power_numbers
-    from anglecam.report.neck_tables import power_tables
+    from anglecam.neck_design.figures import power_figure
+    from anglecam.neck_design.numbers import power_numbers
+    from anglecam.neck_design.tables import power_tables
 
     spans = [_span(text) for text in nod or ()]
     read = read_power_log(log)
@@ -298,7 +298,7 @@ def _tell(
     notes: Sequence[str] = (),
 ) -> None:
     """Print what was worked out and, where asked for, write it with its figures."""
-    from anglecam.report.neck_numbers import without_dust
+    from anglecam.neck_design.numbers import without_dust
 
     numbers = without_dust(numbers)
     if out is not None:

@@ -16,8 +16,8 @@ from anglecam.io.files import write_json
 from anglecam.io.neck_file import read_neck
 from anglecam.io.series_csv import AngleSeries, write_series
 from anglecam.io.session import Command
-from anglecam.neck_systems import paper_systems, second_order, side_by_side
-from anglecam.report.neck_tables import with_sigma
+from anglecam.neck_design.systems import paper_systems, second_order, side_by_side
+from anglecam.neck_design.tables import with_sigma
 from support.motion import Plant
 from support.series import session
 

@@ -6,7 +6,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from anglecam import neck_procedure as procedure
 from anglecam.io.neck_file import read_neck
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.parameters import PAPER
@@ -15,8 +14,10 @@ from anglecam.neck.pd_tuning import Nod, tune_pd
 from anglecam.neck.power import PowerLog, power_use
 from anglecam.neck.sensitivity import figure_9
 from anglecam.neck.synthesis import Wish, synthesise
-from anglecam.neck_systems import STEP, paper_systems, side_by_side
-from anglecam.report import neck_figures, neck_loop_figures
+from anglecam.neck_design import figures as neck_figures
+from anglecam.neck_design import loop_figures as neck_loop_figures
+from anglecam.neck_design import procedure
+from anglecam.neck_design.systems import STEP, paper_systems, side_by_side
 
 NECK = read_neck(None)
 UNITS = ("°", ", s", " V", ", A", ", W", "%", "N·m", "V/rad")

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from rich.table import Table
 
 from anglecam.neck.constraints import shown
-from anglecam.report.neck_loop_numbers import UNITS, key_of, spoken_unit
-from anglecam.report.neck_numbers import Numbers
-from anglecam.report.neck_tables import FIGURE_COLUMNS, amount, demand_fact, pairs, say, step_cells, table, with_sigma
+from anglecam.neck_design.loop_numbers import UNITS, key_of, spoken_unit
+from anglecam.neck_design.numbers import Numbers
+from anglecam.neck_design.tables import FIGURE_COLUMNS, amount, demand_fact, pairs, say, step_cells, table, with_sigma
 
 ROUTES = {
     "by_inertia": "known: inertia, spring, weight, C",

@@ -18,10 +18,10 @@ from anglecam.neck.pd_tuning import Nod, Tuned
 from anglecam.neck.step import linear_step_figures
 from anglecam.neck.synthesis import Synthesis
 from anglecam.neck.variation import NOD, PARAMETERS
-from anglecam.neck_procedure import Plant
-from anglecam.neck_systems import System
-from anglecam.report.neck_demand import demand_notes, demand_numbers, saturation_notes
-from anglecam.report.neck_numbers import UNSTABLE, Numbers, step_numbers
+from anglecam.neck_design.demand import demand_notes, demand_numbers, saturation_notes
+from anglecam.neck_design.numbers import UNSTABLE, Numbers, step_numbers
+from anglecam.neck_design.procedure import Plant
+from anglecam.neck_design.systems import System
 
 UNITS = {
     "a": "per_s",

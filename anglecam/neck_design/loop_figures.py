@@ -19,10 +19,10 @@ from anglecam.neck.pd import ClosedLoop, PdGains, PdMotion, loop_response
 from anglecam.neck.pd_tuning import Tuned
 from anglecam.neck.step import linear_step
 from anglecam.neck.synthesis import Synthesis
-from anglecam.neck_procedure import Plant
-from anglecam.neck_systems import SideBySide, System
+from anglecam.neck_design.figures import SERIES, mark_step, save
+from anglecam.neck_design.procedure import Plant
+from anglecam.neck_design.systems import SideBySide, System
 from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, STYLE
-from anglecam.report.neck_figures import SERIES, mark_step, save
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from rich.table import Table
 
-from anglecam.report.neck_numbers import Numbers
+from anglecam.neck_design.numbers import Numbers
 
 _ROUNDING = 1e-12
 """Of a value, below which its standard uncertainty is the arithmetic's and the value counts as exact."""

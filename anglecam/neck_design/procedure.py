@@ -42,7 +42,7 @@ from anglecam.neck.pd import (
 )
 from anglecam.neck.pd_tuning import ADULT, Nod, nod_from_responses
 from anglecam.neck.synthesis import Wish
-from anglecam.neck_systems import STEP, SYS1
+from anglecam.neck_design.systems import STEP, SYS1
 
 if TYPE_CHECKING:
     import control

@@ -40,7 +40,7 @@ from anglecam.neck.turning import (
     turning_start_torque,
 )
 from anglecam.neck.variation import NOD, PARAMETERS, nod_range, nod_slope
-from anglecam.report.neck_demand import SUPPLY, demand_notes, demand_numbers
+from anglecam.neck_design.demand import SUPPLY, demand_notes, demand_numbers
 
 Numbers = dict[str, Any]
 

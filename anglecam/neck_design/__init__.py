@@ -1,0 +1,1 @@
+"""The paper's design calculations on top of its equations: procedure, systems, tables, figures."""
