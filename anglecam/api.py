@@ -11,7 +11,7 @@ from anglecam.io.rig import Rig
 from anglecam.io.series_csv import AngleSeries
 from anglecam.io.session import Session, command_beside, read_session, rig_beside
 from anglecam.loop.close import Verdict, close_records
-from anglecam.recordings import Measured, measure_recording, measure_session, shown_to_loop
+from anglecam.workflow.recordings import Measured, measure_recording, measure_session, shown_to_loop
 
 
 def measure(clip: str | Path, rig: Rig | None = None) -> AngleSeries:

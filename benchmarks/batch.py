@@ -43,7 +43,7 @@ BARE = """
 import sys, cv2
 from pathlib import Path
 from anglecam.measurement.clip import measure_clip
-from anglecam.clip_results import write_measurement
+from anglecam.workflow.clip import write_measurement
 from anglecam.io.session import rig_beside
 cv2.setNumThreads(1)
 for clip in sorted(Path(sys.argv[1]).glob("*.avi")):

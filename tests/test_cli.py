@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anglecam.cli import main
+from anglecam.cli.app import main
 from anglecam.io.series_csv import COLUMNS, AngleSeries, write_series
 from support import broken
 from support.drawn import Look, Plant, Recording, draw_session

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from pyarrow import parquet
 
-from anglecam import cli
+from anglecam.cli.app import app as cli
 from anglecam.io.netcdf_parquet import Also, write_also, write_netcdf, write_parquet
 from anglecam.io.series_csv import COLUMNS, AngleSeries, read_series, write_series
 from support.tracked import nod, write_sleap

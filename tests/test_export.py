@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import io, signal
 
-from anglecam import cli
+from anglecam.cli.app import app as cli
 from anglecam.errors import InputError
 from anglecam.identification.export import (
     FittedModel,
@@ -155,7 +155,7 @@ def test_units_are_read_off_names(name, unit):
 
 
 def test_loading_the_exports_does_not_load_python_control():
-    code = "import sys, anglecam.cli, anglecam.identification.export, json; print(json.dumps('control' in sys.modules))"
+    code = "import sys, anglecam.cli.app, anglecam.identification.export, json; print(json.dumps('control' in sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert json.loads(done.stdout) is False
 

@@ -11,7 +11,7 @@ from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Marks, Rig, read_rig
 from anglecam.io.series_csv import COLUMNS, AngleSeries, read_series, write_series
 from anglecam.io.session import Command, find_measurable, read_command, read_session
-from anglecam.recordings import measure_session
+from anglecam.workflow.recordings import measure_session
 from support import broken
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anglecam import cli
+from anglecam.cli.app import app as cli
 from anglecam.data.record import Record
 from anglecam.io.files import write_json
 from anglecam.io.neck_file import read_neck

@@ -17,7 +17,7 @@ from anglecam.io.series_csv import AngleSeries, read_series, write_series
 from anglecam.report.figures import plot_series
 from support.drawn import Look, draw_frames, write_clip
 
-COMMAND = "from anglecam.cli import main; main()"
+COMMAND = "from anglecam.cli.app import main; main()"
 NAMES = [
     "line\nbreak",
     "escape\x1b[2J",

@@ -18,8 +18,8 @@ from anglecam.io.session import Command, read_command, read_session, rig_beside
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.clock_sync import AGREED, offsets
 from anglecam.models.plant import Plant
-from anglecam.recordings import measure_session
 from anglecam.vision.image.lamp import lit_between
+from anglecam.workflow.recordings import measure_session
 from synth.session import render
 
 RESTS = (0.81, 0.82, 0.83)

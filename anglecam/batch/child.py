@@ -20,15 +20,15 @@ import cv2
 import numpy as np
 
 from anglecam.batch.row import cannot_write
-from anglecam.clip_results import write_measurement
 from anglecam.errors import AnglecamError, InputError, RigError, blame
 from anglecam.io.rig import read_rig
 from anglecam.io.series_csv import AngleSeries
 from anglecam.io.series_npz import keep_series, read_kept
 from anglecam.io.session import Recording, command_beside, read_session, rig_beside
 from anglecam.measurement.clip import Measurement, measure_clip
-from anglecam.recordings import gather_session, measure_recording, shown_to_loop
 from anglecam.video.frames import inspect_clip
+from anglecam.workflow.clip import write_measurement
+from anglecam.workflow.recordings import gather_session, measure_recording, shown_to_loop
 
 _GRACE_S = 60.0
 """After its time limit a process whose starter is gone, and which does not heed that, ends by itself."""
@@ -85,7 +85,7 @@ def fit(request: dict[str, Any]) -> dict[str, Any]:
         ``verdict``, ``effects`` and ``problems``, or the ``cause`` why there is no model and whether the
         ``call_is_wrong``.
     """
-    from anglecam.session_results import close_session, identify_session  # a second of imports, which no clip needs
+    from anglecam.workflow.session import close_session, identify_session  # a second of imports, which no clip needs
 
     folder, into = Path(request["session"]), Path(request["into"])
     kept: dict[str, str] = request["kept"]

@@ -11,7 +11,7 @@ from pathlib import Path
 import pyarrow as pa
 from pyarrow import parquet
 
-from anglecam.batch.notes import move_in
+from anglecam.batch.records import move_in
 from anglecam.batch.row import Row
 
 _TYPES = {"int | None": pa.int64(), "float | None": pa.float64()}

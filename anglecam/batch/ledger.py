@@ -9,7 +9,7 @@ from pathlib import Path
 
 from anglecam.batch.address import parent
 from anglecam.batch.index import write_index
-from anglecam.batch.notes import Note, SessionNote, Store
+from anglecam.batch.records import Note, SessionNote, Store
 from anglecam.batch.row import FAILED, Row, cannot_write
 from anglecam.batch.sessions import SessionJob
 from anglecam.batch.work import Settings

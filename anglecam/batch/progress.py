@@ -12,7 +12,7 @@ from typing import IO, Any
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from anglecam.batch.notes import Note, SessionNote
+from anglecam.batch.records import Note, SessionNote
 from anglecam.batch.row import FAILED, OK
 from anglecam.errors import RigError
 from anglecam.terminal import errors

@@ -18,15 +18,15 @@ from typing import Protocol
 from anglecam.batch.address import is_of_one_process, join, normalised, stem
 from anglecam.batch.ledger import Ledger
 from anglecam.batch.lock import locked
-from anglecam.batch.notes import Note, SessionNote, Store
-from anglecam.batch.places import clip_places, session_places
-from anglecam.batch.pool import LocalTeam
+from anglecam.batch.output_paths import clip_places, session_places
 from anglecam.batch.process import MeasuringProcess
 from anglecam.batch.progress import Log, Watch, log_to, watch
+from anglecam.batch.records import Note, SessionNote, Store
 from anglecam.batch.row import Row
 from anglecam.batch.sessions import SessionJob, do_session, find_sessions
 from anglecam.batch.sources import Source, find_sources
 from anglecam.batch.work import ClipJob, Settings, do_clip
+from anglecam.batch.worker_pool import LocalTeam
 from anglecam.errors import AnglecamError, RigError
 from anglecam.io.rig import read_rig
 from anglecam.io.series_csv import CORRECTED

@@ -12,8 +12,8 @@ from anglecam import __version__
 from anglecam.batch.address import is_remote, join, name, names_in, parent, read_small, stem
 from anglecam.batch.identity import combined, content_hash
 from anglecam.batch.lock import is_current
-from anglecam.batch.notes import Note, SessionNote, Store
 from anglecam.batch.process import Lost, MeasuringProcess
+from anglecam.batch.records import Note, SessionNote, Store
 from anglecam.batch.row import FAILED, cannot_write
 from anglecam.batch.sources import Source
 from anglecam.batch.work import Settings, fetch_beside, require_same_batch, time_allowed, told, unfinished

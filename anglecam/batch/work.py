@@ -19,8 +19,8 @@ from anglecam import __version__
 from anglecam.batch.address import PassingError, fetch, is_remote, join, name, names_in, parent, stem
 from anglecam.batch.identity import calibration_named, clip_configuration, content_hash, is_settled, stamp
 from anglecam.batch.lock import is_current
-from anglecam.batch.notes import Note, Store
 from anglecam.batch.process import Lost, MeasuringProcess
+from anglecam.batch.records import Note, Store
 from anglecam.batch.row import FAILED, OK, TRUNCATED, Row, cannot_write
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.io.session import COMMAND_ENDING

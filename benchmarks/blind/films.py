@@ -27,7 +27,7 @@ from rich.table import Table
 from anglecam.errors import InputError
 from anglecam.io.session import read_session
 from anglecam.loop.close import close_records
-from anglecam.recordings import measure_session, shown_to_loop
+from anglecam.workflow.recordings import measure_session, shown_to_loop
 from benchmarks.blind.judged import Line, judge, show, told
 from synth.session import render
 from synth.spec import Spec, read_spec

@@ -44,7 +44,7 @@ class KeptProcess(MeasuringProcess):
 def kept_processes() -> Iterator[None]:
     """Let the batches of this file that run in the tests' own process hand on their measuring processes."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("anglecam.batch.pool.MeasuringProcess", KeptProcess)
+        patch.setattr("anglecam.batch.worker_pool.MeasuringProcess", KeptProcess)
         yield
     while KeptProcess.idle:
         process = KeptProcess.idle.pop()

@@ -12,10 +12,10 @@ import pandas as pd
 import pytest
 
 from anglecam.batch.run import Options, run_batch
-from anglecam.clip_results import write_measurement
 from anglecam.errors import RigError
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import measure_clip
+from anglecam.workflow.clip import write_measurement
 from support.tiny import FRAMES, SIZE, results, tiny_clip, tiny_lab
 from support.tiny import run_batch as run
 

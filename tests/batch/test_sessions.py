@@ -15,8 +15,8 @@ from anglecam.batch.sessions import SessionJob, _configuration
 from anglecam.batch.work import Settings
 from anglecam.io.series_csv import AngleSeries, write_series
 from anglecam.io.session import read_session
-from anglecam.recordings import measure_session
-from anglecam.session_results import identify_session
+from anglecam.workflow.recordings import measure_session
+from anglecam.workflow.session import identify_session
 from support.motion import Plant
 from support.series import session as make_records
 from support.tiny import tiny_clip, tiny_lab

@@ -7,7 +7,7 @@ from pathlib import Path
 import fsspec
 import pytest
 
-from anglecam.batch.places import clip_places, session_places
+from anglecam.batch.output_paths import clip_places, session_places
 from anglecam.batch.sessions import find_sessions
 from anglecam.batch.sources import Source, find_sources
 from anglecam.errors import RigError

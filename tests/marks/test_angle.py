@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 import anglecam
-from anglecam import cli
+from anglecam.cli.app import app as cli
 from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Camera, Marks, Rig
 from anglecam.io.series_csv import COLUMNS
 from anglecam.io.session import Command, read_session, recording_name
 from anglecam.measurement.tracks import measure_tracks
-from anglecam.recordings import measure_session, shown_to_loop
+from anglecam.workflow.recordings import measure_session, shown_to_loop
 from support.drawn import Look, Plant, Recording, draw_frames, write_clip
 from support.motion import command_rows, move
 from support.tracked import LEVER, PIVOT, SCORER, nod, write_deeplabcut, write_sleap

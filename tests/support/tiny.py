@@ -48,7 +48,7 @@ def _frames(seed: int) -> tuple[np.ndarray, ...]:
 
 def batch_command(*arguments: object) -> list[str]:
     """Return the command line of a batch."""
-    return [sys.executable, "-c", "from anglecam.cli import main; main()", "batch", *map(str, arguments)]
+    return [sys.executable, "-c", "from anglecam.cli.app import main; main()", "batch", *map(str, arguments)]
 
 
 def run_batch(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:

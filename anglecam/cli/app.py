@@ -18,7 +18,8 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from anglecam import __version__
-from anglecam.batch.cli import batch
+from anglecam.cli.batch import batch
+from anglecam.cli.neck import app as neck
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.io.netcdf_parquet import Also, write_also
 from anglecam.io.rig import Rig, read_rig
@@ -31,14 +32,13 @@ from anglecam.io.session import (
     recording_name,
     rig_beside,
 )
-from anglecam.neck_cli import app as neck
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
     from anglecam.identification.identify import Estimator
     from anglecam.measurement.clip import Measurement
     from anglecam.measurement.tracks import MeasuredTracks
-    from anglecam.recordings import Measured
+    from anglecam.workflow.recordings import Measured
 
 app = typer.Typer(
     name="anglecam",
@@ -87,9 +87,9 @@ def measure(
     ] = None,
 ) -> None:
     """Measure the angle in every frame: NAME.angles.csv and a plot for each clip, and how it answers every change."""
-    from anglecam.clip_results import write_measurement
     from anglecam.report.summary import response_table, series_table
     from anglecam.video.overlay import write_overlay
+    from anglecam.workflow.clip import write_measurement
 
     declared = read_rig(rig) if rig else None
     make_folder(out)
@@ -193,7 +193,7 @@ def identify(
     from anglecam.identification.identify import ESTIMATORS
     from anglecam.io.neck_file import read_neck
     from anglecam.report.summary import model_table
-    from anglecam.session_results import identify_session
+    from anglecam.workflow.session import identify_session
 
     if estimator not in ESTIMATORS:  # before any clip is measured
         raise RigError(f"--estimator {estimator}: choose one of {', '.join(ESTIMATORS)}")
@@ -220,9 +220,9 @@ def close(
     ] = None,
 ) -> None:
     """Find what the model lacks: loop.json, report.html and, where it helps, the command to play next."""
-    from anglecam.recordings import shown_to_loop
     from anglecam.report.summary import loop_table, model_table
-    from anglecam.session_results import close_session
+    from anglecam.workflow.recordings import shown_to_loop
+    from anglecam.workflow.session import close_session
 
     opened, measured = _open(session, out)
     names = [*opened.rig.held_out, *(hold_out or ())]
@@ -268,7 +268,7 @@ def main() -> None:
 
 def _open(session: Path, out: Path) -> tuple[Session, Measured]:
     """Read a session and measure its clips, writing their series to ``out``."""
-    from anglecam.recordings import measure_session
+    from anglecam.workflow.recordings import measure_session
 
     opened = read_session(session)
     make_folder(out)
@@ -323,7 +323,7 @@ def _film(source: Path, measurement: Measurement | MeasuredTracks) -> Path:
 
 
 def _measure(clip: Path, rig: Rig, bars: Progress) -> Measurement | MeasuredTracks:
-    from anglecam.recordings import measure_recording
+    from anglecam.workflow.recordings import measure_recording
 
     bar = bars.add_task(clip.name, total=None)
     with blame(clip):

@@ -18,9 +18,9 @@ from anglecam.loop.cross_validation import split_records
 from anglecam.loop.loop_json import next_experiment, verdict_as_dict, write_next_command
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.neck.large_angle import LargeAngleNeck
-from anglecam.recordings import Measured, Shown
 from anglecam.report.page import write_report
 from anglecam.terminal import make_folder
+from anglecam.workflow.recordings import Measured, Shown
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def close_session(
     measured : Measured
         Its recordings.
     shown : Shown
-        From `anglecam.recordings.shown_to_loop`.
+        From `anglecam.workflow.recordings.shown_to_loop`.
     out : Path
         Folder for the files.
     held_out : list of str

@@ -1,0 +1,1 @@
+"""What the command line, the batch and the Python API all call: one clip, one session."""
