@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError
 from anglecam.identification.identify import Estimator, Identified, declared_start, identify_records
 from anglecam.io.rig import Rig
-from anglecam.io.series_csv import AngleSeries
 from anglecam.io.session import Session, command_beside, read_session, rig_beside
 from anglecam.loop.close import Verdict, close_records
 from anglecam.workflow.recordings import Measured, measure_recording, measure_session, shown_to_loop

@@ -25,6 +25,7 @@ from filterpy.kalman import ExtendedKalmanFilter
 from numpy.typing import NDArray
 
 import anglecam
+from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.identification.ekf import PAPER, EkfSettings, fit_ekf, settings_for
 from anglecam.identification.identify import identify_records
@@ -32,7 +33,6 @@ from anglecam.identification.kalman import SHARED
 from anglecam.identification.output_error import fit_output_error
 from anglecam.identification.smoothing import smooth
 from anglecam.io.rig import Rig
-from anglecam.io.session import Command
 from anglecam.models.plant import Plant
 from anglecam.models.third_order import ThirdOrder
 from support.comparison import compare_models

@@ -37,11 +37,11 @@ from numpy.typing import NDArray
 from scipy.linalg import logm
 
 import anglecam
+from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.identification.ekf import fit_ekf, settings_for
 from anglecam.identification.identify import identify_records
 from anglecam.io.rig import Rig
-from anglecam.io.session import Command
 from support.transfer import SYS2_DENOMINATOR, SYS2_NUMERATOR, respond
 
 Floats = NDArray[np.float64]

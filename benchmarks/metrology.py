@@ -22,8 +22,8 @@ import numpy as np
 import yaml
 
 from anglecam.camera.calibration import Calibration, write_calibration
+from anglecam.io.command_csv import read_command
 from anglecam.io.rig import read_rig
-from anglecam.io.session import read_command
 from anglecam.measurement.clip import measure_clip
 from anglecam.video.frames import read_frames
 from synth.motion import move

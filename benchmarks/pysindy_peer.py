@@ -45,8 +45,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record
-from anglecam.io.session import Command
 from anglecam.loop.close import close_records
 from benchmarks.blind.sessions import HELD_OUT, session
 

@@ -10,8 +10,8 @@ import pytest
 
 from anglecam.budget.collect import error_sources
 from anglecam.budget.terms import angle_draws, courses
+from anglecam.io.command_csv import read_command
 from anglecam.io.rig import read_rig
-from anglecam.io.session import read_command
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.mark_pass import sight_clip
 from anglecam.measurement.registration_pass import Registered, register_clip

@@ -10,8 +10,10 @@ import xarray as xr
 from pyarrow import parquet
 
 from anglecam.cli.app import app as cli
+from anglecam.data.series import AngleSeries
+from anglecam.io.csv_columns import SERIES_COLUMNS as COLUMNS
 from anglecam.io.netcdf_parquet import Also, write_also, write_netcdf, write_parquet
-from anglecam.io.series_csv import COLUMNS, AngleSeries, read_series, write_series
+from anglecam.io.series_csv import read_series, write_series
 from support.tracked import nod, write_sleap
 
 

@@ -10,6 +10,8 @@ import pytest
 from scipy import io, signal
 
 from anglecam.cli.app import app as cli
+from anglecam.data.command import Command
+from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError
 from anglecam.identification.export import (
     FittedModel,
@@ -25,8 +27,7 @@ from anglecam.identification.export import (
 from anglecam.identification.identify import identify_records
 from anglecam.io.files import write_json
 from anglecam.io.rig import Rig
-from anglecam.io.series_csv import AngleSeries, write_series
-from anglecam.io.session import Command
+from anglecam.io.series_csv import write_series
 from anglecam.models.large_angle import LargeAngle
 from anglecam.neck.large_angle import LargeAngleNeck
 from support.motion import Plant

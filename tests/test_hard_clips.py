@@ -12,8 +12,8 @@ import pytest
 import yaml
 
 from anglecam.camera.calibration import Calibration, write_calibration
+from anglecam.io.command_csv import read_command
 from anglecam.io.rig import read_rig
-from anglecam.io.session import read_command
 from anglecam.measurement.clip import Measurement, measure_clip
 from synth.motion import move
 from synth.session import render

@@ -13,12 +13,13 @@ import pytest
 from anglecam.camera.calibration import read_calibration
 from anglecam.errors import AnglecamError, InputError, RigError
 from anglecam.identification.export import read_model
+from anglecam.io.command_csv import read_command
 from anglecam.io.neck_file import read_neck
+from anglecam.io.responses_json import nod_from_responses
 from anglecam.io.rig import read_rig
 from anglecam.io.series_csv import read_series
-from anglecam.io.session import command_beside, read_command, rig_beside
+from anglecam.io.session import command_beside, rig_beside
 from anglecam.io.tracks.files import read_tracks
-from anglecam.neck.pd_tuning import nod_from_responses
 
 READERS = {
     "rig.yaml": read_rig,

@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
+from anglecam.data.command import Command
 from anglecam.errors import InputError
+from anglecam.io.command_csv import read_command
 from anglecam.io.rig import Mouth, Pivot, Rig, read_rig
-from anglecam.io.session import Command, read_command
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.mark_pass import sight_clip
 from anglecam.measurement.sigma import angle_sigma, place_errors, worst_case, worst_case_both_ends

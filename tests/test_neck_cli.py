@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from anglecam.cli.app import app as cli
+from anglecam.data.command import Command
 from anglecam.data.record import Record
+from anglecam.data.series import AngleSeries
 from anglecam.io.files import write_json
 from anglecam.io.neck_file import read_neck
-from anglecam.io.series_csv import AngleSeries, write_series
-from anglecam.io.session import Command
+from anglecam.io.series_csv import write_series
 from anglecam.neck_design.systems import paper_systems, second_order, side_by_side
 from anglecam.neck_design.tables import with_sigma
 from support.motion import Plant

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError, printable
 from anglecam.io.files import write_atomically, write_whole
 from anglecam.io.netcdf_parquet import Also, write_also
-from anglecam.io.series_csv import AngleSeries, read_series, write_series
+from anglecam.io.series_csv import read_series, write_series
 from anglecam.report.figures import plot_series
 from support.drawn import Look, draw_frames, write_clip
 

@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 import yaml
 
+from anglecam.data.command import Command
 from anglecam.effects import effect
 from anglecam.errors import RigError
 from anglecam.identification.noise import DISTANCE, Noise
 from anglecam.identification.output_error import fit_output_error
 from anglecam.identification.systematic import full_sigma
+from anglecam.io.command_csv import read_command
 from anglecam.io.rig import Rig, Sync
-from anglecam.io.session import Command, read_command, read_session, rig_beside
+from anglecam.io.session import read_session, rig_beside
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.clock_sync import AGREED, offsets
 from anglecam.models.plant import Plant
@@ -66,7 +68,7 @@ def late(filmed, tmp_path_factory):
 def test_a_lamp_that_agrees_with_the_command_changes_nothing(agreeing):
     assert not agreeing.notes
     for series, record, rest in zip(agreeing.series, agreeing.records, RESTS, strict=True):
-        dark, lit = series.lamp_s
+        dark, lit = series.evidence.lamp_s
         assert dark < rest <= lit
         assert lit - dark < 0.07
         assert record.command.first_change() == pytest.approx(rest, abs=1e-6)

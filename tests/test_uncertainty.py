@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anglecam.budget.terms import ErrorSources, Tilt, angle_draws, courses
+from anglecam.budget.terms import ErrorSources, angle_draws, courses
 from anglecam.camera.lens import Lens
+from anglecam.camera.tilt import Tilt
 from anglecam.measurement.sigma import PlaceErrors, angle_sigma
 from support.nod import COVARIANCE, PIVOT, REST, N, nod_sources
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anglecam.io.series_csv import AngleSeries
+from anglecam.data.camera_evidence import CameraEvidence
+from anglecam.data.series import AngleSeries
 from anglecam.measurement.uncorrected import uncorrected
 
 TIME = np.arange(240) / 30.0
@@ -29,7 +30,7 @@ def filmed(mark, *, facing=1.0, shown=lambda line: line, noise_px=0.01):
         line=line,
         mouth_px=mouth,
         pivot_px=np.broadcast_to(PIVOT, mouth.shape),
-        marker_px=tuple(PIVOT + mark),
+        evidence=CameraEvidence(marker_px=tuple(PIVOT + mark)),
     )
 
 
@@ -37,7 +38,7 @@ def filmed(mark, *, facing=1.0, shown=lambda line: line, noise_px=0.01):
 def test_a_mark_beside_the_axis_is_shown_to_the_loop_as_that_alone(facing):
     series, differs = uncorrected([filmed((6.0, -4.0), facing=facing)])
     assert differs
-    assert series[0].only_pivot_differs
+    assert series[0].evidence.only_pivot_differs
     arm = LEVER * np.column_stack([facing * np.cos(series[0].line), -np.sin(series[0].line)])
     assert np.median(np.hypot(*arm.T)) == pytest.approx(LEVER)
     ahead, up = facing * 6.0 / LEVER, 4.0 / LEVER
@@ -50,27 +51,29 @@ def test_a_mark_beside_the_axis_is_shown_to_the_loop_as_that_alone(facing):
 def test_a_bent_view_is_not_taken_for_a_mark_beside_the_axis():
     series, differs = uncorrected([filmed((0.0, 0.0), shown=lambda line: line + 0.2 * line**2)])
     assert differs
-    assert series[0].only_pivot_differs is False
+    assert series[0].evidence.only_pivot_differs is False
 
 
 def test_where_it_cannot_be_said_whether_more_than_the_mark_is_beside_nothing_is_said():
     barely = filmed((6.0, -4.0), shown=lambda line: line + 0.0075 * line**2)
     series, differs = uncorrected([barely])
     assert differs
-    assert series[0].only_pivot_differs is None
+    assert series[0].evidence.only_pivot_differs is None
 
 
 def test_an_angle_read_off_the_mouth_does_not_tell_what_else_than_the_pivot_may_be_wrong():
     bent = filmed((6.0, -4.0), shown=lambda line: line + 0.2 * line**2)
     arm = bent.mouth_px - PIVOT
-    alone = replace(bent, line=np.arctan2(-arm[:, 1], arm[:, 0]), by_mouth=True, sigma=np.full(len(TIME), 5e-5))
+    evidence = replace(bent.evidence, from_mark=True)
+    line = np.arctan2(-arm[:, 1], arm[:, 0])
+    alone = replace(bent, line=line, evidence=evidence, sigma=np.full(len(TIME), 5e-5))
     (shown,), differs = uncorrected([replace(alone, angle=alone.line - np.radians(-0.6))])
     assert differs
-    assert shown.only_pivot_differs is None
+    assert shown.evidence.only_pivot_differs is None
     assert shown.sigma == pytest.approx(5e-5)
-    for own_turn, slanted in (((0.3, 0.01), True), ((-0.3, 0.01), True), ((0.3, 0.1), False), ((0.04, 0.001), False)):
-        (shown,), _ = uncorrected([replace(alone, own_turn=own_turn)])
-        assert (shown.only_pivot_differs is False) == slanted
+    for turn, slanted in (((0.3, 0.01), True), ((-0.3, 0.01), True), ((0.3, 0.1), False), ((0.04, 0.001), False)):
+        (shown,), _ = uncorrected([replace(alone, evidence=replace(evidence, outline_turn=turn))])
+        assert (shown.evidence.only_pivot_differs is False) == slanted
 
 
 def test_noise_however_large_is_no_difference():

@@ -20,10 +20,10 @@ import cv2
 import numpy as np
 
 from anglecam.batch.row import cannot_write
+from anglecam.data.series import AngleSeries
 from anglecam.errors import AnglecamError, InputError, RigError, blame
+from anglecam.io.netcdf_parquet import read_netcdf, write_netcdf
 from anglecam.io.rig import read_rig
-from anglecam.io.series_csv import AngleSeries
-from anglecam.io.series_npz import keep_series, read_kept
 from anglecam.io.session import Recording, command_beside, read_session, rig_beside
 from anglecam.measurement.clip import Measurement, measure_clip
 from anglecam.video.frames import inspect_clip
@@ -62,7 +62,7 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
             try:
                 write_measurement(measurement, command, into)
                 if request["keep"]:
-                    keep_series(measurement.series, Path(request["keep"]))
+                    write_netcdf(measurement.series, Path(request["keep"]))
             except OSError as problem:
                 return found | {"cause": cannot_write(problem), "call_is_wrong": False, "passing": True}
     except AnglecamError as problem:
@@ -97,7 +97,7 @@ def fit(request: dict[str, Any]) -> dict[str, Any]:
             return tracked.series, tracked.truncated
         if recording.source.name not in kept:
             raise InputError(f"{recording.source}: could not be measured")
-        return read_kept(Path(kept[recording.source.name])), None
+        return read_netcdf(Path(kept[recording.source.name])), None
 
     try:
         with blame(folder):

@@ -13,7 +13,7 @@ import yaml
 
 from anglecam.batch.address import asking, is_remote, join, parent, read_small, stem
 from anglecam.errors import InputError
-from anglecam.io.session import COMMAND_ENDING
+from anglecam.io.command_csv import COMMAND_ENDING
 
 _RACY_NS = 2_000_000_000
 """A file touched so shortly before it was read may change again within one tick of its file system's clock."""

@@ -86,7 +86,7 @@ class Store:
 
     def kept(self, address: str) -> str:
         """Return where a clip's series is kept for its session, relative to the output folder."""
-        return f".anglecam/series/{key(address)}.npz"
+        return f".anglecam/series/{key(address)}.nc"
 
     def clear(self) -> None:
         """Remove what killed runs have left behind."""

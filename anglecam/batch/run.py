@@ -29,7 +29,7 @@ from anglecam.batch.work import ClipJob, Settings, do_clip
 from anglecam.batch.worker_pool import LocalTeam
 from anglecam.errors import AnglecamError, RigError
 from anglecam.io.rig import read_rig
-from anglecam.io.series_csv import CORRECTED
+from anglecam.io.session import CORRECTED
 from anglecam.terminal import make_folder
 
 Job = ClipJob | SessionJob

@@ -18,7 +18,8 @@ from anglecam.batch.row import FAILED, cannot_write
 from anglecam.batch.sources import Source
 from anglecam.batch.work import Settings, fetch_beside, require_same_batch, time_allowed, told, unfinished
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
-from anglecam.io.session import CLIP_ENDINGS, COMMAND_ENDING, SERIES_ENDING
+from anglecam.io.command_csv import COMMAND_ENDING
+from anglecam.io.session import CLIP_ENDINGS, SERIES_ENDING
 from anglecam.io.tracks.files import find_tracks
 
 _LEAST_TIME_S = 3600.0

@@ -23,7 +23,7 @@ from anglecam.batch.process import Lost, MeasuringProcess
 from anglecam.batch.records import Note, Store
 from anglecam.batch.row import FAILED, OK, TRUNCATED, Row, cannot_write
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
-from anglecam.io.session import COMMAND_ENDING
+from anglecam.io.command_csv import COMMAND_ENDING
 
 _LEAST_TIME_S = 600.0
 _TIME_PER_BYTE_S = 1e-5
@@ -198,7 +198,7 @@ def _measured(
     note: Note, job: ClipJob, settings: Settings, process: MeasuringProcess, clip: Path, work: Path
 ) -> tuple[Note, dict[str, Path]]:
     """Have a clip measured; return what became of it and its finished files by their places."""
-    into, kept = work / "out", work / "series.npz"
+    into, kept = work / "out", work / "series.nc"
     try:
         into.mkdir(parents=True)
     except OSError as problem:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from anglecam.budget.gum import Combined, Comparison, Propagated, combine, compare, propagate
 from anglecam.budget.terms import Course, ErrorSources, angle_draws, courses
-from anglecam.io.series_csv import CONTRACT_RADII_PX
+from anglecam.data.series import CONTRACT_RADII_PX
 from anglecam.measurement.sigma import worst_case, worst_case_both_ends
 
 Floats = NDArray[np.float64]

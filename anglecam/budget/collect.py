@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.budget.terms import ErrorSources, Neutral
+from anglecam.data.series import OK
 from anglecam.io.rig import Rig
-from anglecam.io.series_csv import OK
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.clip import Measurement
 from anglecam.measurement.registration_pass import Registered

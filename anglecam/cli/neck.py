@@ -276,7 +276,8 @@ def power(
 
     As in Figs. 12 and 13.
     """
-    from anglecam.neck.power import power_use, read_power_log
+    from anglecam.io.power_csv import read_power_log
+    from anglecam.neck.power import power_use
     from anglecam.neck_design.figures import power_figure
     from anglecam.neck_design.numbers import power_numbers
     from anglecam.neck_design.tables import power_tables

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.effects import UNSEEN, View
+from anglecam.data.camera_evidence import UNSEEN, View
+from anglecam.data.command import Command
+from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError
-from anglecam.io.series_csv import AngleSeries
-from anglecam.io.session import Command
 
 Floats = NDArray[np.float64]
 
@@ -131,10 +131,11 @@ def _view(series: AngleSeries, ok: NDArray[np.bool_]) -> View:
         return UNSEEN
     neutral, lever = float(np.nanmedian((series.line - series.angle)[ok])), float(np.nanmedian(np.hypot(*arm.T)))
     mirrored = bool(np.median(arm[:, 0] * np.cos(series.line[ok])) < 0.0)
-    only = series.only_pivot_differs
-    if series.picture_px is None:
+    evidence = series.evidence
+    only = evidence.only_pivot_differs
+    if evidence.picture_px is None:
         return View(neutral, lever, None, mirrored, only)
-    x, y = np.nanmedian(series.pivot_px[ok], axis=0) - (np.array(series.picture_px) - 1.0) / 2.0
+    x, y = np.nanmedian(series.pivot_px[ok], axis=0) - (np.array(evidence.picture_px) - 1.0) / 2.0
     return View(neutral, lever, (float(x), float(y)), mirrored, only)
 
 

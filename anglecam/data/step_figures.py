@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,23 @@ Floats = NDArray[np.float64]
 
 LOW, HIGH, SETTLED = 0.1, 0.9, 0.02
 """Shares of the way: rise from the first to the second, settling to within the third."""
+
+
+@dataclass(frozen=True)
+class StepFigures:
+    """Figures of a step response; NaN where the model has no steady state."""
+
+    rise_time: float
+    """From 10 % to 90 % of the way, s."""
+    overshoot: float
+    """Peak beyond the steady state as a share of it, not below 0."""
+    settling_time: float
+    """After which the response stays within 2 % of the steady state, s."""
+    steady_state: float
+    """Per unit of the command."""
+
+
+NO_STEP = StepFigures(np.nan, np.nan, np.nan, np.nan)
 
 
 def first_crossing(time: Floats, share: Floats, level: float) -> float:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import importlib
 import pkgutil
 
-from anglecam.effects.effect import UNSEEN, Effect, Knots, Parameter, View
+from anglecam.effects.effect import Effect, Knots, Parameter
 
-__all__ = ["LEDGER", "UNSEEN", "Effect", "Knots", "Parameter", "View", "effect"]
+__all__ = ["LEDGER", "Effect", "Knots", "Parameter", "effect"]
 
 
 def _collect() -> tuple[Effect, ...]:

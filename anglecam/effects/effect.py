@@ -23,6 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.camera_evidence import View
+
 Floats = NDArray[np.float64]
 Values = tuple[float, ...]
 """Parameters as compiled functions take them: arrays would cost them more than what they work out."""
@@ -40,26 +42,6 @@ class Knots:
     """At each knot, rad."""
     slope: Floats
     """From there to the next, rad/s."""
-
-
-@dataclass(frozen=True)
-class View:
-    """How the camera sees the mechanism of a recording, where it is known."""
-
-    neutral: float = 0.0
-    """Line from pivot to mouth at the zero of the angle, upward from ahead, rad."""
-    lever_px: float | None = None
-    """Pivot to mouth; ``None`` for a series without marks."""
-    pivot_px: tuple[float, float] | None = None
-    """From the middle of the picture, to the right and down."""
-    mirrored: bool = False
-    """Whether the face looks to the left."""
-    only_pivot_differs: bool | None = None
-    """Whether all that the picture shows otherwise than the mechanism moves comes from where the mark is, if known."""
-
-
-UNSEEN = View()
-"""Of a series from elsewhere: the face looks ahead at its zero, and more is not known."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.effects.effect import Effect, Parameter, View
+from anglecam.data.camera_evidence import View
+from anglecam.effects.effect import Effect, Parameter
 
 Floats = NDArray[np.float64]
 

@@ -10,14 +10,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
-from anglecam.effects import UNSEEN, View
-from anglecam.io.session import Command
+from anglecam.models.model import Model
 
 Floats = NDArray[np.float64]
 
@@ -25,26 +23,6 @@ CLUSTER = 15
 """Frames; errors further apart than this count as independent."""
 PRESSED = 100.0
 """Standard deviations; a parameter that would lie further beyond its bound is as good as known to be on it."""
-
-
-class Model(Protocol):
-    """What can be fitted: `anglecam.models.plant.Plant` and `anglecam.models.third_order.ThirdOrder`."""
-
-    states: int
-
-    @property
-    def names(self) -> tuple[str, ...]: ...  # noqa: D102  # documented where implemented
-    @property
-    def lower(self) -> Floats: ...  # noqa: D102
-    @property
-    def upper(self) -> Floats: ...  # noqa: D102
-    @property
-    def scales(self) -> Floats: ...  # noqa: D102
-    @property
-    def to_file(self) -> Floats: ...  # noqa: D102
-    def predict(  # noqa: D102
-        self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNSEEN
-    ) -> Floats: ...
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
+from anglecam.data.step_figures import NO_STEP, StepFigures
 from anglecam.errors import RigError
 from anglecam.identification.fit import Fit
 from anglecam.identification.initial_guess import start_parameters
@@ -20,7 +21,7 @@ from anglecam.io.rig import Rig
 from anglecam.models.large_angle import DEFAULT, FREE_SWING, LargeAngle
 from anglecam.models.plant import Plant
 from anglecam.models.third_order import ThirdOrder
-from anglecam.models.unit_step import NO_STEP, StepFigures, step_figures
+from anglecam.models.unit_step import step_figures
 from anglecam.neck.large_angle import LargeAngleNeck, linearise
 
 Floats = NDArray[np.float64]

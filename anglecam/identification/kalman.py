@@ -16,8 +16,8 @@ from filterpy.kalman import ExtendedKalmanFilter
 from numba import njit
 from numpy.typing import NDArray
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record
-from anglecam.io.session import Command
 from anglecam.models.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, SOURCES, WIDTH, integrate
 from anglecam.models.plant import MAX_STEP
 

@@ -18,7 +18,8 @@ from scipy.optimize import OptimizeResult, least_squares
 from threadpoolctl import ThreadpoolController
 
 from anglecam.data.record import Record
-from anglecam.identification.fit import Fit, Model, whiten
+from anglecam.identification.fit import Fit, whiten
+from anglecam.models.model import Model
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,9 @@ keypoints here, and the angle stands beside them as further variables over time.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
+from dataclasses import fields
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -16,12 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam import __version__
-from anglecam.errors import printable
+from anglecam.data.camera_evidence import CameraEvidence
+from anglecam.data.series import AngleSeries
+from anglecam.errors import InputError, printable
 from anglecam.io.files import write_whole
-from anglecam.io.series_csv import AngleSeries, series_columns
+from anglecam.io.series_csv import series_columns
 
 UNITS = {"s": "s", "deg": "degree", "px": "pixel"}
 """By the last part of a column's name."""
+GROUP = "anglecam"
+"""Of a netCDF file, with the series to the last bit."""
 
 
 class Also(StrEnum):
@@ -51,10 +57,11 @@ def write_also(series: AngleSeries, formats: Iterable[Also], stem: Path) -> None
 
 
 def write_netcdf(series: AngleSeries, path: Path) -> None:
-    """Write a series as netCDF-4 in the layout of `movement`'s poses.
+    """Write a series as netCDF-4: in the layout of `movement`'s poses, and to the last bit in a group of its own.
 
     Dimensions time, space, keypoints, individuals; ``position`` in px, ``confidence`` NaN, because anglecam states an
-    uncertainty and no likelihood; ``angle_deg``, ``sigma_deg``, ``line_deg``, the bounds and ``status`` over time.
+    uncertainty and no likelihood; ``angle_deg``, ``sigma_deg``, ``line_deg``, the bounds and ``status`` over time. The
+    group ``anglecam`` holds the fields of `AngleSeries` and `CameraEvidence` in SI units, unrounded.
 
     Parameters
     ----------
@@ -93,6 +100,81 @@ def write_netcdf(series: AngleSeries, path: Path) -> None:
                 variable = file.create_variable(name, ("time",), "f8", data=values)
                 variable.attrs["units"] = UNITS["deg"]
         _texts(file, "status", "time", series.status)
+        _write_exact(file.create_group(GROUP), series)
+
+
+def read_netcdf(path: Path) -> AngleSeries:
+    """Read a series that `write_netcdf` wrote, equal to it bit for bit.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    AngleSeries
+        With its `CameraEvidence`.
+
+    Raises
+    ------
+    OSError
+        Where the file is missing or is not netCDF-4.
+    InputError
+        Where another program wrote it.
+    """
+    import h5netcdf
+
+    with h5netcdf.File(path, "r") as file:
+        if GROUP not in file.groups:
+            raise InputError(f"{path}: not an angle series of anglecam")
+        group = file.groups[GROUP]
+        exact = {name: np.asarray(variable[...]) for name, variable in group.variables.items()}
+        stated = {name: np.asarray(value) for name, value in group.attrs.items()}
+        status = tuple(text.decode() if isinstance(text, bytes) else text for text in file.variables["status"][...])
+    evidence = CameraEvidence(**{f.name: _from_attribute(stated.get(f.name)) for f in fields(CameraEvidence)})
+    return AngleSeries(
+        name=os.fsdecode(stated["name"].tobytes()),
+        time=exact["time"],
+        angle=exact["angle"],
+        sigma=exact["sigma"],
+        status=status,
+        line=exact.get("line"),
+        mouth_px=exact.get("mouth_px"),
+        pivot_px=exact.get("pivot_px"),
+        bounds={float(r): exact["bounds"][i] for i, r in enumerate(exact["radius"])},
+        evidence=evidence,
+    )
+
+
+def _write_exact(group: Any, series: AngleSeries) -> None:
+    """Write the fields of a series and of its evidence as they are; a field that is ``None`` is left out."""
+    group.dimensions = {"radius": len(series.bounds)}
+    group.create_variable("radius", ("radius",), "f8", data=np.array(list(series.bounds)))
+    bounds = np.array(list(series.bounds.values())).reshape(len(series.bounds), len(series.time))
+    group.create_variable("bounds", ("radius", "time"), "f8", data=bounds)
+    for name in ("time", "angle", "sigma", "line"):
+        if getattr(series, name) is not None:
+            group.create_variable(name, ("time",), "f8", data=getattr(series, name))
+    for name in ("mouth_px", "pivot_px"):
+        if getattr(series, name) is not None:
+            group.create_variable(name, ("time", "space"), "f8", data=getattr(series, name))
+    group.attrs["name"] = np.frombuffer(os.fsencode(series.name), np.uint8)  # a file's name need not be text
+    for field in fields(series.evidence):
+        value = getattr(series.evidence, field.name)
+        if value is not None:
+            group.attrs[field.name] = np.asarray(value, dtype=np.int64 if _is_whole(value) else np.float64)
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, bool) or (isinstance(value, tuple) and all(isinstance(part, int) for part in value))
+
+
+def _from_attribute(value: NDArray | None) -> Any:
+    """Return a flag or a pair as `_write_exact` was given it."""
+    if value is None:
+        return None
+    return tuple(value.tolist()) if value.size == 2 else bool(value)
 
 
 def write_parquet(series: AngleSeries, path: Path) -> None:
@@ -108,15 +190,15 @@ def write_parquet(series: AngleSeries, path: Path) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 
-    fields, arrays = [], []
+    schema, arrays = [], []
     for name, values in series_columns(series).items():
         unit = UNITS.get(name.rpartition("_")[2])
         array = pa.array(values, from_pandas=True)  # NaN becomes null
-        fields.append(pa.field(name, array.type, metadata=None if unit is None else {"unit": unit}))
+        schema.append(pa.field(name, array.type, metadata=None if unit is None else {"unit": unit}))
         arrays.append(array)
     about = {"source_software": f"anglecam {__version__}", "name": printable(series.name)}
     with write_whole(path) as unfinished, unfinished.open("wb") as stream:  # of a name pyarrow makes an address
-        parquet.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=about)), stream)
+        parquet.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(schema, metadata=about)), stream)
 
 
 def _marks(places_px: NDArray[np.float64] | None, n: int) -> NDArray[np.float64]:

@@ -13,36 +13,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.command import Command
 from anglecam.errors import InputError, RigError
+from anglecam.io.command_csv import COMMAND_ENDING, read_command
 from anglecam.io.rig import Rig, read_rig
-from anglecam.io.series_csv import read_columns, require_increasing
 from anglecam.io.tracks.files import TRACKS_ENDINGS, find_tracks, name_by_tool
 
 CLIP_ENDINGS = (".avi", ".mp4", ".mkv", ".mov")
 SERIES_ENDING = ".angles.csv"
-COMMAND_ENDING = ".command.csv"
+CORRECTED = "corrected"
+"""Folder of a session's series without what the camera did."""
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Command:
-    """A piecewise constant command, each value held until the next; arrays of length m."""
-
-    time: Floats
-    """Instants of the rows, s on the clip's clock, strictly increasing."""
-    angle: Floats
-    """Commanded head angle from neutral, rad."""
-
-    def first_change(self) -> float | None:
-        """Return the instant (s) of the first row that differs from the one before it, ``None`` if none does."""
-        changes = np.flatnonzero(np.diff(self.angle) != 0.0)
-        return float(self.time[changes[0] + 1]) if len(changes) else None
-
-    def at(self, time: Floats) -> Floats:
-        """Look the command up at ``time`` (s); before the first row the first value holds."""
-        index = np.searchsorted(self.time, time, side="right") - 1
-        return self.angle[np.maximum(index, 0)]
 
 
 @dataclass(frozen=True)
@@ -77,29 +59,6 @@ class Session:
     """What made a recording unusable, one for each."""
     notes: tuple[str, ...] = ()
     """What the user should know, a line each."""
-
-
-def read_command(path: Path) -> Command:
-    """Read ``NAME.command.csv``: ``time_s,command_deg``, held constant until the next row.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    Command
-        In radians.
-
-    Raises
-    ------
-    InputError
-        Where a row cannot be read or times do not increase, naming file and line.
-    """
-    table = read_columns(path, required=("time_s", "command_deg"))
-    require_increasing(path, table["time_s"])
-    return Command(table["time_s"], np.radians(table["command_deg"]))
 
 
 def command_beside(source: Path) -> Command | None:

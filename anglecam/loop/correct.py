@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from anglecam.effects import Knots, View
+from anglecam.data.camera_evidence import View
+from anglecam.data.series import AngleSeries
+from anglecam.effects import Knots
 from anglecam.identification.fit import Fit
-from anglecam.io.series_csv import AngleSeries
 from anglecam.models.plant import Plant
 
 ROUNDS = 20

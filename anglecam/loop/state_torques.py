@@ -14,9 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.identification.fit import Fit, whiten
-from anglecam.io.session import Command
 from anglecam.loop.refit import plant_of
 from anglecam.models.plant import Plant
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.budget.terms import Tilt
 from anglecam.camera.lens import Lens
 from anglecam.camera.shutter import mean_off_middle
+from anglecam.camera.tilt import Tilt
+from anglecam.data.command import Command
 from anglecam.io.rig import Rig
-from anglecam.io.session import Command
 from anglecam.measurement.detections import Sighting
 from anglecam.measurement.registration_pass import Registered
 from anglecam.measurement.sigma import PlaceErrors, angle_sigma, place_errors

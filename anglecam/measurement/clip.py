@@ -14,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.camera.shutter import measurement_time
+from anglecam.data.camera_evidence import CameraEvidence
+from anglecam.data.command import Command
+from anglecam.data.series import OK, AngleSeries
 from anglecam.io.rig import Rig
-from anglecam.io.series_csv import OK, AngleSeries
-from anglecam.io.session import Command, recording_name
+from anglecam.io.session import recording_name
 from anglecam.measurement.angles import Angles, coarse_angles, turns
 from anglecam.measurement.clock_sync import DARK, note_on, offset_of, on_clip_clock, see_lamp
 from anglecam.measurement.detections import Sighting
@@ -26,7 +28,7 @@ from anglecam.measurement.registration_pass import Registered, Start, register_c
 from anglecam.measurement.rigid_body_pass import sight_head
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.video.film import decoded_once
-from anglecam.vision.mark.outline_turn import own_turn
+from anglecam.vision.mark.outline_turn import outline_turn
 
 Floats = NDArray[np.float64]
 
@@ -141,7 +143,7 @@ def measure_clip(
                 other = coarse_angles(head, rigid, head.time, rig, command)
                 if (other.sigma**2).mean() < (angles.sigma**2).mean():
                     seen, ok, time, angles = head, rigid, head.time, other
-    series = replace(_series(path, rig, time, seen, ok, angles), lamp_s=lamp)
+    series = _series(path, rig, time, seen, ok, angles, lamp)
     zero = why_zero_is_elsewhere(rig, command, time[ok])
     dark = changes and lamp is None and rig.sync.lamp is not None
     return Measurement(series, seen, angles, why_coarse, zero, DARK if dark else note_on(offset))
@@ -225,6 +227,7 @@ def _series(
     seen: Sighting,
     ok: NDArray[np.bool_],
     angles: Angles,
+    lamp: tuple[float, float] | None,
 ) -> AngleSeries:
     """Lay the measured frames among all the clip's frames, less the duplicates."""
     status = [OK if k else s for k, s in zip(ok, seen.status, strict=True)]
@@ -234,22 +237,24 @@ def _series(
         status[i] = "duplicate"
     mouths = seen.in_picture(_among(ok, angles.mouth_px))
     pivots = seen.in_picture(np.broadcast_to(angles.pivot.centre_px, (len(time), 2)))
-    name, marker = recording_name(path), _marker(seen)
-    series = series_of_angles(
-        name, time, status, ok, angles, mouths, pivots, rig, picture_px=seen.size, marker_px=marker
+    from_mark = seen.head is None and angles.registered is None
+    evidence = CameraEvidence(
+        picture_px=seen.size,
+        marker_px=_marker(seen),
+        from_mark=from_mark,
+        outline_turn=_outline_turn(seen, ok) if from_mark else None,
+        lamp_s=lamp,
     )
-    if seen.head is not None:
-        return replace(series, by_mouth=False)
-    return replace(series, own_turn=_own_turn(seen, ok)) if series.by_mouth else series
+    return series_of_angles(recording_name(path), time, status, ok, angles, mouths, pivots, rig, evidence)
 
 
-def _own_turn(seen: Sighting, ok: NDArray[np.bool_]) -> tuple[float, float] | None:
+def _outline_turn(seen: Sighting, ok: NDArray[np.bool_]) -> tuple[float, float] | None:
     regions = [seen.regions[i] for i in np.flatnonzero(ok)]
     whole = [region for region in regions if region is not None]
     if seen.circle is None or not whole:
         return None
     arm = np.array([region.centre_px for region in whole]) - seen.circle.centre_px
-    return own_turn(whole, np.unwrap(np.arctan2(arm[:, 1], arm[:, 0])))
+    return outline_turn(whole, np.unwrap(np.arctan2(arm[:, 1], arm[:, 0])))
 
 
 def _marker(seen: Sighting) -> tuple[float, float] | None:

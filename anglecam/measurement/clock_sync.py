@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from anglecam.camera.shutter import measurement_time
+from anglecam.data.command import Command
 from anglecam.errors import RigError
 from anglecam.io.rig import Rig
-from anglecam.io.session import Command
 from anglecam.video.frames import inspect_clip, read_frames
 from anglecam.vision.image.lamp import lit_between, patch_levels
 

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.camera.shutter import mean_off_middle
+from anglecam.data.command import Command
 from anglecam.io.rig import Rig
-from anglecam.io.session import Command
 from anglecam.measurement.angles import Angles, neutral_of
 from anglecam.measurement.registration_pass import Registered
 from anglecam.vision.pivot.marker import Pivot

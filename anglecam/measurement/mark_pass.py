@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.camera.lens import Lens, lens_from_rig
+from anglecam.data.series import OK
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
-from anglecam.io.series_csv import OK
 from anglecam.measurement.detections import Sighting, find_pivot, frames_to_keep, why_truncated
 from anglecam.measurement.rigid_body_pass import sight_head
 from anglecam.video.frames import Image, Sample, inspect_clip, read_frames, sample_frames

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from anglecam.camera.lens import lens_from_rig
+from anglecam.data.series import OK
 from anglecam.io.rig import Rig
-from anglecam.io.series_csv import OK
 from anglecam.measurement.detections import Sighting, find_pivot, frames_to_keep, why_truncated
 from anglecam.video.frames import inspect_clip, read_frames, sample_frames
 from anglecam.vision.image.noise import pixel_noise

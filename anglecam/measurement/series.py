@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.camera_evidence import CameraEvidence
+from anglecam.data.command import Command
+from anglecam.data.series import CONTRACT_RADII_PX, OK, AngleSeries
 from anglecam.io.rig import Rig
-from anglecam.io.series_csv import CONTRACT_RADII_PX, OK, AngleSeries
-from anglecam.io.session import Command
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.sigma import worst_case
 
@@ -26,9 +27,7 @@ def series_of_angles(
     mouth_px: Floats,
     pivot_px: Floats,
     rig: Rig,
-    *,
-    picture_px: tuple[int, int] | None = None,
-    marker_px: tuple[float, float] | None = None,
+    evidence: CameraEvidence,
 ) -> AngleSeries:
     """Lay the measured frames among all the recording's frames.
 
@@ -48,8 +47,8 @@ def series_of_angles(
         (frames, 2) where the picture shows them, px.
     rig : Rig
         Whose ``pixel_error_px`` the bounds are worked out for, besides the contract's.
-    picture_px, marker_px : tuple, optional
-        As of `AngleSeries`.
+    evidence : CameraEvidence
+        What the film shows besides.
 
     Returns
     -------
@@ -73,9 +72,7 @@ def series_of_angles(
         line=lines,
         mouth_px=np.where(told[:, None], mouth_px, np.nan),
         pivot_px=np.where(told[:, None], pivot_px, np.nan),
-        picture_px=picture_px,
-        marker_px=marker_px,
-        by_mouth=angles.registered is None,
+        evidence=evidence,
         bounds={r: worst_case(r, levers) for r in {*CONTRACT_RADII_PX, *rig.pixel_error_px}},
     )
 

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 
 from anglecam.camera.lens import lens_from_rig
 from anglecam.camera.shutter import measurement_time
+from anglecam.data.camera_evidence import CameraEvidence
+from anglecam.data.command import Command
+from anglecam.data.series import OK, AngleSeries
 from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Marks, Rig
-from anglecam.io.series_csv import OK, AngleSeries
-from anglecam.io.session import Command, clip_beside, recording_name
+from anglecam.io.session import clip_beside, recording_name
 from anglecam.io.tracks.files import read_tracks
 from anglecam.io.tracks.tracks import choose_pair
 from anglecam.measurement.angles import Angles, angles_of_places
@@ -128,9 +130,8 @@ def measure_tracks(path: Path, rig: Rig, command: Command | None = None) -> Meas
         x, y = lens.distort(fixed.centre_px)
         shown = np.broadcast_to((x, y), pivot.shape)
         marker = (float(x), float(y)) if lens.calibration is None else None
-    series = series_of_angles(
-        recording_name(path), time, status, ok, angles, mouth, shown, rig, picture_px=size, marker_px=marker
-    )
+    evidence = CameraEvidence(picture_px=size, marker_px=marker, from_mark=True)
+    series = series_of_angles(recording_name(path), time, status, ok, angles, mouth, shown, rig, evidence)
     zero = why_zero_is_elsewhere(rig, command, time[ok])
     return MeasuredTracks(series, angles, points.by, (*points.notes, *([zero] if zero else [])), points.film)
 

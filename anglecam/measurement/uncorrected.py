@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.io.series_csv import AngleSeries
+from anglecam.data.series import AngleSeries
 
 Floats = NDArray[np.float64]
 
@@ -51,23 +51,27 @@ def uncorrected(series: Sequence[AngleSeries]) -> tuple[list[AngleSeries], bool]
     if not any(_apart(one, other, one.angle) for one, other in marked):
         return list(series), False
     # a line to the mouth about another point is one from another pivot by its making, whatever the camera does
-    beside = [(one, other, _about_mark(one)) for one, other in marked if not one.by_mouth]
+    beside = [(one, other, _about_mark(one)) for one, other in marked if not one.evidence.from_mark]
     only_pivot = not any(_apart(*three) for three in beside) if beside else None
     if any(_slanted(one) for one, _ in marked):
         only_pivot = False
     if only_pivot and any(_apart(*three, clearly=DOUBT) for three in beside):
         only_pivot = None
     return [
-        one if other is None else replace(other, only_pivot_differs=only_pivot)
-        for one, other in zip(series, plain, strict=True)
+        one if other is None else _with_evidence(other, only_pivot) for one, other in zip(series, plain, strict=True)
     ], True
 
 
+def _with_evidence(series: AngleSeries, only_pivot: bool | None) -> AngleSeries:
+    return replace(series, evidence=replace(series.evidence, only_pivot_differs=only_pivot))
+
+
 def _from_mark(series: AngleSeries) -> AngleSeries | None:
-    if series.marker_px is None or series.mouth_px is None or series.pivot_px is None or series.line is None:
+    marker_px = series.evidence.marker_px
+    if marker_px is None or series.mouth_px is None or series.pivot_px is None or series.line is None:
         return None
     ok = series.ok
-    arm = series.mouth_px[ok] - np.asarray(series.marker_px)
+    arm = series.mouth_px[ok] - np.asarray(marker_px)
     line = np.full(len(ok), np.nan)
     line[ok] = np.unwrap(np.arctan2(-arm[:, 1], _side(series) * arm[:, 0]))
     line -= 2.0 * np.pi * np.round(np.nanmedian(line - series.line) / (2.0 * np.pi))
@@ -76,9 +80,9 @@ def _from_mark(series: AngleSeries) -> AngleSeries | None:
     # the median frame is near neutral: there the two lines part by what has no meaning for the angle
     angle = line - zero - np.nanmedian(off)
     # where there is no second witness, the mouth is as sure as its angle is where the pivot has no part in it
-    scatter = np.nanmin(series.sigma) if series.by_mouth else np.std(off[ok] - _course(off[ok], series))
+    scatter = np.nanmin(series.sigma) if series.evidence.from_mark else np.std(off[ok] - _course(off[ok], series))
     sigma = np.where(ok, scatter, np.nan)
-    pivot = np.where(ok[:, None], np.asarray(series.marker_px), np.nan)
+    pivot = np.where(ok[:, None], np.asarray(marker_px), np.nan)
     return replace(series, angle=angle, line=line, sigma=sigma, pivot_px=pivot)
 
 
@@ -88,7 +92,7 @@ def _about_mark(series: AngleSeries) -> Floats:
     assert series.pivot_px is not None
     assert series.mouth_px is not None
     centre = np.nanmedian(series.pivot_px, axis=0)
-    beside = np.asarray(series.marker_px) - centre
+    beside = np.asarray(series.evidence.marker_px) - centre
     lever = np.nanmedian(np.hypot(*(series.mouth_px - centre).T))
     ahead, up = _side(series) * beside[0] / lever, -beside[1] / lever
     return np.arctan2(np.sin(series.line) - up, np.cos(series.line) - ahead)
@@ -114,9 +118,9 @@ def _apart(measured: AngleSeries, plain: AngleSeries, angle: Floats, clearly: fl
 
 def _slanted(series: AngleSeries) -> bool:
     """Tell whether the mouth turns clearly otherwise than the line to it, as beside a wrong pivot alone it does not."""
-    if series.own_turn is None:
+    if series.evidence.outline_turn is None:
         return False
-    share, sigma = series.own_turn
+    share, sigma = series.evidence.outline_turn
     return abs(share) > max(OWN_TURN, TOLD_APART * sigma)
 
 

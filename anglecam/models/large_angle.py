@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from anglecam.effects import UNSEEN, View
-from anglecam.io.session import Command
+from anglecam.data.camera_evidence import UNSEEN, View
+from anglecam.data.command import Command
 from anglecam.neck.large_angle import LargeAngleNeck, linearise, restoring_tangent, restoring_torque
 
 Floats = NDArray[np.float64]

@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.effects import UNSEEN, Effect, Knots, View
-from anglecam.io.session import Command
+from anglecam.data.camera_evidence import UNSEEN, View
+from anglecam.data.command import Command
+from anglecam.effects import Effect, Knots
 from anglecam.models.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, WIDTH, integrate
 
 Floats = NDArray[np.float64]

@@ -2,33 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.data.step_figures import HIGH, LOW, first_crossing, settling
-from anglecam.identification.fit import Model
-from anglecam.io.session import Command
+from anglecam.data.command import Command
+from anglecam.data.step_figures import HIGH, LOW, NO_STEP, StepFigures, first_crossing, settling
+from anglecam.models.model import Model
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class StepFigures:
-    """Figures of a step response; NaN where the model has no steady state."""
-
-    rise_time: float
-    """From 10 % to 90 % of the way, s."""
-    overshoot: float
-    """Peak beyond the steady state as a share of it, not below 0."""
-    settling_time: float
-    """After which the response stays within 2 % of the steady state, s."""
-    steady_state: float
-    """Per unit of the command."""
-
-
-NO_STEP = StepFigures(np.nan, np.nan, np.nan, np.nan)
 
 
 def step_figures(model: Model, parameters: Floats, poles: NDArray, steady_state: float) -> StepFigures:

@@ -4,6 +4,7 @@ What steps, tunes and optimises the neck stands in its own modules, `step`, `pd`
 `synthesis`: they need python-control, which is slow to load, or the estimators' figures, which geometry does without.
 """
 
+from anglecam.io.power_csv import read_power_log
 from anglecam.neck.command_table import (
     FIGURE_13,
     TABLE_3,
@@ -40,17 +41,7 @@ from anglecam.neck.large_angle import (
     restoring_torque,
     torque_balance,
 )
-from anglecam.neck.power import (
-    NodPower,
-    PowerLog,
-    PowerUse,
-    Source,
-    find_nods,
-    fit_source,
-    nod_power,
-    power_use,
-    read_power_log,
-)
+from anglecam.neck.power import NodPower, PowerLog, PowerUse, Source, find_nods, fit_source, nod_power, power_use
 from anglecam.neck.servo import TorqueSpeed, drive_torque, servo_torque, torque_speed
 from anglecam.neck.spring import Preload, small_angle_torque, spring_tangent, spring_torque
 from anglecam.neck.statics import (

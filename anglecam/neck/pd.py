@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import newton
 
-from anglecam.data.step_figures import HIGH, LOW, first_crossing, settling
-from anglecam.models.unit_step import NO_STEP, StepFigures
+from anglecam.data.step_figures import HIGH, LOW, NO_STEP, StepFigures, first_crossing, settling
 from anglecam.neck.linear import LinearNeck
 from anglecam.neck.step import linear_step, linear_step_figures
 

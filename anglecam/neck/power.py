@@ -9,13 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from anglecam.errors import InputError
-from anglecam.io.series_csv import read_columns, require_increasing
 
 Floats = NDArray[np.float64]
 
@@ -112,31 +110,6 @@ class PowerUse:
     """Mean outside the nods, W; NaN where there is no such time."""
     all_servos: float
     """Mean power of a nod times `SERVOS`, W: if all were driven at once, "which is not the case practically"."""
-
-
-def read_power_log(path: Path) -> PowerLog:
-    """Read a log of voltage and current.
-
-    Parameters
-    ----------
-    path : Path
-        CSV with ``time_s,voltage_v,current_a``; further columns are left alone.
-
-    Returns
-    -------
-    PowerLog
-        As it stands.
-
-    Raises
-    ------
-    InputError
-        Naming the file, the line and the cause.
-    """
-    table = read_columns(path, required=("time_s", "voltage_v", "current_a"))
-    require_increasing(path, table["time_s"])
-    if len(table["time_s"]) < 3:
-        raise InputError(f"{path}: {len(table['time_s'])} rows; at least 3 are needed")
-    return PowerLog(str(path), table["time_s"], table["voltage_v"], table["current_a"])
 
 
 def power_use(log: PowerLog, nods: Sequence[tuple[float, float]] | None = None) -> PowerUse:

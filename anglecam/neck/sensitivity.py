@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from anglecam.models.unit_step import StepFigures
+from anglecam.data.step_figures import StepFigures
 from anglecam.neck.fourbar import FourBar, crank_reach, head_angle
 from anglecam.neck.linear import LinearNeck, linear_neck
 from anglecam.neck.parameters import PAPER, NeckParameters

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import companion
 from scipy.optimize import brentq
 
-from anglecam.data.step_figures import HIGH, LOW, SETTLED
-from anglecam.models.unit_step import NO_STEP, StepFigures
+from anglecam.data.step_figures import HIGH, LOW, NO_STEP, SETTLED, StepFigures
 
 Floats = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.models.unit_step import StepFigures
+from anglecam.data.step_figures import StepFigures
 from anglecam.neck.constraints import Constraint, least
 from anglecam.neck.fourbar import reach, servo_angle
 from anglecam.neck.linear import LinearNeck, linear_neck, passive_stiffness

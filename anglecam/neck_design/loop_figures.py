@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from anglecam.io.session import Command
+from anglecam.data.command import Command
 from anglecam.neck.design import Relations
 from anglecam.neck.joint import Joint
 from anglecam.neck.linear import LinearNeck

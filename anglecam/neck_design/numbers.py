@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from anglecam.data.step_figures import StepFigures
 from anglecam.io.neck_file import Neck
-from anglecam.models.unit_step import StepFigures
 from anglecam.neck.command_table import (
     STRAIGHT,
     command_of_nod,

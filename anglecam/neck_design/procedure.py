@@ -18,6 +18,7 @@ import numpy as np
 from anglecam.errors import InputError
 from anglecam.identification.export import SECOND_ORDER, read_model, transfer_function
 from anglecam.io.neck_file import Neck
+from anglecam.io.responses_json import nod_from_responses
 from anglecam.neck.design import (
     Relations,
     by_inertia,
@@ -40,7 +41,7 @@ from anglecam.neck.pd import (
     simulate_pd,
     sys2,
 )
-from anglecam.neck.pd_tuning import ADULT, Nod, nod_from_responses
+from anglecam.neck.pd_tuning import ADULT, Nod
 from anglecam.neck.synthesis import Wish
 from anglecam.neck_design.systems import STEP, SYS1
 

@@ -17,16 +17,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record, record_from_series
+from anglecam.data.step_figures import NO_STEP, StepFigures
 from anglecam.identification.export import FittedModel
-from anglecam.identification.fit import Model
 from anglecam.io.series_csv import read_series
-from anglecam.io.session import Command, command_beside, rig_beside
+from anglecam.io.session import command_beside, rig_beside
 from anglecam.measurement.step_response import responses
 from anglecam.models.large_angle import LargeAngle
+from anglecam.models.model import Model
 from anglecam.models.plant import Plant
 from anglecam.models.third_order import ThirdOrder
-from anglecam.models.unit_step import NO_STEP, StepFigures
 from anglecam.neck.large_angle import LargeAngleNeck, acceleration, equilibrium, linearise
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.pd import PdGains, simulate_pd, sys2

@@ -15,8 +15,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from anglecam.data.series import AngleSeries
 from anglecam.errors import printable
-from anglecam.io.series_csv import AngleSeries
 
 Floats = NDArray[np.float64]
 

@@ -11,11 +11,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record
+from anglecam.data.series import AngleSeries
 from anglecam.errors import printable
 from anglecam.identification.fit import Fit
-from anglecam.io.series_csv import AngleSeries
-from anglecam.io.session import Command
 from anglecam.loop.candidates import Candidate
 from anglecam.loop.close import Verdict
 from anglecam.loop.cross_validation import Prediction

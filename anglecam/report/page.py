@@ -10,10 +10,11 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from anglecam import __version__
+from anglecam.data.series import AngleSeries
 from anglecam.effects import effect
 from anglecam.identification.identify import Identified
 from anglecam.io.files import write_atomically
-from anglecam.io.series_csv import CORRECTED, AngleSeries
+from anglecam.io.session import CORRECTED
 from anglecam.loop.close import Verdict
 from anglecam.loop.cross_validation import LEFT_OUT, TURNS
 from anglecam.loop.loop_json import NEXT_COMMAND, plain, sentence, size_of, split_unit, with_uncertainty

@@ -15,11 +15,11 @@ from matplotlib.axes import Axes
 from matplotlib.patches import FancyBboxPatch
 from numpy.typing import NDArray
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.effects import Effect, Knots
 from anglecam.effects import effect as entry
 from anglecam.identification.fit import Fit
-from anglecam.io.session import Command
 from anglecam.loop.close import Verdict
 from anglecam.loop.loop_json import plain
 from anglecam.loop.stepwise import applicable

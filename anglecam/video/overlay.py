@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.series import OK, AngleSeries
 from anglecam.io.files import write_whole
-from anglecam.io.series_csv import OK, AngleSeries
 from anglecam.video.frames import Frame, Image, read_frames
 
 Floats = NDArray[np.float64]

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from anglecam.data.command import Command
 from anglecam.io.files import write_json
 from anglecam.io.series_csv import write_series
-from anglecam.io.session import SERIES_ENDING, Command
+from anglecam.io.session import SERIES_ENDING
 from anglecam.measurement.clip import Measurement
 from anglecam.measurement.clock_sync import offset_of, on_clip_clock
 from anglecam.measurement.step_response import Response, responses, responses_as_dicts
@@ -36,7 +37,7 @@ def write_measurement(
         How the angle answered every change.
     """
     series = measurement.series
-    command = on_clip_clock(command, offset_of(command, series.lamp_s))
+    command = on_clip_clock(command, offset_of(command, series.evidence.lamp_s))
     write_series(series, out / f"{series.name}{SERIES_ENDING}")
     changes = [] if command is None else command.time[1:][np.diff(command.angle) != 0.0].tolist()
     answers = responses(series.time, series.angle, series.sigma, changes)

@@ -7,11 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record, record_from_series
+from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError, blame
 from anglecam.io.rig import Rig
-from anglecam.io.series_csv import AngleSeries, read_series, write_series
-from anglecam.io.session import SERIES_ENDING, Command, Recording, Session
+from anglecam.io.series_csv import read_series, write_series
+from anglecam.io.session import SERIES_ENDING, Recording, Session
 from anglecam.io.tracks.files import TRACKS_ENDINGS
 from anglecam.measurement.clip import Measurement, measure_clip
 from anglecam.measurement.clock_sync import note_on, offsets, on_clip_clock
@@ -172,7 +174,7 @@ def gather_session(session: Session, series_of: Callable[[Recording], tuple[Angl
             commands[one.name] = recording.command
         except InputError as problem:
             problems.append(problem)
-    ahead = offsets(commands, {one.name: one.lamp_s for one in series})
+    ahead = offsets(commands, {one.name: one.evidence.lamp_s for one in series})
     for one in series:
         offset = ahead[one.name]
         try:

@@ -10,8 +10,8 @@ from anglecam.errors import RigError
 from anglecam.identification.export import fitted_model, transfer_as_dict, write_mat
 from anglecam.identification.identify import Estimator, Identified, declared_start, identify_records
 from anglecam.io.files import write_json
-from anglecam.io.series_csv import CORRECTED, write_series
-from anglecam.io.session import SERIES_ENDING, Session
+from anglecam.io.series_csv import write_series
+from anglecam.io.session import CORRECTED, SERIES_ENDING, Session
 from anglecam.loop.close import Verdict, close_records
 from anglecam.loop.correct import corrected
 from anglecam.loop.cross_validation import split_records

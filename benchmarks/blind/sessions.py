@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from anglecam.data.camera_evidence import View
+from anglecam.data.command import Command
 from anglecam.data.record import Record
-from anglecam.effects import View
 from anglecam.identification.output_error import fit_output_error
-from anglecam.io.session import Command
 from anglecam.models.plant import Plant
 from benchmarks.blind.drawn import magnified
 from synth.errors import SpecError

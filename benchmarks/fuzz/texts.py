@@ -273,12 +273,12 @@ def readers() -> dict[str, Reader]:
     from anglecam.camera.lens import lens_from_rig
     from anglecam.data.record import record_from_series
     from anglecam.identification.export import read_model
+    from anglecam.io.command_csv import read_command
     from anglecam.io.neck_file import read_neck
+    from anglecam.io.responses_json import nod_from_responses
     from anglecam.io.rig import Marks, Rig, read_rig
     from anglecam.io.series_csv import read_series
-    from anglecam.io.session import read_command
     from anglecam.measurement.tracks import measure_tracks
-    from anglecam.neck.pd_tuning import nod_from_responses
 
     marks = Rig(marks=Marks(mouth="lips", pivot="ear", rate_hz=30))
 

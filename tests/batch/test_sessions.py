@@ -13,7 +13,8 @@ import pytest
 from anglecam.batch.run import Options, run_batch
 from anglecam.batch.sessions import SessionJob, _configuration
 from anglecam.batch.work import Settings
-from anglecam.io.series_csv import AngleSeries, write_series
+from anglecam.data.series import AngleSeries
+from anglecam.io.series_csv import write_series
 from anglecam.io.session import read_session
 from anglecam.workflow.recordings import measure_session
 from anglecam.workflow.session import identify_session

@@ -11,13 +11,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.identification.ekf import fit_ekf, settings_for
 from anglecam.identification.identify import identify_records
 from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.output_error import fit_output_error
 from anglecam.io.rig import Rig
-from anglecam.io.session import Command
 from anglecam.models.plant import Plant
 from anglecam.models.third_order import ThirdOrder
 from support.comparison import compare_models

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.identification.ekf import PAPER, fit_ekf, settings_for
 from anglecam.identification.identify import identify_records
 from anglecam.identification.output_error import fit_output_error
 from anglecam.identification.smoothing import smooth
 from anglecam.io.rig import Rig
-from anglecam.io.session import Command
 from anglecam.models.plant import Plant
 from support.cramer_rao import cramer_rao_bound
 from support.motion import Plant as TruePlant

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.effects import effect
 from anglecam.identification.multiple_shooting import drifts, goes_astray, windows
 from anglecam.identification.output_error import fit_output_error
-from anglecam.io.session import Command
 from anglecam.models.plant import Plant
 
 TIME = np.arange(0.0, 20.0, 0.02)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anglecam.effects import View, effect
+from anglecam.data.camera_evidence import View
+from anglecam.data.series import AngleSeries
+from anglecam.effects import effect
 from anglecam.identification.fit import Fit
-from anglecam.io.series_csv import AngleSeries
 from anglecam.loop.correct import corrected
 from anglecam.models.plant import Plant
 

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 import yaml
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.effects import effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.noise import Noise
 from anglecam.identification.output_error import fit_output_error
-from anglecam.io.session import Command, read_command
+from anglecam.io.command_csv import read_command
 from anglecam.loop.candidates import fit_with
 from anglecam.loop.next_experiment.commands import candidate_commands, limits_of
 from anglecam.loop.next_experiment.design import ENOUGH, separating_experiment, write_command

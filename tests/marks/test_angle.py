@@ -13,10 +13,11 @@ import pytest
 
 import anglecam
 from anglecam.cli.app import app as cli
+from anglecam.data.command import Command
 from anglecam.errors import InputError, RigError
+from anglecam.io.csv_columns import SERIES_COLUMNS as COLUMNS
 from anglecam.io.rig import Camera, Marks, Rig
-from anglecam.io.series_csv import COLUMNS
-from anglecam.io.session import Command, read_session, recording_name
+from anglecam.io.session import read_session, recording_name
 from anglecam.measurement.tracks import measure_tracks
 from anglecam.workflow.recordings import measure_session, shown_to_loop
 from support.drawn import Look, Plant, Recording, draw_frames, write_clip
@@ -170,7 +171,7 @@ def test_times_come_from_the_clip_beside_and_every_frame_of_it_has_its_row(clip)
     assert measured.film == clip
     assert measured.series.name == "swing"
     np.testing.assert_allclose(measured.series.time, np.arange(40) / 30.0, atol=1e-9)
-    assert measured.series.picture_px == (640, 480)
+    assert measured.series.evidence.picture_px == (640, 480)
     assert measured.series.status == ("ok",) * 36 + ("no_mouth",) * 4
 
 

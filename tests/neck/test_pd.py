@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from anglecam.errors import InputError
+from anglecam.io.responses_json import nod_from_responses
 from anglecam.neck.large_angle import LargeAngleNeck, acceleration, equilibrium
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.parameters import PAPER
@@ -23,7 +24,7 @@ from anglecam.neck.pd import (
     sys2,
     third_order_plant,
 )
-from anglecam.neck.pd_tuning import ADULT, Nod, nod_from_responses, tune_pd
+from anglecam.neck.pd_tuning import ADULT, Nod, tune_pd
 
 NECK = linear_neck(PAPER)
 

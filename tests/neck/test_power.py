@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from anglecam.errors import InputError
-from anglecam.neck.power import SERVOS, PowerLog, Source, find_nods, fit_source, nod_power, power_use, read_power_log
+from anglecam.io.power_csv import read_power_log
+from anglecam.neck.power import SERVOS, PowerLog, Source, find_nods, fit_source, nod_power, power_use
 
 V0, R = 6.0, 2.5 / 0.6
 NODS = ((1.0, 1.6), (2.5, 3.0), (4.0, 4.8))

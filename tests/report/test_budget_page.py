@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from anglecam.io.command_csv import read_command
 from anglecam.io.rig import read_rig
-from anglecam.io.session import read_command
 from anglecam.measurement.clip import measure_clip
 from anglecam.report.budget_page import budget_table, write_budget
 from anglecam.report.figure8 import touching_point

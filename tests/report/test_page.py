@@ -9,12 +9,13 @@ from html import unescape
 import numpy as np
 import pytest
 
+from anglecam.data.command import Command
+from anglecam.data.series import AngleSeries
 from anglecam.effects import effect
 from anglecam.identification.identify import identify_records
 from anglecam.identification.output_error import fit_output_error
+from anglecam.io.command_csv import read_command
 from anglecam.io.rig import Rig
-from anglecam.io.series_csv import AngleSeries
-from anglecam.io.session import Command, read_command
 from anglecam.loop.close import Accepted, close_records
 from anglecam.loop.loop_json import next_experiment, sentence, split_unit, verdict_as_dict, write_next_command
 from anglecam.loop.next_experiment.design import Experiment

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anglecam.io.session import Command
+from anglecam.data.command import Command
 from anglecam.models.large_angle import DEFAULT, QUANTITIES, LargeAngle
 from anglecam.models.plant import Plant
 from anglecam.neck.large_angle import LargeAngleNeck, linearise

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import yaml
 
-from anglecam.effects import LEDGER, UNSEEN, View, effect
-from anglecam.io.session import Command
+from anglecam.data.camera_evidence import UNSEEN, View
+from anglecam.data.command import Command
+from anglecam.effects import LEDGER, effect
 from anglecam.models.plant import Plant
 from synth.motion import command_rows, move
 from synth.spec import read_spec

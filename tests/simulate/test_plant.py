@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from anglecam.data.command import Command
 from anglecam.effects import LEDGER, effect
 from anglecam.effects.effect import PORTS
-from anglecam.io.session import Command
 from anglecam.models.plant import Plant
 from support.motion import Plant as TruePlant
 from support.motion import Recording, command_rows, move

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
-from anglecam.identification.fit import Fit, Model
+from anglecam.identification.fit import Fit
 from anglecam.identification.output_error import fit_output_error
+from anglecam.models.model import Model
 
 Floats = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record
-from anglecam.io.session import Command
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.neck.parameters import PAPER
 from anglecam.neck.statics import slack_limit

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record
-from anglecam.io.session import Command
 from support.motion import Plant, Recording, command_rows, move
 
 

@@ -8,8 +8,8 @@ import av
 import numpy as np
 import pytest
 
+from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError
-from anglecam.io.series_csv import AngleSeries
 from anglecam.video.frames import inspect_clip, read_frames, sample_frames
 from anglecam.video.overlay import write_overlay
 from support import broken

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record
-from anglecam.io.session import Command
 
 Floats = NDArray[np.float64]
 

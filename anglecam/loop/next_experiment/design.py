@@ -26,12 +26,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.effects import LEDGER
 from anglecam.identification.fit import Fit, whiten
 from anglecam.identification.noise import Noise
 from anglecam.io.files import write_atomically
-from anglecam.io.session import Command
 from anglecam.loop.next_experiment.commands import (
     LONGEST,
     Candidate,

@@ -21,7 +21,7 @@ _ROUND = 1.1
 """Ratio of the axes below which an outline points nowhere."""
 
 
-def own_turn(regions: Sequence[Region], line: Floats) -> tuple[float, float] | None:
+def outline_turn(regions: Sequence[Region], line: Floats) -> tuple[float, float] | None:
     """Tell by which share of the line's turn the mouth's longer axis turns more than the line.
 
     Parameters

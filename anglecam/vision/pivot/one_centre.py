@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.io.series_csv import OK
+from anglecam.data.series import OK
 from anglecam.vision.image.transforms import turn_of, turned
 from anglecam.vision.rigid_body.bodies import LEAST_TURN
 from anglecam.vision.rigid_body.keyframes import GROUPS

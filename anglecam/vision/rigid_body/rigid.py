@@ -15,7 +15,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.io.series_csv import OK
+from anglecam.data.series import OK
 from anglecam.video.frames import Frame, Image
 from anglecam.vision.image.transforms import inverse, moved, turn_of
 from anglecam.vision.pivot.one_centre import Placed, RigidMotion, pose_information, turn_about_one_centre

@@ -1,0 +1,33 @@
+"""What every forward model offers to an estimator."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.data.camera_evidence import UNSEEN, View
+from anglecam.data.command import Command
+
+Floats = NDArray[np.float64]
+
+
+class Model(Protocol):
+    """What can be fitted: `anglecam.models.plant.Plant` and `anglecam.models.third_order.ThirdOrder`."""
+
+    states: int
+
+    @property
+    def names(self) -> tuple[str, ...]: ...  # noqa: D102  # documented where implemented
+    @property
+    def lower(self) -> Floats: ...  # noqa: D102
+    @property
+    def upper(self) -> Floats: ...  # noqa: D102
+    @property
+    def scales(self) -> Floats: ...  # noqa: D102
+    @property
+    def to_file(self) -> Floats: ...  # noqa: D102
+    def predict(  # noqa: D102
+        self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNSEEN
+    ) -> Floats: ...
