@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.budget.gum import Combined, Comparison, Propagated, combine, compare, propagate
 from anglecam.budget.terms import Course, ErrorSources, angle_draws, courses
 from anglecam.data.series import CONTRACT_RADII_PX
+from anglecam.data.typing import Floats
 from anglecam.measurement.sigma import worst_case, worst_case_both_ends
-
-Floats = NDArray[np.float64]
 
 PAPER = ((6.0, 0.28), (10.0, 0.68))
 """Pixel error, px, and what the paper says it does to the angle, degrees (text on Fig. 8)."""

@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 
 from anglecam.budget.terms import ErrorSources, Neutral
 from anglecam.data.series import OK
+from anglecam.data.typing import Flags, Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.clip import Measurement
 from anglecam.measurement.registration_pass import Registered
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _MARKER_DOF = 10.0
 """Of a marker's covariance: twelve sectors of its edge less two coordinates."""

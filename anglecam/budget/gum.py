@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
+
 Distribution = Literal["normal", "uniform"]
 
 COVERAGE = 0.95

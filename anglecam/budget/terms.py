@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 
 from anglecam.budget.gum import Distribution, Term, widening
 from anglecam.camera.tilt import Tilt
+from anglecam.data.typing import Floats
 
-Floats = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Floats]
 
 

@@ -13,15 +13,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.camera.calibration import Calibration
 from anglecam.camera.chessboard import find_corners
+from anglecam.data.typing import Floats
 from anglecam.errors import InputError
 from anglecam.video.film import decoded_once
 from anglecam.video.frames import inspect_clip, read_frames
-
-Floats = NDArray[np.float64]
 
 _STRETCHES = 120
 """Parts of the clip from each of which one frame is searched."""

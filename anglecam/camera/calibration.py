@@ -14,12 +14,10 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats
 from anglecam.errors import RigError
 from anglecam.io.files import read_text, write_atomically
-
-Floats = NDArray[np.float64]
 
 DISTORTION_NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "taux", "tauy")
 """OpenCV's order."""

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 _BLUR_PX = 1.0
 _WINDOW_SHARE = 0.3

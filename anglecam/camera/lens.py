@@ -29,13 +29,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from anglecam.camera.calibration import Calibration, read_calibration
+from anglecam.data.typing import Floats
 from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Rig
-
-Floats = NDArray[np.float64]
 
 _UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
 """OpenCV's own default, five rounds, leaves 0.1 px in the corners of a wide lens."""

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from anglecam.data.camera_evidence import UNSEEN, View
 from anglecam.data.command import Command
 from anglecam.data.series import AngleSeries
+from anglecam.data.typing import Floats
 from anglecam.errors import InputError
-
-Floats = NDArray[np.float64]
 
 STILL = 0.02
 """Share of the whole swing within which the angle counts as not yet released."""

@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.camera_evidence import NO_EVIDENCE, CameraEvidence
+from anglecam.data.typing import Floats
 
 OK = "ok"
 STATUSES = (OK, "no_mouth", "occluded", "ambiguous", "no_pivot", "duplicate", "undecodable")
 """``ok`` or why a frame has no angle."""
 CONTRACT_RADII_PX = (6.0, 10.0)
 """Radii of the paper's worst cases, px; every series file has a column for each."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

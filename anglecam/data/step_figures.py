@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 LOW, HIGH, SETTLED = 0.1, 0.9, 0.02
 """Shares of the way: rise from the first to the second, settling to within the third."""

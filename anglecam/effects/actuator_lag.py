@@ -7,12 +7,8 @@ The paper leaves the motor's inductance out, Eq. (30), and says that the order "
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter
-
-Floats = NDArray[np.float64]
 
 
 def _lag(parameters: Floats) -> float:

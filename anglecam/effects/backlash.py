@@ -11,11 +11,9 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Knots, Parameter
-
-Floats = NDArray[np.float64]
 
 
 def _play(asked: Knots, parameters: Floats) -> Knots:

@@ -8,12 +8,8 @@ counts of dropped frames by more. What the clip's own clock makes of a, b and c 
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Knots, Parameter
-
-Floats = NDArray[np.float64]
 
 
 def _stretch(asked: Knots, parameters: Floats) -> Knots:

@@ -12,12 +12,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
+from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Knots, Parameter
-
-Floats = NDArray[np.float64]
 
 
 def _shift(asked: Knots, parameters: Floats) -> Knots:

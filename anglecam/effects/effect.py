@@ -21,11 +21,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.camera_evidence import View
+from anglecam.data.typing import Floats
 
-Floats = NDArray[np.float64]
 Values = tuple[float, ...]
 """Parameters as compiled functions take them: arrays would cost them more than what they work out."""
 

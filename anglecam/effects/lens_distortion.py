@@ -11,12 +11,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.camera_evidence import View
+from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter
-
-Floats = NDArray[np.float64]
 
 ROUNDS = 8
 """Steps in which the picture is undone; each leaves a share of the error that is as large as the distortion itself."""

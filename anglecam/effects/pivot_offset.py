@@ -9,12 +9,10 @@ how far ahead and up it lies of the right one, as shares of the lever arm.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.camera_evidence import View
+from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter
-
-Floats = NDArray[np.float64]
 
 
 def _seen(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:

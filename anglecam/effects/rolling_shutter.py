@@ -8,12 +8,10 @@ The paper takes the whole frame at one instant.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.camera_evidence import View
+from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter
-
-Floats = NDArray[np.float64]
 
 
 def _when(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:

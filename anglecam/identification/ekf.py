@@ -16,14 +16,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.identification.kalman import SHARED, Filtered, filter_record
 from anglecam.identification.smoothing import smooth_first_states
 from anglecam.models.plant import Plant
-
-Floats = NDArray[np.float64]
 
 SETTLED = 1e-3
 """Passes end when no parameter moves by more than this share of its standard uncertainty."""

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import io
 
+from anglecam.data.typing import Floats
 from anglecam.errors import InputError
 from anglecam.identification.identify import Identified
 from anglecam.io.files import read_json
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     import control
     from scipy import signal
 
-Floats = NDArray[np.float64]
 
 SECOND_ORDER = ("a_per_s", "b_per_s2", "c_per_s2")
 THIRD_ORDER = ("d2_per_s", "d1_per_s2", "d0_per_s3", "n2_per_s", "n1_per_s2", "n0_per_s3")

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.models.model import Model
-
-Floats = NDArray[np.float64]
 
 CLUSTER = 15
 """Frames; errors further apart than this count as independent."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.record import Record
 from anglecam.data.step_figures import NO_STEP, StepFigures
+from anglecam.data.typing import Floats
 from anglecam.errors import RigError
 from anglecam.identification.fit import Fit
 from anglecam.identification.initial_guess import start_parameters
@@ -24,7 +24,6 @@ from anglecam.models.third_order import ThirdOrder
 from anglecam.models.unit_step import step_figures
 from anglecam.neck.large_angle import LargeAngleNeck, linearise
 
-Floats = NDArray[np.float64]
 Estimator = Literal["ekf", "oe2", "oe3", "neck"]
 ESTIMATORS: tuple[str, ...] = get_args(Estimator)
 DOUBTFUL = 3.0

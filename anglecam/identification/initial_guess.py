@@ -11,12 +11,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.models.plant import Plant
-
-Floats = NDArray[np.float64]
 
 DAMPING_RATIOS = (0.01, 0.05, 0.2, 0.5, 0.8, 1.5, 4.0)
 FREQUENCIES = 28

@@ -14,14 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 from numba import njit
-from numpy.typing import NDArray
 
 from anglecam.data.command import Command
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.models.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, SOURCES, WIDTH, integrate
 from anglecam.models.plant import MAX_STEP
-
-Floats = NDArray[np.float64]
 
 SHARED = slice(2, 5)
 """Where a, b, c stand in the state; what stands elsewhere is the recording's own."""

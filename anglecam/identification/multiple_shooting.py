@@ -26,9 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import LEAST_FRAMES, Record
+from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit
-
-Floats = NDArray[np.float64]
 
 TIME_CONSTANTS = 2.0
 """A drifting plant's window in time constants of its fastest pole: a decaying rate has lost 86 % of its start by then,

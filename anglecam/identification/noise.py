@@ -12,11 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.record import Record
-
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 DISTANCE = "distance from the pivot"
 MEASURED = "the measurement's own statement"

@@ -13,15 +13,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 from threadpoolctl import ThreadpoolController
 
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit, whiten
 from anglecam.models.model import Model
-
-Floats = NDArray[np.float64]
 
 STEP = 1e-6
 """Of the difference quotients, as a share of a parameter."""

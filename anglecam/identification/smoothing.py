@@ -20,11 +20,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats
 from anglecam.identification.kalman import SHARED, Filtered, measured
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

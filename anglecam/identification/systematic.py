@@ -14,13 +14,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit
 from anglecam.identification.noise import Noise
-
-Floats = NDArray[np.float64]
 
 
 def full_sigma(fit: Fit, records: Sequence[Record], noise: Noise) -> Floats:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.series import STATUSES
+from anglecam.data.typing import Floats
 from anglecam.errors import InputError
 from anglecam.io.files import open_text
 
@@ -37,8 +38,6 @@ _LONGEST_STATUS = max(map(len, STATUSES)) + 1
 """Characters; longer than any, so that what is cut is none of them."""
 _LARGEST = 1e12
 """No time in s, angle in degrees or place in px is as large; squares of what is smaller stay finite."""
-
-Floats = NDArray[np.float64]
 
 
 def read_columns(path: Path, *, required: Sequence[str], may_be_empty: bool = False) -> dict[str, NDArray]:

@@ -18,8 +18,6 @@ from anglecam.errors import InputError
 from anglecam.io.csv_columns import SERIES_COLUMNS, read_columns, require_increasing
 from anglecam.io.files import write_atomically
 
-Floats = NDArray[np.float64]
-
 
 def write_series(series: AngleSeries, path: Path) -> None:
     """Write ``NAME.angles.csv``: a row a frame, degrees, empty cells where a frame could not be measured.

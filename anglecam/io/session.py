@@ -10,9 +10,6 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from anglecam.data.command import Command
 from anglecam.errors import InputError, RigError
 from anglecam.io.command_csv import COMMAND_ENDING, read_command
@@ -23,8 +20,6 @@ CLIP_ENDINGS = (".avi", ".mp4", ".mkv", ".mov")
 SERIES_ENDING = ".angles.csv"
 CORRECTED = "corrected"
 """Folder of a session's series without what the camera did."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

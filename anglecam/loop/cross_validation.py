@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.errors import RigError
 from anglecam.identification.fit import Fit, whiten
 from anglecam.identification.output_error import fit_output_error, predict_output_error, predicted_angle
-
-Floats = NDArray[np.float64]
 
 DRAWS = 999
 BLOCK = 0.5

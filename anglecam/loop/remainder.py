@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit
 from anglecam.identification.noise import Noise
-
-Floats = NDArray[np.float64]
 
 REACHES = (3, 4, 6, 8, 11, 15, 20)
 """Half-lengths, in frames, of the stretches that are tried."""

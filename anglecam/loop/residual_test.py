@@ -17,15 +17,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit, whiten
 from anglecam.loop.screen import Direction, absorbed_space
 from anglecam.loop.state_torques import torque_responses
-
-Floats = NDArray[np.float64]
 
 DRAWS = 999
 LAGS = 15

@@ -14,15 +14,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit, whiten
 from anglecam.loop.refit import plant_of
 from anglecam.models.plant import Plant
-
-Floats = NDArray[np.float64]
 
 STEPS = (0.0003, 0.003, 0.03, 0.3)
 """Shares of a start at which an effect is also tried: small ones are far from their starts."""

@@ -12,15 +12,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.command import Command
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit, whiten
 from anglecam.loop.refit import plant_of
 from anglecam.models.plant import Plant
-
-Floats = NDArray[np.float64]
 
 ANGLES = 9
 """Knots of a curve over the angle, from the lowest to the highest."""

@@ -14,16 +14,13 @@ from anglecam.camera.lens import Lens
 from anglecam.camera.shutter import mean_off_middle
 from anglecam.camera.tilt import Tilt
 from anglecam.data.command import Command
+from anglecam.data.typing import Flags, Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.detections import Sighting
 from anglecam.measurement.registration_pass import Registered
 from anglecam.measurement.sigma import PlaceErrors, angle_sigma, place_errors
 from anglecam.vision.pivot.marker import Pivot
-from anglecam.vision.pivot.one_centre import RigidMotion
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
+from anglecam.vision.rigid_body.one_centre import RigidMotion
 
 _THICK = 0.25
 """Standard deviation of the height of what is seen of a mouth, as a share of the root of its area."""

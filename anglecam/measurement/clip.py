@@ -17,6 +17,7 @@ from anglecam.camera.shutter import measurement_time
 from anglecam.data.camera_evidence import CameraEvidence
 from anglecam.data.command import Command
 from anglecam.data.series import OK, AngleSeries
+from anglecam.data.typing import Floats
 from anglecam.io.rig import Rig
 from anglecam.io.session import recording_name
 from anglecam.measurement.angles import Angles, coarse_angles, turns
@@ -29,8 +30,6 @@ from anglecam.measurement.rigid_body_pass import sight_head
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.video.film import decoded_once
 from anglecam.vision.mark.outline_turn import outline_turn
-
-Floats = NDArray[np.float64]
 
 _CARRIED_PX = 1.0
 """How far from where the head carries it a mouth may seem to be that is smeared and not hidden."""

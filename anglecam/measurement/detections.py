@@ -13,16 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.camera.lens import Lens
+from anglecam.data.typing import Floats, Image
 from anglecam.io.rig import Rig
-from anglecam.video.frames import ClipInfo, Image, Sample
+from anglecam.video.frames import ClipInfo, Sample
 from anglecam.vision.image.median import median_picture
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle
 from anglecam.vision.pivot.marker import Marker, Pivot, choose_pivot, find_marker
-from anglecam.vision.pivot.one_centre import RigidMotion
+from anglecam.vision.rigid_body.one_centre import RigidMotion
 from anglecam.vision.stabilise.background_motion import CameraMove
-
-Floats = NDArray[np.float64]
 
 _SAMPLE_BYTES = 100_000_000
 """Memory for the frames of the first pass."""

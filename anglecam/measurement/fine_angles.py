@@ -13,12 +13,11 @@ from numpy.typing import NDArray
 
 from anglecam.camera.shutter import mean_off_middle
 from anglecam.data.command import Command
+from anglecam.data.typing import Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles, neutral_of
 from anglecam.measurement.registration_pass import Registered
 from anglecam.vision.pivot.marker import Pivot
-
-Floats = NDArray[np.float64]
 
 
 def fine_angles(

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from anglecam.camera.lens import Lens, lens_from_rig
 from anglecam.data.series import OK
+from anglecam.data.typing import Floats, Image
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.detections import Sighting, find_pivot, frames_to_keep, why_truncated
 from anglecam.measurement.rigid_body_pass import sight_head
-from anglecam.video.frames import Image, Sample, inspect_clip, read_frames, sample_frames
+from anglecam.video.frames import Sample, inspect_clip, read_frames, sample_frames
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.mark.search import Found, find_mouth
 from anglecam.vision.mark.segment import Region, find_regions
@@ -29,8 +30,6 @@ from anglecam.vision.mark.track import Track, follow_mouth
 from anglecam.vision.pivot.marker import Marker, Pivot
 from anglecam.vision.stabilise.background_motion import LOST, CameraMove, Steady
 from anglecam.vision.stabilise.learn import learn_steady
-
-Floats = NDArray[np.float64]
 
 _SMALLEST_SHARE = 0.25
 """Of the mouth's area; a smaller region is no mouth even if partly hidden."""

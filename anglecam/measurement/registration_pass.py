@@ -15,14 +15,13 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from anglecam.camera.lens import Lens
-from anglecam.video.frames import Image, inspect_clip, read_frames
+from anglecam.data.typing import Floats, Image
+from anglecam.video.frames import inspect_clip, read_frames
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.marker import Pivot
 from anglecam.vision.registration.fit import LOST, Look, Turn, find_turn, nearest_fit
 from anglecam.vision.registration.learn import learn
 from anglecam.vision.registration.tiles import Glimpse, choose_tiles, plane_of
-
-Floats = NDArray[np.float64]
 
 _LEARNT = 120
 """Frames from which the head is learnt, at most."""

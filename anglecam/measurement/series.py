@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.camera_evidence import CameraEvidence
 from anglecam.data.command import Command
 from anglecam.data.series import CONTRACT_RADII_PX, OK, AngleSeries
+from anglecam.data.typing import Flags, Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.sigma import worst_case
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 def series_of_angles(

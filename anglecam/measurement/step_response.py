@@ -15,12 +15,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import UnivariateSpline
 
 from anglecam.data.step_figures import HIGH, LOW, SETTLED, first_crossing, last_rise, settling
-
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 _STILL_SIGMAS, _STILL_SHARE = 3.0, 0.005
 """Half-width of the band that a rest stays in: times sigma, of the clip's whole range; the larger holds."""

@@ -17,6 +17,7 @@ from anglecam.camera.shutter import measurement_time
 from anglecam.data.camera_evidence import CameraEvidence
 from anglecam.data.command import Command
 from anglecam.data.series import OK, AngleSeries
+from anglecam.data.typing import Flags, Floats
 from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Marks, Rig
 from anglecam.io.session import clip_beside, recording_name
@@ -27,9 +28,6 @@ from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.measurement.sigma import PlaceErrors
 from anglecam.video.frames import inspect_clip, read_frames
 from anglecam.vision.pivot.marker import Pivot
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _SHORTEST_PX = 1.0
 """A lever shorter than this has no direction worth the name."""

@@ -12,11 +12,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.series import AngleSeries
-
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 FINEST = math.radians(1e-3)
 """No difference smaller than this is looked into."""

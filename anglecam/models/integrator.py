@@ -17,12 +17,9 @@ from pathlib import Path
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from anglecam import effects
 from anglecam.effects import LEDGER
-
-Floats = NDArray[np.float64]
 
 _SERVOS = sorted((e for e in LEDGER if e.servo is not None), key=lambda e: e.rank)
 SERVO_IDS = tuple(e.id for e in _SERVOS)

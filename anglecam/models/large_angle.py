@@ -8,13 +8,11 @@ from functools import cached_property
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from anglecam.data.camera_evidence import UNSEEN, View
 from anglecam.data.command import Command
+from anglecam.data.typing import Floats
 from anglecam.neck.large_angle import LargeAngleNeck, linearise, restoring_tangent, restoring_torque
-
-Floats = NDArray[np.float64]
 
 MAX_STEP = 0.004
 """s; see `anglecam.models.plant.MAX_STEP`."""

@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from anglecam.data.camera_evidence import UNSEEN, View
 from anglecam.data.command import Command
-
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 
 class Model(Protocol):

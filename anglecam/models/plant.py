@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.camera_evidence import UNSEEN, View
 from anglecam.data.command import Command
+from anglecam.data.typing import Floats
 from anglecam.effects import Effect, Knots
 from anglecam.models.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, WIDTH, integrate
-
-Floats = NDArray[np.float64]
 
 MAX_STEP = 0.006
 """s; at the paper's natural frequency of 23 rad/s a step response errs by less than 5e-5 degrees."""

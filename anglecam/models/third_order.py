@@ -11,12 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from anglecam.data.camera_evidence import UNSEEN, View
 from anglecam.data.command import Command
-
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 MAX_STEP = 0.004
 

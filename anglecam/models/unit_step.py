@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from anglecam.data.command import Command
 from anglecam.data.step_figures import HIGH, LOW, NO_STEP, StepFigures, first_crossing, settling
+from anglecam.data.typing import Floats
 from anglecam.models.model import Model
-
-Floats = NDArray[np.float64]
 
 
 def step_figures(model: Model, parameters: Floats, poles: NDArray, steady_state: float) -> StepFigures:

@@ -4,7 +4,6 @@ What steps, tunes and optimises the neck stands in its own modules, `step`, `pd`
 `synthesis`: they need python-control, which is slow to load, or the estimators' figures, which geometry does without.
 """
 
-from anglecam.io.power_csv import read_power_log
 from anglecam.neck.command_table import (
     FIGURE_13,
     TABLE_3,
@@ -139,7 +138,6 @@ __all__ = [
     "pretension",
     "pretension_angle",
     "reach",
-    "read_power_log",
     "resolution",
     "restoring_torque",
     "sensor_gain_bound",

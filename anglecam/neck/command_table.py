@@ -28,13 +28,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from anglecam.data.typing import Floats, Integers
 from anglecam.neck.fourbar import NEUTRAL_SERVO, FourBar, head_angle, servo_angle
 from anglecam.neck.transmission import limits, slope, straight_line
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 HIGHEST = 254
 """Largest command; 255 opens a message."""

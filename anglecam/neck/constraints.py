@@ -12,10 +12,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 TOLERANCE = 1e-4
 """Of a constraint's scale, by which it may be missed and still be met, and within which it is active."""

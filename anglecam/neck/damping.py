@@ -18,9 +18,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 PAPER_VISCOSITY = 125.0
 """μ as the paper has it, N·s/m²."""

@@ -24,9 +24,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
+
 Branch = Literal["open", "crossed"]
 
 NEUTRAL_SERVO = math.radians(135.0)

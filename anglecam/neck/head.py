@@ -11,11 +11,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from anglecam.data.typing import Floats
 from anglecam.neck.parameters import Head
-
-Floats = NDArray[np.float64]
 
 
 def centre_of_mass(head: Head, theta: ArrayLike) -> tuple[Floats, Floats]:

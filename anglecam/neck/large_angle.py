@@ -20,16 +20,15 @@ from functools import cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicHermiteSpline
 
+from anglecam.data.typing import Floats
 from anglecam.neck.fourbar import NEUTRAL_SERVO, FourBar, head_angle, reach, servo_angle
 from anglecam.neck.parameters import PAPER, NeckParameters
 from anglecam.neck.spring import Preload, spring_tangent
 from anglecam.neck.statics import balanced, stable_zero, static_torque
 from anglecam.neck.transmission import bend, slope
-
-Floats = NDArray[np.float64]
 
 WIDEST = math.radians(120.0)
 """How far from neutral a neck with constant γ is taken at its word, rad: its equations know no end stop."""

@@ -16,15 +16,14 @@ from dataclasses import dataclass
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import newton
 
 from anglecam.data.step_figures import HIGH, LOW, NO_STEP, StepFigures, first_crossing, settling
+from anglecam.data.typing import Floats
 from anglecam.neck.linear import LinearNeck
 from anglecam.neck.step import linear_step, linear_step_figures
 
-Floats = NDArray[np.float64]
 Acceleration = Callable[[float, float, float], float]
 """θ̈ (rad/s²) of θ (rad), θ̇ (rad/s) and U (V)."""
 

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 
 import control
 import numpy as np
-from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats
 from anglecam.neck.constraints import Constraint, least
 from anglecam.neck.pd import ClosedLoop, PdGains, close_loop, rest_gain
-
-Floats = NDArray[np.float64]
 
 _LARGEST_GAIN = 50.0
 """Of K_p·G(0), and of K_d·G(0) in wanted rise times: far more than any margin allows."""

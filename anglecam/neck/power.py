@@ -11,11 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from anglecam.data.typing import Floats
 from anglecam.errors import InputError
-
-Floats = NDArray[np.float64]
 
 SERVOS = 16
 """Of the paper's head, face and neck."""

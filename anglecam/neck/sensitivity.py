@@ -13,16 +13,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from anglecam.data.step_figures import StepFigures
+from anglecam.data.typing import Floats
 from anglecam.neck.fourbar import FourBar, crank_reach, head_angle
 from anglecam.neck.linear import LinearNeck, linear_neck
 from anglecam.neck.parameters import PAPER, NeckParameters
 from anglecam.neck.step import linear_step, linear_step_figures
 from anglecam.neck.variation import PARAMETERS, Parameter
-
-Floats = NDArray[np.float64]
 
 FIG_9: dict[str, tuple[float, ...]] = {
     "h": (1.0, 1.4, 1.8),

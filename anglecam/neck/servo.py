@@ -17,11 +17,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from anglecam.data.typing import Floats
 from anglecam.neck.parameters import Servo
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

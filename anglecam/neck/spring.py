@@ -26,11 +26,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from anglecam.data.typing import Floats
 from anglecam.neck.parameters import Spring
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -14,14 +14,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from anglecam.data.typing import Floats
 from anglecam.neck.linear import passive_stiffness
 from anglecam.neck.parameters import Head, NeckParameters, Spring
 from anglecam.neck.spring import Preload, elongation, spring_torque
-
-Floats = NDArray[np.float64]
 
 SEARCHED = math.radians(90.0)
 """How far from neutral a balance is looked for, rad."""

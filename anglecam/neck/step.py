@@ -11,13 +11,12 @@ smoothly with parameters as their definitions do.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import companion
 from scipy.optimize import brentq
 
 from anglecam.data.step_figures import HIGH, LOW, NO_STEP, SETTLED, StepFigures
-
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 _DECAYS = 12.0
 """Time constants of the slowest pole that are looked at; e⁻¹² is far below the settling band."""

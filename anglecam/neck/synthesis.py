@@ -16,9 +16,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.step_figures import StepFigures
+from anglecam.data.typing import Floats
 from anglecam.neck.constraints import Constraint, least
 from anglecam.neck.fourbar import reach, servo_angle
 from anglecam.neck.linear import LinearNeck, linear_neck, passive_stiffness
@@ -29,8 +29,6 @@ from anglecam.neck.statics import pretension_angle
 from anglecam.neck.step import linear_step_figures
 from anglecam.neck.transmission import worst_transmission_angle
 from anglecam.neck.variation import PARAMETERS, neutral_head
-
-Floats = NDArray[np.float64]
 
 BOUNDS: dict[str, tuple[float, float]] = {
     "K": (200.0, 20_000.0),

@@ -17,11 +17,11 @@ from dataclasses import asdict, dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from anglecam.data.typing import Floats
 from anglecam.neck.fourbar import Branch, FourBar, crank_reach, head_angle, reach, servo_angle
 
-Floats = NDArray[np.float64]
 Kind = Literal["crank-rocker", "rocker-crank", "double-crank", "double-rocker", "triple-rocker", "change-point"]
 
 

@@ -21,9 +21,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 KGF_CM = 9.80665e-2
 """Kilogram-force centimetre, N·m: the paper's "kg cm"."""

@@ -10,7 +10,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from anglecam.io.neck_file import Neck
 from anglecam.neck.command_table import STRAIGHT, nod_limits, table_3
@@ -21,8 +20,6 @@ from anglecam.neck.statics import static_curve
 from anglecam.neck.transmission import limits, slope, straight_line, transmission_angle
 from anglecam.neck.turning import turning_angle, turning_range, turning_servo_angle, turning_slope
 from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, STYLE
-
-Floats = NDArray[np.float64]
 
 SERIES = (MEASURED, BEFORE, AFTER, "#b7791f", "#6b4fa0")
 """Colours of curves that stand side by side."""

@@ -9,9 +9,9 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from anglecam.data.command import Command
+from anglecam.data.typing import Floats
 from anglecam.neck.design import Relations
 from anglecam.neck.joint import Joint
 from anglecam.neck.linear import LinearNeck
@@ -23,8 +23,6 @@ from anglecam.neck_design.figures import SERIES, mark_step, save
 from anglecam.neck_design.procedure import Plant
 from anglecam.neck_design.systems import SideBySide, System
 from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, STYLE
-
-Floats = NDArray[np.float64]
 
 _COLOURS = {"SYS1": BEFORE, "small angles": "#b7791f", "SYS2": AFTER, "large angles": "#6b4fa0", "fitted": "#2f855a"}
 _WIDEST = 2.5

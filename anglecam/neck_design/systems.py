@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.command import Command
 from anglecam.data.record import Record, record_from_series
 from anglecam.data.step_figures import NO_STEP, StepFigures
+from anglecam.data.typing import Floats
 from anglecam.identification.export import FittedModel
 from anglecam.io.series_csv import read_series
 from anglecam.io.session import command_beside, rig_beside
@@ -32,8 +32,6 @@ from anglecam.neck.large_angle import LargeAngleNeck, acceleration, equilibrium,
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.pd import PdGains, simulate_pd, sys2
 from anglecam.neck.step import linear_step_figures
-
-Floats = NDArray[np.float64]
 
 SYS1 = (25.9786, 523.7292, 507.5597)
 """a (1/s), b (1/s²) and c (1/s²) that the paper identified."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import matplotlib.pyplot as plt
@@ -13,12 +12,9 @@ from matplotlib.patches import Circle
 from matplotlib.patheffects import Normal, Stroke
 from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats, Image
 from anglecam.report.figures import STYLE, _svg
 from anglecam.vision.mark.colour import FULL, NONE, learn_colour
-
-Image = NDArray[Any]
-"""Bytes, but cv2's type hints do not know it."""
-Floats = NDArray[np.float64]
 
 RADII_PX = (6.0, 10.0)
 _TRUE, _SIX, _TEN, _PIVOT = "#d7191c", "#2b6cff", "#12a150", "#ffd400"

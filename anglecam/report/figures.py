@@ -13,12 +13,9 @@ matplotlib.use("Agg")  # no screen
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from anglecam.data.series import AngleSeries
 from anglecam.errors import printable
-
-Floats = NDArray[np.float64]
 
 MEASURED, BEFORE, AFTER, COMMAND, FAINT = "#1b1f24", "#c4432b", "#1f6f8b", "#9aa3ad", "#d9dee3"
 STYLE: Any = {

@@ -9,11 +9,11 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
 from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.data.series import AngleSeries
+from anglecam.data.typing import Floats
 from anglecam.errors import printable
 from anglecam.identification.fit import Fit
 from anglecam.loop.candidates import Candidate
@@ -24,8 +24,6 @@ from anglecam.loop.next_experiment.design import SETTLE, Experiment
 from anglecam.loop.remainder import Remainder
 from anglecam.models.plant import Plant
 from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, STYLE, _svg
-
-Floats = NDArray[np.float64]
 
 WIDTH = 9.6
 MOST = 8

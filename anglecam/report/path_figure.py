@@ -13,10 +13,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import FancyBboxPatch
-from numpy.typing import NDArray
 
 from anglecam.data.command import Command
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.effects import Effect, Knots
 from anglecam.effects import effect as entry
 from anglecam.identification.fit import Fit
@@ -24,8 +24,6 @@ from anglecam.loop.close import Verdict
 from anglecam.loop.loop_json import plain
 from anglecam.loop.stepwise import applicable
 from anglecam.report.figures import AFTER, COMMAND, MEASURED, STYLE, _svg
-
-Floats = NDArray[np.float64]
 
 STATIONS = {
     "command": "what is asked",

@@ -10,21 +10,18 @@ import heapq
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import av
 import numpy as np
 from av.video.frame import PictureType
-from numpy.typing import NDArray
 
+from anglecam.data.typing import Image
 from anglecam.errors import InputError
 from anglecam.threads import native_threads
 from anglecam.video.container import is_cut_short
 from anglecam.video.film import reread
 from anglecam.video.opening import LONGEST_S, MOST_FRAMES, open_film
 
-Image = NDArray[Any]
-"""Bytes, but cv2's type hints do not know it."""
 _PREDICTED = (PictureType.P, PictureType.B)
 
 

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.series import OK, AngleSeries
+from anglecam.data.typing import Floats, Image
 from anglecam.io.files import write_whole
-from anglecam.video.frames import Frame, Image, read_frames
-
-Floats = NDArray[np.float64]
+from anglecam.video.frames import Frame, read_frames
 
 RADII_PX = (6.0, 10.0)
 """Circles of the paper's pixel errors about the mouth."""

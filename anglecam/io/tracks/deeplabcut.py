@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats
 from anglecam.errors import InputError
 from anglecam.io.files import open_text
 from anglecam.io.tracks.hdf5 import as_text, read_array, read_texts
@@ -28,7 +29,6 @@ from anglecam.io.tracks.tracks import MOST_VALUES, Tracks, unique_in_order
 if TYPE_CHECKING:
     import h5py
 
-Floats = NDArray[np.float64]
 
 _HEADERS = (["scorer", "bodyparts", "coords"], ["scorer", "individuals", "bodyparts", "coords"])
 _MOST_BYTES = 20 * MOST_VALUES

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats
 from anglecam.errors import InputError
-
-Floats = NDArray[np.float64]
 
 MOST_VALUES = 50_000_000
 """A file that says it holds more numbers than this is not read: a day of film with six points has fewer."""

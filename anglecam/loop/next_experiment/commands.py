@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from itertools import chain, cycle
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from anglecam.data.command import Command
 from anglecam.data.record import Record
-
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 UPDATE = 0.02
 """s; a servo takes a new position 50 times a second: smooth commands are stairs of this tread."""

@@ -23,11 +23,11 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from anglecam.data.command import Command
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.effects import LEDGER
 from anglecam.identification.fit import Fit, whiten
 from anglecam.identification.noise import Noise
@@ -42,7 +42,6 @@ from anglecam.loop.next_experiment.commands import (
 from anglecam.loop.refit import plant_of
 from anglecam.models.plant import Plant
 
-Floats = NDArray[np.float64]
 Pair = tuple[str, str]
 
 DURATIONS = (4.0, 8.0, LONGEST)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 RADIUS = 2
 """Of the patch that is looked at, px."""

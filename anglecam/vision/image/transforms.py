@@ -6,9 +6,8 @@ Turns count counter-clockwise as seen, though y points down.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 
 def turned(turns: float | Floats) -> Floats:

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 SMALLEST_PX2 = 12.0
 """A smaller patch has no centroid worth the name."""

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.transforms import turned
-
-Image = NDArray[Any]
-Floats = NDArray[np.float64]
 
 _OWN, _AROUND = 0.8, 1.8
 """Of the root of its area: within the first a patch is itself, up to the second lie its surroundings."""

@@ -14,9 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Image = NDArray[Any]
-"""Bytes, but cv2's type hints do not know it."""
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats, Image
 
 NONE, FULL = 40.0, 215.0
 """Grey levels of a fraction map that stand for no mouth and for nothing but mouth; the rest is head room."""

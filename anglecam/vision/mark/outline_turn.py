@@ -9,11 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats
 from anglecam.vision.mark.segment import Region
-
-Floats = NDArray[np.float64]
 
 _FEWEST = 12
 """Frames."""

@@ -8,19 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats, Image
 from anglecam.vision.mark.blobs import Patches
 from anglecam.vision.mark.carried import carried_share
 from anglecam.vision.pivot.circle import circle_through
-
-Image = NDArray[Any]
-"""Bytes, but cv2's type hints do not know it."""
-Floats = NDArray[np.float64]
 
 _TOLERANCE_PX = 2.0
 """Coarse patches are placed this well."""

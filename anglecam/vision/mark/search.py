@@ -15,13 +15,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats, Image
 from anglecam.vision.mark.blobs import cut_out
 from anglecam.vision.mark.colour import ColourModel, chroma_of, hue_contrast, learn_colour
 from anglecam.vision.mark.paths import Track, moving_track, resting_track
-
-Image = NDArray[Any]
-"""Bytes, but cv2's type hints do not know it."""
-Floats = NDArray[np.float64]
 
 LEVELS = (0.3, 0.4, 0.5, 0.6, 0.7)
 """Shares of the way from the picture's usual hue to its most mouth-like one at which patches are cut out."""

@@ -13,11 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats, Image
 from anglecam.vision.mark.colour import FULL, NONE, ColourModel
-
-Image = NDArray[Any]
-"""Bytes, but cv2's type hints do not know it."""
-Floats = NDArray[np.float64]
 
 _MARGIN_PX = 12
 """Room around a region for the foot of its edges."""

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats
 from anglecam.vision.mark.search import Found
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle, fit_circle
-
-Floats = NDArray[np.float64]
 
 SEEN, ABSENT, HIDDEN, DOUBTFUL = "ok", "no_mouth", "occluded", "ambiguous"
 

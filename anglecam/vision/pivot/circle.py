@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from skimage.measure import CircleModel
 
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats
 
 _STEPS = 8
 _GATE = 4.0

@@ -9,17 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats, Image
 from anglecam.vision.pivot.circle import Circle
-
-Image = NDArray[Any]
-"""Bytes, but cv2's type hints do not know it."""
-Floats = NDArray[np.float64]
 
 _RADII_PX = np.arange(3, 25)
 _LEAST_COVERAGE = 0.6

@@ -18,10 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
+from anglecam.data.typing import Floats, Integers
 from anglecam.vision.registration.kernels import gain_equations, normal_equations, turn_equations
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 STEP_PX = 0.5
 """Between neighbouring knots: fine enough for an edge that only the pixels have blurred."""
@@ -41,7 +39,7 @@ class Views:
     """(m, 2) places of the pixels from the tile's centre of rotation, px."""
     values: NDArray[np.float32]
     """(m, planes) what they show."""
-    starts: Ints
+    starts: Integers
     """(views + 1,) where each view's pixels begin."""
 
     def without(self, out: NDArray[np.bool_]) -> Views:
@@ -130,7 +128,7 @@ class Fit:
     """(views, 3) of derivative times residual."""
     squares: Floats
     """(views,) of squared residuals."""
-    count: Ints
+    count: Integers
     """(views,) pixels times colours."""
     light: Floats
     """(views, planes, 3) what gain and offset of brightness, and variance of blur along the path (px²), the view has

@@ -17,12 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.video.frames import Image
+from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.transforms import turned
 from anglecam.vision.registration.appearance import Fit, Patches, compare
 from anglecam.vision.registration.tiles import SIDE_PX, Glimpse, Plane, look_at
-
-Floats = NDArray[np.float64]
 
 _STEPS = 3
 """Of Gauss and Newton, at most."""

@@ -14,14 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.typing import Floats
 from anglecam.vision.image.clusters import group_neighbours
 from anglecam.vision.image.transforms import turned
 from anglecam.vision.pivot.marker import Pivot
 from anglecam.vision.registration.appearance import Fit, Patches, Views, compare, joined, learn_patch, levelled
 from anglecam.vision.registration.fit import HIDDEN, Look, covered, scatter
 from anglecam.vision.registration.tiles import SIDE_PX, Glimpse, Plane, Tiles, look_at
-
-Floats = NDArray[np.float64]
 
 _GROUPS = 6
 _ROUNDS = 16

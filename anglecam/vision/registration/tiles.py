@@ -16,12 +16,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from anglecam.camera.lens import Lens
-from anglecam.video.frames import Image
+from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.median import median_picture
 from anglecam.vision.image.transforms import turned
 from anglecam.vision.registration.appearance import Views
-
-Floats = NDArray[np.float64]
 
 SIDE_PX = 16
 MOST_TILES = 40

@@ -13,10 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.video.frames import Image
+from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.transforms import fit_rigid, moved, turn_of, turned
-
-Floats = NDArray[np.float64]
 
 FEWEST = 10
 """Points; fewer are no body."""

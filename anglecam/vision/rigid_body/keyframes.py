@@ -13,12 +13,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.video.frames import Image
+from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.clusters import group_neighbours
 from anglecam.vision.image.transforms import fit_rigid, inverse, moved, turn_of
 from anglecam.vision.rigid_body.bodies import FEWEST, LEAST_TURN, find_body
-
-Floats = NDArray[np.float64]
 
 GROUPS = 8
 """Of points that lie together."""

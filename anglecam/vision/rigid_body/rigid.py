@@ -13,16 +13,14 @@ from itertools import combinations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.series import OK
-from anglecam.video.frames import Frame, Image
+from anglecam.data.typing import Floats, Image
+from anglecam.video.frames import Frame
 from anglecam.vision.image.transforms import inverse, moved, turn_of
-from anglecam.vision.pivot.one_centre import Placed, RigidMotion, pose_information, turn_about_one_centre
 from anglecam.vision.rigid_body.bodies import FEWEST, LEAST_TURN, Features, describe, find_turning_body, locate
 from anglecam.vision.rigid_body.keyframes import Key, choose_keys, hold_against
-
-Floats = NDArray[np.float64]
+from anglecam.vision.rigid_body.one_centre import Placed, RigidMotion, pose_information, turn_about_one_centre
 
 LOST, HIDDEN, UNDECODABLE = "no_mouth", "occluded", "undecodable"
 

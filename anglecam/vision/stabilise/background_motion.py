@@ -17,13 +17,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.video.frames import Image
+from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.transforms import turned
 from anglecam.vision.registration.appearance import Patches, Views, compare
 from anglecam.vision.stabilise.scenery import Scenery, locate
 from anglecam.vision.stabilise.windows import SIDE_PX, carried, follow, level
-
-Floats = NDArray[np.float64]
 
 _STEPS = 4
 """Of Gauss and Newton, at most; from a few hundredths of a pixel one is nearly enough."""

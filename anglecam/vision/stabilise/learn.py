@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 from threadpoolctl import threadpool_limits
 
-from anglecam.video.frames import Image
+from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.transforms import turned
 from anglecam.vision.registration.appearance import STEP_PX, Patches, compare, joined, learn_patch, levelled
 from anglecam.vision.stabilise.background_motion import (
@@ -30,8 +30,6 @@ from anglecam.vision.stabilise.background_motion import (
 )
 from anglecam.vision.stabilise.scenery import Scenery, find_scenery
 from anglecam.vision.stabilise.windows import SIDE_PX, level
-
-Floats = NDArray[np.float64]
 
 _FEWEST = 8
 """Frames to learn from."""

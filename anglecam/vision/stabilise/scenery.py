@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.video.frames import Image
+from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.stabilise.windows import (
     GATE_PX,
@@ -26,8 +26,6 @@ from anglecam.vision.stabilise.windows import (
     metric_of,
     squared_gates,
 )
-
-Floats = NDArray[np.float64]
 
 _FAR = 9.0
 """Squared gates from which on farther off is no worse."""

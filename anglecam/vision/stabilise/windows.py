@@ -8,11 +8,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from anglecam.video.frames import Image
-
-Floats = NDArray[np.float64]
+from anglecam.data.typing import Floats, Image
 
 SIDE_PX = 20
 """Of a window."""

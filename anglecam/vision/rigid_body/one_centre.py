@@ -10,14 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.series import OK
+from anglecam.data.typing import Floats
 from anglecam.vision.image.transforms import turn_of, turned
 from anglecam.vision.rigid_body.bodies import LEAST_TURN
 from anglecam.vision.rigid_body.keyframes import GROUPS
-
-Floats = NDArray[np.float64]
 
 _FEWEST = 10
 """Frames."""
