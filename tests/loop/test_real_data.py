@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).parents[2]
-FOLDER = ROOT.parent / "shared" / "real"
+from support.real import REAL, ROOT
+
 sys.path.append(str(ROOT / "benchmarks"))
 
-import real_data  # noqa: E402  # the benchmark's own reading of the files, not a second one
+import real_data  # the benchmark's own reading of the files, not a second one
 
-emps_here = pytest.mark.skipif(not (FOLDER / "emps").is_dir(), reason="the EMPS records are not here")
-pendulum_here = pytest.mark.skipif(not (FOLDER / "single-pendulum").is_dir(), reason="the pendulum is not here")
+emps_here = pytest.mark.skipif(not (REAL / "emps").is_dir(), reason="the EMPS records are not here")
+pendulum_here = pytest.mark.skipif(not (REAL / "single-pendulum").is_dir(), reason="the pendulum is not here")
 
 
 @pytest.fixture(scope="module")
 def drive():
-    records = real_data.records_of(real_data.write_emps, FOLDER / "emps")
+    records = real_data.records_of(real_data.write_emps, REAL / "emps")
     return {name: (fit, told) for name, fit, told in real_data.fit_emps(records)}
 
 
 @emps_here
 def test_dry_friction_of_a_drive_without_stiffness_brings_the_force_error_to_the_published(drive):
-    errors = {name: real_data.force_error(real_data.carriage(fit), FOLDER / "emps") for name, (fit, _) in drive.items()}
+    errors = {name: real_data.force_error(real_data.carriage(fit), REAL / "emps") for name, (fit, _) in drive.items()}
     assert errors["viscous"] > 0.17
     assert errors["+ coulomb_friction"] < 0.042  # published: 4.083 %
     assert errors["+ damping_asymmetry"] < 0.033  # published: 3.112 %
@@ -44,12 +43,12 @@ def test_each_kind_of_friction_predicts_the_record_with_added_pulses_better(driv
 @emps_here
 def test_the_published_parameters_give_the_published_force_error():
     told = {"M, kg": 95.109, "Fv+, N·s/m": 203.5, "Fv-, N·s/m": 203.5, "Fc+, N": 17.229, "Fc-, N": 23.559}
-    assert real_data.force_error(told, FOLDER / "emps") == pytest.approx(0.04083, abs=1e-4)
+    assert real_data.force_error(told, REAL / "emps") == pytest.approx(0.04083, abs=1e-4)
 
 
 @pendulum_here
 def test_a_wide_swing_shows_the_sine_of_gravity_and_then_drag():
-    records = real_data.records_of(real_data.write_pendulum, FOLDER / "single-pendulum")
+    records = real_data.records_of(real_data.write_pendulum, REAL / "single-pendulum")
     fits = real_data.fit_swing(records, ("quadratic_drag", 0.001))
     linear, sine, drag = (np.degrees(told.rmse) for _, _, told in fits)
     assert linear > 15.0

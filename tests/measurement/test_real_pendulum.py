@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import csv
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from anglecam.io.rig import Mouth, Pivot, Rig
 from anglecam.measurement.clip import measure_clip
+from support.real import REAL
 
-FOLDER = Path(__file__).parents[2] / "shared" / "real" / "pendulum-red-ball"
+FOLDER = REAL / "pendulum-red-ball"
 FRAME_S = 1 / 24
 
 pytestmark = pytest.mark.skipif(not (FOLDER / "esempio.avi").exists(), reason="the real film is not here")

@@ -36,7 +36,7 @@ def refusal(path) -> str:
 
 @pytest.mark.parametrize("ending", [".csv", ".h5"])
 @pytest.mark.parametrize("format", ["table", "fixed"])
-def test_deeplabcut_of_several_animals_comes_back_as_it_was_written(tmp_path, ending, format):  # noqa: A002
+def test_deeplabcut_of_several_animals_comes_back_as_it_was_written(tmp_path, ending, format):
     path = tmp_path / f"film{SCORER}{ending}"
     write_deeplabcut(path, POINTS, SCORES, names=NAMES, individuals=("mia", "max"), format=format)
     tracks = read_tracks(path)
@@ -59,7 +59,7 @@ def test_deeplabcut_of_one_animal_has_three_header_rows_and_a_missing_row_is_a_f
 def test_columns_of_two_kinds_of_number_lie_in_two_blocks_and_find_each_other(tmp_path):
     table = frame(POINTS[:, :1], SCORES[:, :1], NAMES)
     table = table.astype({column: "float32" for column in table.columns if column[-1] == "likelihood"})
-    for format in ("table", "fixed"):  # noqa: A001
+    for format in ("table", "fixed"):
         path = tmp_path / f"{format}.h5"
         table.to_hdf(path, key="df_with_missing", format=format, mode="w")
         tracks = read_tracks(path)

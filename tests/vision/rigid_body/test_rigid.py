@@ -1,7 +1,6 @@
 """A head followed with nothing on it that marks it: a person's nod, and a textured room with a thing that swings."""
 
 import itertools
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,9 +9,10 @@ import yaml
 from anglecam.video.frames import Frame, read_frames
 from anglecam.vision.rigid_body.rigid import follow_head
 from support.drawn import Look, draw_frames
+from support.real import REAL
 from synth.session import render
 
-REAL = Path(__file__).parents[3] / "shared" / "real" / "pendulum-red-ball" / "esempio.avi"
+FILM = REAL / "pendulum-red-ball" / "esempio.avi"
 NOD = {
     "seed": 69,
     "rig": {"neck": "human", "marker": "none", "head": "male", "lips": "bare", "lever_px": 150, "pivot_px": [260, 300]},
@@ -125,8 +125,8 @@ def test_a_clip_in_which_nothing_turns_says_so(swinging):
     assert isinstance(follow_head(numbered(images[:1] * 20), images[:1] * 5, look.noise), str)
 
 
-@pytest.mark.skipif(not REAL.exists(), reason="the real film is not here")
+@pytest.mark.skipif(not FILM.exists(), reason="the real film is not here")
 def test_a_plain_ball_has_nothing_to_tell_its_turn_by():
     """Its centre moves on a circle; whether it turns on its thread is not to be seen."""
-    images = [frame.image for frame in itertools.islice(read_frames(REAL), 0, 60)]
+    images = [frame.image for frame in itertools.islice(read_frames(FILM), 0, 60)]
     assert isinstance(follow_head(numbered(images, 24.0), images[::10], 2.0), str)
