@@ -104,7 +104,7 @@ def with_anglecam(film: Film) -> Found:
     began = time.perf_counter()
     series = anglecam.measure(film.clip, Rig())
     seconds = time.perf_counter() - began
-    arms = series.mouth_px - series.pivot_px
+    arms = series.mark_px - series.pivot_px
     centroid = np.arctan2(-arms[:, 1], arms[:, 0])
     return {"anglecam": series.angle, "anglecam, the mouth's centroid alone": centroid}, seconds
 

@@ -33,7 +33,7 @@ from anglecam.identification.output_error import fit_output_error, predict_outpu
 from anglecam.io.files import write_atomically
 from anglecam.io.session import read_session
 from anglecam.loop.close import close_records
-from anglecam.loop.cross_validation import Prediction, predict_unseen, split_records
+from anglecam.loop.cross_validation import Prediction, predict_held_out, split_records
 from anglecam.models.plant import Plant
 from anglecam.workflow.recordings import measure_session
 
@@ -113,7 +113,7 @@ def grow(base: Fit, records: Sequence[Record], added: Effect, size: float) -> Fi
     fit, value = base, size
     for count in range(1, len(added.parameters) + 1):
         model = base.model.with_effect(replace(added, parameters=added.parameters[:count]))  # type: ignore[attr-defined]
-        fit = fit_output_error(model, records, [np.append(fit.parameters, value)], own=fit.own)
+        fit = fit_output_error(model, records, [np.append(fit.parameters, value)], nuisance=fit.nuisance)
         value = 0.0
     return fit
 
@@ -190,7 +190,7 @@ def fit_swing(records: Sequence[Record], *more: tuple[str, float]) -> list[tuple
     named = [("linear", base), ("+ gravity_geometry", found)]
     for name, size in more:
         named.append((f"+ {name}", grow(named[-1][1], fitted, effect(name), size)))
-    return [(name, fit, predict_unseen(fit, fitted, [])[0]) for name, fit in named]
+    return [(name, fit, predict_held_out(fit, fitted, [])[0]) for name, fit in named]
 
 
 def main() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from anglecam.budget.gum import Combined, Comparison, Propagated, combine, compare, propagate
-from anglecam.budget.terms import Course, ErrorSources, angle_draws, courses
+from anglecam.budget.terms import TermOverTime, ErrorSources, angle_draws, terms_over_time
 from anglecam.data.series import CONTRACT_RADII_PX
 from anglecam.data.typing import Floats
 from anglecam.measurement.sigma import worst_case, worst_case_both_ends
@@ -68,7 +68,7 @@ class Budget:
     name: str
     """The recording's."""
     sources: ErrorSources
-    courses: tuple[Course, ...]
+    terms_over_time: tuple[TermOverTime, ...]
     sigma: Floats
     """(n,) of the terms that the series' sigma holds, rad."""
     total: Floats
@@ -105,7 +105,7 @@ def budget_of(name: str, sources: ErrorSources, radii_px: tuple[float, ...] = CO
     Budget
         The same for the same sources: the drawing is seeded.
     """
-    terms = courses(sources)
+    terms = terms_over_time(sources)
     variance = np.array([c.contribution**2 for c in terms])
     total = np.sqrt(variance.sum(axis=0))
     sigma = np.sqrt(variance[[c.in_sigma for c in terms]].sum(axis=0))
@@ -114,7 +114,7 @@ def budget_of(name: str, sources: ErrorSources, radii_px: tuple[float, ...] = CO
     return Budget(
         name=name,
         sources=sources,
-        courses=terms,
+        terms_over_time=terms,
         sigma=sigma,
         total=total,
         typical=_frame(sources, terms, sigma, int(order[(len(order) - 1) // 2])),
@@ -167,7 +167,7 @@ def budget_as_dict(budget: Budget) -> dict[str, Any]:
                     "contribution_deg": math.degrees(math.sqrt((c.contribution**2).mean())),
                     "share": float((c.contribution**2).mean()) / mean2,
                 }
-                for c in budget.courses
+                for c in budget.terms_over_time
             ],
         },
         "bounds": [
@@ -193,7 +193,7 @@ def implied_lever(radius_px: float, stated_deg: float) -> float:
     return radius_px / math.sin(math.radians(stated_deg))
 
 
-def _frame(sources: ErrorSources, terms: tuple[Course, ...], sigma: Floats, i: int) -> FrameBudget:
+def _frame(sources: ErrorSources, terms: tuple[TermOverTime, ...], sigma: Floats, i: int) -> FrameBudget:
     stated = [course.at(i) for course in terms]
     certain = replace(sources, noise_dof=math.inf, pose_dof=math.inf, pivot_dof=math.inf)
     combined, as_known = combine(stated), combine([replace(term, dof=math.inf) for term in stated])
@@ -247,7 +247,7 @@ def _frame_as_dict(budget: Budget, one: FrameBudget) -> dict[str, Any]:
                 "in_sigma": course.in_sigma,
                 "known": t.known,
             }
-            for course, t, share in zip(budget.courses, combined.terms, combined.shares, strict=True)
+            for course, t, share in zip(budget.terms_over_time, combined.terms, combined.shares, strict=True)
         ],
         "monte_carlo": _drawn_as_dict(one.drawn, one.comparison),
         "monte_carlo_uncertainties_as_known": _drawn_as_dict(one.drawn_as_known, one.linearity),

@@ -43,7 +43,7 @@ def error_sources(measured: Measurement, rig: Rig) -> ErrorSources:
     rows = np.array([i for i, status in enumerate(series.status) if status in (OK, "duplicate")])
     kept = series.ok[rows]
     mirrored = rig.facing == "left"
-    _, pose, count = np.unique(np.round(angles.mouth_px), axis=0, return_inverse=True, return_counts=True)
+    _, pose, count = np.unique(np.round(angles.mark_px), axis=0, return_inverse=True, return_counts=True)
     several, poses = count[count > 1], max(len(count) - 3.0, 1.0)
     noise, registration, pull, mouth_on_head = angles.errors.noise_px, None, None, None
     pose_px, pivot_dof = angles.errors.pose_px, _pivot_dof(angles.pivot.source, poses)
@@ -73,7 +73,7 @@ def error_sources(measured: Measurement, rig: Rig) -> ErrorSources:
         pose_dof=poses,
         neutral=neutral,
         registration=None if registration is None else registration[kept],
-        pivot_pull=None if pull is None else pull[kept],
+        pivot_sensitivity=None if pull is None else pull[kept],
         mouth_on_head=None if mouth_on_head is None else mouth_on_head[kept],
         lens_px=(angles.view.lens * angles.lever_px)[kept] if angles.view.lens.any() else None,
         tilt=angles.view.tilt,
@@ -90,7 +90,7 @@ def _pivot_dof(source: str, poses: float) -> float:
 
 def _neutral(angles: Angles, resting: Flags, pose: NDArray[np.int64], mirrored: bool) -> Neutral:
     upright = np.array([-1.0 if mirrored else 1.0, -1.0])
-    places = (angles.mouth_px[resting] - angles.pivot.centre_px) * upright
+    places = (angles.mark_px[resting] - angles.pivot.centre_px) * upright
     ahead, up = (places / np.hypot(*places.T)[:, None]).mean(axis=0)
     frames = int(resting.sum())
     return Neutral(
@@ -110,7 +110,7 @@ def _by_registration(
     Everything is what `anglecam.measurement.angles.fine_angles` made sigma of. A declared neutral leaves the mean over all frames
     in its place, and what the line itself stands on: the mouth's place on the head.
     """
-    sigma, pull = found.sigma[rows], found.pull[rows]
+    sigma, pull = found.sigma[rows], found.pivot_sensitivity[rows]
     seen = np.isfinite(found.turn[rows])
     used = seen if angles.resting is None else angles.resting & seen
     some = bool(used.any())

@@ -1,6 +1,6 @@
 """What errs in a measured angle, term by term, for one frame and for the whole clip.
 
-`ErrorSources` says how large the errors are; `courses` how much each turns the angle in every frame, linearised, as
+`ErrorSources` says how large the errors are; `terms_over_time` how much each turns the angle in every frame, linearised, as
 the series' sigma has it; `angle_draws` what the unlinearised geometry makes of them, so that one checks the other.
 
 The model of the measurement, with p the pivot, m the mouth and m₀ the mouth's mean place in the frames that define
@@ -46,7 +46,7 @@ class Neutral:
     """Standard uncertainty of that mean by the picture's noise, px."""
     registration: float = 0.0
     """Standard uncertainty of the mean line by registration, rad."""
-    pull: Floats | None = None
+    pivot_sensitivity: Floats | None = None
     """(2,) mean change of a registered line with an error of the pivot, x and y of the picture, rad/px."""
 
 
@@ -85,7 +85,7 @@ class ErrorSources:
     registration: Floats | None = None
     """Standard uncertainty of a line read by registration, rad; ``noise_px`` and ``pose_px`` are zero then, unless they
     err besides."""
-    pivot_pull: Floats | None = None
+    pivot_sensitivity: Floats | None = None
     """(n, 2) change of such a line with an error of the pivot along x and y of the picture, rad/px; without it the
     geometry tells."""
     mouth_on_head: Floats | None = None
@@ -117,7 +117,7 @@ class ErrorSources:
 
 
 @dataclass(frozen=True)
-class Course:
+class TermOverTime:
     """One term over the clip, SI; `at` states it for a frame in degrees."""
 
     name: str
@@ -147,7 +147,7 @@ class Course:
         return Term(self.name, self.unit, 0.0, u, self.distribution, math.degrees(c), self.dof, self.known)
 
 
-def courses(sources: ErrorSources) -> tuple[Course, ...]:
+def terms_over_time(sources: ErrorSources) -> tuple[TermOverTime, ...]:
     """List what errs and how much it turns the angle, frame by frame, linearised.
 
     Parameters
@@ -157,7 +157,7 @@ def courses(sources: ErrorSources) -> tuple[Course, ...]:
 
     Returns
     -------
-    tuple of Course
+    tuple of TermOverTime
         Independent of each other, without those that are zero throughout. The root of the sum of the squares of
         those ``in_sigma`` is the series' sigma, `anglecam.measurement.sigma.angle_sigma`.
     """
@@ -165,49 +165,55 @@ def courses(sources: ErrorSources) -> tuple[Course, ...]:
     n, lever = len(s.time), s.lever_px
     even = np.ones(n)
     along = np.column_stack([-np.sin(s.line), np.cos(s.line)]) * s.upright
-    found: list[Course] = []
+    found: list[TermOverTime] = []
     pose, line0 = even, None
-    pull = -along / lever[:, None] if s.pivot_pull is None else s.pivot_pull
+    pull = -along / lever[:, None] if s.pivot_sensitivity is None else s.pivot_sensitivity
     if s.neutral is not None:
         k = s.neutral.poses
         pose = np.sqrt(np.maximum(1.0 + 1.0 / k - 2.0 / k * _shared(s, s.neutral), 0.0))
         line0 = np.hypot(s.neutral.noise_px / lever, s.neutral.registration)
-        if s.neutral.pull is not None:
-            pull = pull - s.neutral.pull
-        elif s.pivot_pull is None:
+        if s.neutral.pivot_sensitivity is not None:
+            pull = pull - s.neutral.pivot_sensitivity
+        elif s.pivot_sensitivity is None:
             pull = pull + s.neutral.along * s.upright / lever[:, None]
     reach = np.hypot(*pull.T)
     toward = np.divide(pull, reach[:, None], out=along.copy(), where=reach[:, None] > 0.0)
     pivot = np.sqrt(np.einsum("ni,ij,nj->n", toward, s.pivot_covariance_px2, toward))
-    found.append(Course("picture noise", "px", s.noise_px, 1.0 / lever, "scatter at one pose (A)", s.noise_dof))
+    found.append(TermOverTime("picture noise", "px", s.noise_px, 1.0 / lever, "scatter at one pose (A)", s.noise_dof))
     found.append(
-        Course("pixel grid and codec", "px", s.pose_px * even, pose / lever, "scatter between poses (A)", s.pose_dof)
+        TermOverTime(
+            "pixel grid and codec", "px", s.pose_px * even, pose / lever, "scatter between poses (A)", s.pose_dof
+        )
     )
-    found.append(Course("pivot", "px", pivot, reach, f"{s.pivot_source} (A)", s.pivot_dof))
+    found.append(TermOverTime("pivot", "px", pivot, reach, f"{s.pivot_source} (A)", s.pivot_dof))
     if s.registration is not None:
-        found.append(Course("registration", "rad", s.registration, even, "fit to the picture (A)"))
+        found.append(TermOverTime("registration", "rad", s.registration, even, "fit to the picture (A)"))
     if s.mouth_on_head is not None:
-        found.append(Course("mouth's place on the head", "rad", s.mouth_on_head, even, "the mouth's own angles (A)"))
+        found.append(
+            TermOverTime("mouth's place on the head", "rad", s.mouth_on_head, even, "the mouth's own angles (A)")
+        )
     if s.neutral is not None and line0 is not None:
         dof = s.noise_dof if s.registration is None else math.inf
-        found.append(Course("neutral line", "rad", line0, -even, f"mean of {s.neutral.frames} frames (A)", dof))
+        found.append(TermOverTime("neutral line", "rad", line0, -even, f"mean of {s.neutral.frames} frames (A)", dof))
     if s.lens_px is not None:
-        found.append(Course("lens", "px", s.lens_px, 1.0 / lever, "calibration's covariance (B)"))
+        found.append(TermOverTime("lens", "px", s.lens_px, 1.0 / lever, "calibration's covariance (B)"))
     if s.tilt is not None and s.tilt.sigma > 0.0:
         # A difference over one standard uncertainty: at a square view the slope is zero and the error is not.
         off = s.tilt.turned(s.line, s.tilt.sigma) - s.line
         zero = s.line - s.angle
         off = off - (s.tilt.turned(zero, s.tilt.sigma) - zero)
-        found.append(Course("camera tilt", "rad", s.tilt.sigma * even, off / s.tilt.sigma, "declared (B)"))
+        found.append(TermOverTime("camera tilt", "rad", s.tilt.sigma * even, off / s.tilt.sigma, "declared (B)"))
     if s.within_exposure is not None:
-        found.append(Course("acceleration in the exposure", "rad", s.within_exposure, even, "exposure declared (B)"))
+        found.append(
+            TermOverTime("acceleration in the exposure", "rad", s.within_exposure, even, "exposure declared (B)")
+        )
     for name, step, known in (
         ("instant within the exposure", s.exposure_s, "exposure declared (B)"),
         ("time stamp's step", s.clock_s, "the file's unit of time (B)"),
     ):
         if step is not None:
             u = step / math.sqrt(12.0) * even
-            found.append(Course(name, "s", u, s.speed, known, distribution="uniform", in_sigma=False))
+            found.append(TermOverTime(name, "s", u, s.speed, known, distribution="uniform", in_sigma=False))
     return tuple(course for course in found if (course.uncertainty > 0.0).any())
 
 
@@ -232,8 +238,8 @@ def angle_draws(sources: ErrorSources, i: int) -> Draw:
     zero = s.line[i] - s.angle[i]
     neutral = s.neutral
     root = _root(s.pivot_covariance_px2)
-    pull = np.zeros(2) if s.pivot_pull is None else s.pivot_pull[i]
-    pull0 = np.zeros(2) if neutral is None or neutral.pull is None else neutral.pull
+    pull = np.zeros(2) if s.pivot_sensitivity is None else s.pivot_sensitivity[i]
+    pull0 = np.zeros(2) if neutral is None or neutral.pivot_sensitivity is None else neutral.pivot_sensitivity
     share = 0.0 if neutral is None else float(_shared(s, neutral)[i]) / neutral.poses
     speed = float(s.speed[i])
 
@@ -242,7 +248,7 @@ def angle_draws(sources: ErrorSources, i: int) -> Draw:
             return rng.standard_normal((m, 2)) * np.reshape(scale, (-1, 1))
 
         error = places(widening(rng, s.pivot_dof, m)) @ root.T
-        pivot = error * s.upright if s.pivot_pull is None else np.zeros(2)
+        pivot = error * s.upright if s.pivot_sensitivity is None else np.zeros(2)
         noise, grid = widening(rng, s.noise_dof, m), s.pose_px * widening(rng, s.pose_dof, m)
         pose = places(grid)
         line = _direction(mouth + places(s.noise_px[i] * noise) + pose - pivot) + error @ pull

@@ -104,8 +104,8 @@ def record_from_series(
             "; are its times seconds on the clip's clock?"
         )
     cross = None
-    if series.mouth_px is not None and series.pivot_px is not None:
-        lever = np.hypot(*(series.mouth_px - series.pivot_px)[ok].T)
+    if series.mark_px is not None and series.pivot_px is not None:
+        lever = np.hypot(*(series.mark_px - series.pivot_px)[ok].T)
         cross = lever / np.mean(lever) - 1.0 if np.all(np.isfinite(lever)) else None
     acts = command is not None and (change is not None or (zero_known and command.angle[0] != 0.0))
     record = Record(
@@ -123,9 +123,9 @@ def record_from_series(
 
 
 def _view(series: AngleSeries, ok: NDArray[np.bool_]) -> View:
-    if series.line is None or series.mouth_px is None or series.pivot_px is None:
+    if series.line is None or series.mark_px is None or series.pivot_px is None:
         return UNSEEN
-    arm = (series.mouth_px - series.pivot_px)[ok]
+    arm = (series.mark_px - series.pivot_px)[ok]
     if not np.any(np.isfinite(arm)):
         return UNSEEN
     neutral, lever = float(np.nanmedian((series.line - series.angle)[ok])), float(np.nanmedian(np.hypot(*arm.T)))

@@ -36,7 +36,7 @@ class AngleSeries:
     """One of `STATUSES` for each frame."""
     line: Floats | None = None
     """Absolute direction of the line pivot→mouth from the image's horizontal, rad."""
-    mouth_px: Floats | None = None
+    mark_px: Floats | None = None
     """(n, 2) mouth point, x to the right and y down, px."""
     pivot_px: Floats | None = None
     """(n, 2) pivot, px."""

@@ -37,7 +37,7 @@ EFFECT = Effect(
     relaxes="Eq. (22): damping is viscous only",
     parameters=(
         Parameter("friction_deg_per_s2", "F", 0.0, 0.0, 500.0, (0.3, 3.0, 15.0), SI_TO_FILE),
-        Parameter("asymmetry_deg_per_s2", "D", 0.0, -250.0, 250.0, (0.0,), SI_TO_FILE, late=True, like_zero=True),
+        Parameter("asymmetry_deg_per_s2", "D", 0.0, -250.0, 250.0, (0.0,), SI_TO_FILE, staged=True, like_zero=True),
         Parameter(
             "breakaway_excess_deg_per_s2",
             "B",
@@ -46,7 +46,7 @@ EFFECT = Effect(
             500.0,
             (0.03, 0.1, 0.3, 0.6, 1.0, 1.7, 3.0, 5.0),
             SI_TO_FILE,
-            late=True,
+            staged=True,
         ),
         Parameter(
             "stribeck_speed_deg_per_s",
@@ -56,7 +56,7 @@ EFFECT = Effect(
             10.0,
             (0.01, 0.03, 0.1, 0.3, 1.0),
             SI_TO_FILE,
-            late=True,
+            staged=True,
             is_speed=True,
         ),
     ),

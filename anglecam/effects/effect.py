@@ -63,7 +63,7 @@ class Parameter:
     """Whether files state its reciprocal: of a limit, which is absent at 0."""
     circular: bool = False
     """Whether it is a direction, which files state between −180° and 180°."""
-    late: bool = False
+    staged: bool = False
     """Whether it is left out, which must be the same as 0, until the data ask for it; such parameters come last."""
     like_zero: bool = False
     """Whether it moves the head as a wrong zero of the angle does, so that it can be told only where zero is known."""

@@ -81,8 +81,8 @@ class EkfEstimate:
         """Unknowns that were fitted to the very data that the innovations are of: none in a single pass."""
         if self.passes == 1:
             return 0
-        own = sum(int(np.sum(np.diag(one.covariance[0]) > 0.0)) - self.shared for one in self.filtered)
-        return own + self.shared
+        nuisance = sum(int(np.sum(np.diag(one.covariance[0]) > 0.0)) - self.shared for one in self.filtered)
+        return nuisance + self.shared
 
     @property
     def shared(self) -> int:
@@ -119,7 +119,7 @@ def fit_ekf(records: Sequence[Record], start: Floats, settings: EkfSettings) -> 
     Parameters
     ----------
     records : sequence of Record
-        Filtered one after another; each starts with its own state and the parameters so far.
+        Filtered one after another; each starts with its nuisance state and the parameters so far.
     start : (3,) ndarray
         a (1/s), b (1/s²), c (1/s²).
     settings : EkfSettings
@@ -141,24 +141,24 @@ def fit_ekf(records: Sequence[Record], start: Floats, settings: EkfSettings) -> 
     variance = np.array(settings.initial_variance)
     if not any(r.command is not None for r in records):
         parameters[2] = variance[4] = 0.0
-    own = [_first_state(record, settings) for record in records]
+    nuisance = [_first_state(record, settings) for record in records]
     with np.errstate(over="ignore", invalid="ignore"):  # a pass may run away; its fit is then not finite and refused
-        passed = _pass(records, parameters, own, variance, settings)
+        passed = _pass(records, parameters, nuisance, variance, settings)
         if settings.passes == 1:
             return EkfEstimate(*_ended(passed), passed, 1, True)
-        return _iterated(records, parameters, own, variance, settings, passed)
+        return _iterated(records, parameters, nuisance, variance, settings, passed)
 
 
 def _iterated(
     records: Sequence[Record],
     parameters: Floats,
-    own: Sequence[Floats],
+    nuisance: Sequence[Floats],
     variance: Floats,
     settings: EkfSettings,
     passed: tuple[Filtered, ...],
 ) -> EkfEstimate:
     """Pass again, each time about the trajectory of the best end so far, until nothing moves."""
-    cost, trust, count = _cost(records, parameters, own), 1.0, 1
+    cost, trust, count = _cost(records, parameters, nuisance), 1.0, 1
     best, covariance = passed, np.diag(variance[SHARED])
     while True:
         ended, ended_covariance = _ended(passed)
@@ -167,22 +167,22 @@ def _iterated(
         moved = np.abs(ended - parameters)
         settled = trust == WIDEST and bool(np.all(moved <= SETTLED * np.sqrt(np.diag(ended_covariance))))
         if settled or ended_cost <= cost:
-            best, parameters, covariance, own, cost = passed, ended, ended_covariance, ended_own, ended_cost
+            best, parameters, covariance, nuisance, cost = passed, ended, ended_covariance, ended_own, ended_cost
             trust = min(WIDEST, trust / HELD_BACK)
         else:
             trust *= HELD_BACK
         if settled or count == settings.passes:
             return EkfEstimate(parameters, covariance, best, count, settled)
         held = np.concatenate([variance[:2], trust**2 * variance[SHARED]])
-        about = [_free_run(record, parameters, o) for record, o in zip(records, own, strict=True)]
-        passed = _pass(records, parameters, own, held, settings, about)
+        about = [_free_run(record, parameters, o) for record, o in zip(records, nuisance, strict=True)]
+        passed = _pass(records, parameters, nuisance, held, settings, about)
         count += 1
 
 
 def _pass(
     records: Sequence[Record],
     parameters: Floats,
-    own: Sequence[Floats],
+    nuisance: Sequence[Floats],
     variance: Floats,
     settings: EkfSettings,
     about: Sequence[Floats] | None = None,
@@ -191,7 +191,7 @@ def _pass(
     passed: list[Filtered] = []
     mean, covariance = parameters, np.diag(variance[SHARED])
     for i, record in enumerate(records):
-        first = np.concatenate([own[i][:2], mean, own[i][2:]])
+        first = np.concatenate([nuisance[i][:2], mean, nuisance[i][2:]])
         P = np.zeros((len(first), len(first)))
         P[:2, :2], P[SHARED, SHARED], P[5:, 5:] = np.diag(variance[:2]), covariance, settings.zero_variance
         one = filter_record(
@@ -212,16 +212,16 @@ def _ended(passed: Sequence[Filtered]) -> tuple[Floats, Floats]:
     return passed[-1].state[-1, SHARED], passed[-1].covariance[-1, SHARED, SHARED]
 
 
-def _free_run(record: Record, parameters: Floats, own: Floats) -> Floats:
-    """Return the (n, s) trajectory of constant parameters from a recording's own first state."""
-    moving = Plant().run(parameters, record.time, record.command, own[:2])
-    return np.column_stack([moving, np.tile(np.concatenate([parameters, own[2:]]), (len(moving), 1))])
+def _free_run(record: Record, parameters: Floats, nuisance: Floats) -> Floats:
+    """Return the (n, s) trajectory of constant parameters from a recording's nuisance first state."""
+    moving = Plant().run(parameters, record.time, record.command, nuisance[:2])
+    return np.column_stack([moving, np.tile(np.concatenate([parameters, nuisance[2:]]), (len(moving), 1))])
 
 
-def _cost(records: Sequence[Record], parameters: Floats, own: Sequence[Floats]) -> float:
+def _cost(records: Sequence[Record], parameters: Floats, nuisance: Sequence[Floats]) -> float:
     """Return the free run's sum of squared errors, rad²; infinite where it runs away."""
     total = 0.0
-    for record, o in zip(records, own, strict=True):
+    for record, o in zip(records, nuisance, strict=True):
         run = _free_run(record, parameters, o)
         total += float(np.sum((record.angle - run[:, 0] - o[2:].sum()) ** 2))
     return total if np.isfinite(total) else np.inf
@@ -231,5 +231,5 @@ def _first_state(record: Record, settings: EkfSettings) -> Floats:
     """Begin a recording at its first angle: at rest if a command holds it there, at the first frames' rate if not."""
     few = min(3, len(record.time))
     rate = 0.0 if record.command else np.polyfit(record.time[:few], record.angle[:few], 1)[0]
-    own = np.array([record.angle[0], rate])
-    return own if record.zero_known or settings.zero_variance == 0.0 else np.append(own, 0.0)
+    nuisance = np.array([record.angle[0], rate])
+    return nuisance if record.zero_known or settings.zero_variance == 0.0 else np.append(nuisance, 0.0)

@@ -31,7 +31,7 @@ class Fit:
     model: Model
     parameters: Floats
     """(p,) shared parameters, SI, in the order of ``model.names``."""
-    own: tuple[Floats, ...] = field(repr=False)
+    nuisance: tuple[Floats, ...] = field(repr=False)
     """Each recording's own unknowns: initial states, then the zero (rad) unless declared."""
     residuals: tuple[Floats, ...] = field(repr=False)
     """Measured minus predicted angle of each recording, rad."""

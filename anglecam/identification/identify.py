@@ -181,7 +181,7 @@ def _by_filter(fit: Fit, records: Sequence[Record], start: Floats) -> tuple[Fit,
     initial = start if len(start) == 3 else np.append(start, 0.0)
     estimate = fit_ekf(records, initial, settings_for(records, initial, sigma))
     n = len(fit.parameters)
-    free_run = fit_output_error(fit.model, records, [estimate.parameters[:n]], own=fit.own, fixed=True)
+    free_run = fit_output_error(fit.model, records, [estimate.parameters[:n]], nuisance=fit.nuisance, fixed=True)
     return free_run, estimate.parameters[:n], estimate.covariance[:n, :n]
 
 

@@ -1,6 +1,6 @@
 """Output error: the model runs freely, and its parameters are those whose angle is nearest to the measured one.
 
-    minimise Σ_recordings |W(y − z − θ(t; p, x₀))|²  over p (shared) and x₀, z (each recording's own)
+    minimise Σ_recordings |W(y − z − θ(t; p, x₀))|²  over p (shared) and x₀, z (each recording's nuisance)
 
 W whitens first-order autoregressive noise, so that a coloured residual is not counted as so many independent
 observations. The initial state x₀ and, unless declared, the zero z of the angle are unknown in every recording.
@@ -40,7 +40,7 @@ def fit_output_error(
     records: Sequence[Record],
     starts: Sequence[Floats],
     *,
-    own: Sequence[Floats] | None = None,
+    nuisance: Sequence[Floats] | None = None,
     phi: float = 0.0,
     fixed: bool = False,
 ) -> Fit:
@@ -54,46 +54,46 @@ def fit_output_error(
         All fitted at once.
     starts : sequence of (p,) ndarray
         Shared parameters to start from, SI; the best end is kept.
-    own : sequence of ndarray, optional
-        Starts of each recording's own unknowns; from its first frames otherwise.
+    nuisance : sequence of ndarray, optional
+        Starts of each recording's nuisance unknowns; from its first frames otherwise.
     phi : float
         Autocorrelation of the noise from frame to frame.
     fixed : bool
-        Hold the shared parameters at ``starts[0]`` and fit only what is each recording's own: a prediction.
+        Hold the shared parameters at ``starts[0]`` and fit only what is each recording's nuisance: a prediction.
 
     Returns
     -------
     Fit
         The best of the starts.
     """
-    own = [first_state(model, record) for record in records] if own is None else own
-    return min(_fit_all(model, records, starts, own, phi, fixed, MOST), key=lambda fit: fit.cost)
+    nuisance = [first_state(model, record) for record in records] if nuisance is None else nuisance
+    return min(_fit_all(model, records, starts, nuisance, phi, fixed, MOST), key=lambda fit: fit.cost)
 
 
 def fit_best_start(
-    model: Model, records: Sequence[Record], starts: Sequence[Floats], own: Sequence[Floats], phi: float
+    model: Model, records: Sequence[Record], starts: Sequence[Floats], nuisance: Sequence[Floats], phi: float
 ) -> Fit:
     """Fit as `fit_output_error` does, but go on from only one start: the best after a few steps from each.
 
     For models whose fits are slow; which valley is the deepest is then known almost as well.
     """
-    heats = _fit_all(model, records, starts, own, phi, False, HEAT)
+    heats = _fit_all(model, records, starts, nuisance, phi, False, HEAT)
     best = min(heats, key=lambda fit: fit.cost)
-    return fit_output_error(model, records, [best.parameters], own=best.own, phi=phi)
+    return fit_output_error(model, records, [best.parameters], nuisance=best.nuisance, phi=phi)
 
 
 def _fit_all(
     model: Model,
     records: Sequence[Record],
     starts: Sequence[Floats],
-    own: Sequence[Floats],
+    nuisance: Sequence[Floats],
     phi: float,
     fixed: bool,
     most: int,
 ) -> list[Fit]:
     # a trial step may let the plant run away; its cost is then not finite and the step is refused
     with _BLAS.limit(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
-        return [_fit_once(model, records, start, own, phi, fixed, most) for start in starts]
+        return [_fit_once(model, records, start, nuisance, phi, fixed, most) for start in starts]
 
 
 def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:
@@ -102,40 +102,49 @@ def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:
     They start from the first frames, and also from rest: with dry friction the two may end in different valleys.
     """
     moving = [first_state(fit.model, record) for record in records]
-    resting = [np.concatenate([own[:1], np.zeros(fit.model.states - 1), own[fit.model.states :]]) for own in moving]
+    resting = [
+        np.concatenate([nuisance[:1], np.zeros(fit.model.states - 1), nuisance[fit.model.states :]])
+        for nuisance in moving
+    ]
     fits = [
-        fit_output_error(fit.model, records, [fit.parameters], own=own, phi=fit.phi, fixed=True)
-        for own in (moving, resting)
+        fit_output_error(fit.model, records, [fit.parameters], nuisance=nuisance, phi=fit.phi, fixed=True)
+        for nuisance in (moving, resting)
     ]
     return min(fits, key=lambda one: one.cost)
 
 
-def predicted_angle(model: Model, parameters: Floats, record: Record, own: Floats) -> Floats:
-    """Return the (n,) angle, rad, that a model gives a recording from its own unknowns; NaN where it runs away."""
-    zero = 0.0 if record.zero_known else own[model.states]
-    angle = zero + model.predict(parameters, record.time, record.command, own[: model.states], record.view)
+def predicted_angle(model: Model, parameters: Floats, record: Record, nuisance: Floats) -> Floats:
+    """Return the (n,) angle, rad, that a model gives a recording from its nuisance unknowns; NaN where it runs away."""
+    zero = 0.0 if record.zero_known else nuisance[model.states]
+    angle = zero + model.predict(parameters, record.time, record.command, nuisance[: model.states], record.view)
     return np.where(np.abs(angle) < RUNAWAY, angle, np.nan)
 
 
 def output_error(
-    model: Model, parameters: Floats, records: Sequence[Record], own: Sequence[Floats], phi: float
+    model: Model, parameters: Floats, records: Sequence[Record], nuisance: Sequence[Floats], phi: float
 ) -> float:
     """Return the sum of squared whitened residuals, rad², of a model as it stands; infinite where it runs away."""
     with np.errstate(over="ignore", invalid="ignore"):
         left = [
             whiten(r, phi, r.angle - predicted_angle(model, parameters, r, o))
-            for r, o in zip(records, own, strict=True)
+            for r, o in zip(records, nuisance, strict=True)
         ]
         cost = float(sum(one @ one for one in left))
     return cost if np.isfinite(cost) else np.inf
 
 
 def _fit_once(
-    model: Model, records: Sequence[Record], start: Floats, own: Sequence[Floats], phi: float, fixed: bool, most: int
+    model: Model,
+    records: Sequence[Record],
+    start: Floats,
+    nuisance: Sequence[Floats],
+    phi: float,
+    fixed: bool,
+    most: int,
 ) -> Fit:
     start = np.clip(start, model.lower, model.upper)
     p = len(start)
-    edges = np.cumsum([p, *(len(o) for o in own)])
+    edges = np.cumsum([p, *(len(o) for o in nuisance)])
     rows = np.cumsum([0, *(len(r.time) for r in records)])
     shared = [] if fixed else list(range(p))
 
@@ -184,7 +193,7 @@ def _fit_once(
             result[rows[i] : rows[i + 1], place] = -whiten(record, phi, block)
         return result
 
-    x0 = np.concatenate([start, *own])
+    x0 = np.concatenate([start, *nuisance])
     free = np.array([*shared, *range(p, len(x0))])
     lower, upper = np.full(len(x0), -np.inf), np.full(len(x0), np.inf)
     lower[:p], upper[:p] = model.lower, model.upper
@@ -227,7 +236,7 @@ def _fit_once(
 
 
 def first_state(model: Model, record: Record) -> Floats:
-    """Start a recording's own unknowns at its first angle, and at rest if its command has held it there.
+    """Start a recording's nuisance unknowns at its first angle, and at rest if its command has held it there.
 
     One that begins in motion starts with its first rate: at rest a plant with dry friction may be stuck, where nothing
     tells which way it should move.

@@ -90,7 +90,7 @@ def write_netcdf(series: AngleSeries, path: Path) -> None:
         time.attrs["long_name"] = "time stamps of the frames on the clip's own clock, in seconds"
         for name, labels in (("space", ["x", "y"]), ("keypoints", ["mouth", "pivot"]), ("individuals", ["head"])):
             _texts(file, name, name, labels)
-        marks = np.stack([_marks(series.mouth_px, n), _marks(series.pivot_px, n)], axis=-1)
+        marks = np.stack([_marks(series.mark_px, n), _marks(series.pivot_px, n)], axis=-1)
         position = file.create_variable("position", tuple(file.dimensions), "f8", data=marks[..., None])
         position.attrs["units"] = "pixel"
         unstated = np.full((n, 2, 1), np.nan)
@@ -140,7 +140,7 @@ def read_netcdf(path: Path) -> AngleSeries:
         sigma=exact["sigma"],
         status=status,
         line=exact.get("line"),
-        mouth_px=exact.get("mouth_px"),
+        mark_px=exact.get("mark_px"),
         pivot_px=exact.get("pivot_px"),
         bounds={float(r): exact["bounds"][i] for i, r in enumerate(exact["radius"])},
         evidence=evidence,
@@ -156,7 +156,7 @@ def _write_exact(group: Any, series: AngleSeries) -> None:
     for name in ("time", "angle", "sigma", "line"):
         if getattr(series, name) is not None:
             group.create_variable(name, ("time",), "f8", data=getattr(series, name))
-    for name in ("mouth_px", "pivot_px"):
+    for name in ("mark_px", "pivot_px"):
         if getattr(series, name) is not None:
             group.create_variable(name, ("time", "space"), "f8", data=getattr(series, name))
     group.attrs["name"] = np.frombuffer(os.fsencode(series.name), np.uint8)  # a file's name need not be text

@@ -52,7 +52,7 @@ def series_columns(series: AngleSeries) -> dict[str, NDArray]:
     """
     n = len(series.time)
     empty = np.full((n, 2), np.nan)
-    mouth = empty if series.mouth_px is None else series.mouth_px
+    mouth = empty if series.mark_px is None else series.mark_px
     pivot = empty if series.pivot_px is None else series.pivot_px
     line = empty[:, 0] if series.line is None else series.line
     more = sorted(set(series.bounds) - set(CONTRACT_RADII_PX))
@@ -75,7 +75,7 @@ def read_series(path: Path) -> AngleSeries:
     Returns
     -------
     AngleSeries
-        With ``mouth_px`` and ``pivot_px`` where the file holds them.
+        With ``mark_px`` and ``pivot_px`` where the file holds them.
 
     Raises
     ------

@@ -16,7 +16,7 @@ from anglecam.data.record import Record
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.output_error import first_state, fit_best_start, fit_output_error, output_error
-from anglecam.loop.cross_validation import Prediction, predict_unseen
+from anglecam.loop.cross_validation import Prediction, predict_held_out
 from anglecam.loop.refit import effects_of, plant_of, without
 from anglecam.loop.screen import Forecast
 from anglecam.threads import native_threads
@@ -107,7 +107,7 @@ def fit_candidates(
     def predict(i: int) -> Candidate:
         if gains[i] < HOPEFUL * max(gains) and gains[i] not in serious:
             return Candidate(tried[i], fits[i], gains[i], None, None, -math.inf)
-        told, whole = predict_unseen(fits[i], fitted, held_out)
+        told, whole = predict_held_out(fits[i], fitted, held_out)
         predictive = log_likelihood_gain(unseen.cost, whole.cost, sum(len(r.time) for r in whole.records))
         return Candidate(tried[i], fits[i], gains[i], told, whole, predictive)
 
@@ -116,14 +116,14 @@ def fit_candidates(
 
 
 def fit_with(
-    base: Fit, records: Sequence[Record], forecast: Forecast, *, late: bool = True, camera: float = 0.0
+    base: Fit, records: Sequence[Record], forecast: Forecast, *, staged: bool = True, camera: float = 0.0
 ) -> Fit:
     """Fit the plant of ``base`` with one more effect, from where the screen would start, or else the effect itself.
 
     Its ``late`` parameters, which take most of the time, are let in as far as the data ask for them, or not at all.
     """
     effect = forecast.effect
-    early = [p for p in effect.parameters if not p.late]
+    early = [p for p in effect.parameters if not p.staged]
     plant = plant_of(base).with_effect(replace(effect, parameters=tuple(early)))
     own = _held(base, records)
 
@@ -145,9 +145,9 @@ def fit_with(
             best = fit if fit.cost < best.cost else best
     if plant.kinked:
         # on the way here initial states may have got into a valley of their own
-        again = fit_output_error(plant, records, [best.parameters], own=own, phi=base.phi)
+        again = fit_output_error(plant, records, [best.parameters], nuisance=own, phi=base.phi)
         best = again if again.cost < best.cost else best
-    return with_late(base, effect, best, records, camera) if late else best
+    return with_staged(base, effect, best, records, camera) if staged else best
 
 
 def fit_beneath(base: Fit, candidates: Sequence[Candidate], records: Sequence[Record]) -> Fit:
@@ -156,12 +156,12 @@ def fit_beneath(base: Fit, candidates: Sequence[Candidate], records: Sequence[Re
     Beside another effect, whatever its size, a fit with kinks may have come out of the valley that it was in.
     """
     count = len(base.parameters)
-    starts = [(c.fit.parameters[:count], c.fit.own) for c in candidates]
+    starts = [(c.fit.parameters[:count], c.fit.nuisance) for c in candidates]
     costs = [output_error(base.model, values, records, own, base.phi) for values, own in starts]
     if not costs or min(costs) >= base.cost:
         return base
     values, own = starts[int(np.argmin(costs))]
-    return fit_output_error(base.model, records, [values], own=own, phi=base.phi)
+    return fit_output_error(base.model, records, [values], nuisance=own, phi=base.phi)
 
 
 def _held(base: Fit, records: Sequence[Record]) -> list[NDArray[np.float64]]:
@@ -171,29 +171,29 @@ def _held(base: Fit, records: Sequence[Record]) -> list[NDArray[np.float64]]:
     so that rate and angle there can hardly be told apart, and a fit that starts with the base model's rate keeps it.
     """
     first, states = [first_state(base.model, record) for record in records], base.model.states
-    at_rest = [np.concatenate([own[:1], np.zeros(states - 1), own[states:]]) for own in base.own]
-    return [rest if one[1] == 0.0 else own for own, rest, one in zip(base.own, at_rest, first, strict=True)]
+    at_rest = [np.concatenate([own[:1], np.zeros(states - 1), own[states:]]) for own in base.nuisance]
+    return [rest if one[1] == 0.0 else own for own, rest, one in zip(base.nuisance, at_rest, first, strict=True)]
 
 
 def fit_to_more(
     fit: Fit, records: Sequence[Record], own: Sequence[NDArray[np.float64]], ledger: Sequence[Effect]
 ) -> Fit:
     """Fit a plant again to more recordings, with late parameters of its effects that the first ones did not ask for."""
-    best = fit_output_error(fit.model, records, [fit.parameters], own=own, phi=fit.phi)
+    best = fit_output_error(fit.model, records, [fit.parameters], nuisance=own, phi=fit.phi)
     for effect in effects_of(fit):
         whole = next(e for e in ledger if e.id == effect.id)
-        if any(p.late for p in whole.parameters):
-            early = tuple(p for p in whole.parameters if not p.late)
+        if any(p.staged for p in whole.parameters):
+            early = tuple(p for p in whole.parameters if not p.staged)
             base = without(best, effect, records)
             size = [best.parameters[best.model.names.index(p.name)] for p in early]
             plant = plant_of(base).with_effect(replace(whole, parameters=early))
             start = np.append(base.parameters, size)
-            first = fit_output_error(plant, records, [start], own=best.own, phi=fit.phi)
-            best = min(best, with_late(base, whole, first, records), key=lambda one: one.cost)
+            first = fit_output_error(plant, records, [start], nuisance=best.nuisance, phi=fit.phi)
+            best = min(best, with_staged(base, whole, first, records), key=lambda one: one.cost)
     return best
 
 
-def with_late(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record], camera: float = 0.0) -> Fit:
+def with_staged(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record], camera: float = 0.0) -> Fit:
     """Let in the late parameters of a fit's last effect, one after another, as far as the data ask for them.
 
     At once, they would stand in for the size; one alone may show nothing that it and the next do show. When a head sets
@@ -203,13 +203,13 @@ def with_late(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record], ca
     """
     plant, best, spent = plant_of(base), fit, 0
     effect = _within(effect, fit, records)
-    first = len(base.parameters) + sum(not p.late for p in effect.parameters)
+    first = len(base.parameters) + sum(not p.staged for p in effect.parameters)
     for count in range(len(effects_of(fit)[-1].parameters) + 1, len(effect.parameters) + 1):
         richer = plant.with_effect(replace(effect, parameters=effect.parameters[:count]))
         bare = np.append(fit.parameters[:first], np.zeros(len(fit.parameters) - first))
         values = [np.append(x, v) for v in effect.parameters[count - 1].starts for x in (fit.parameters, bare)]
-        values.sort(key=lambda one: output_error(richer, one, records, fit.own, fit.phi))
-        fit, spent = fit_best_start(richer, records, values[:NEAREST], fit.own, fit.phi), spent + 1
+        values.sort(key=lambda one: output_error(richer, one, records, fit.nuisance, fit.phi))
+        fit, spent = fit_best_start(richer, records, values[:NEAREST], fit.nuisance, fit.phi), spent + 1
         gain = log_likelihood_gain(best.cost, fit.cost, len(fit.white))
         if 2.0 * gain > special.chdtri(spent, ASKED_FOR) and apart(fit, best) > camera:
             best, spent = fit, 0

@@ -22,9 +22,9 @@ from anglecam.identification.multiple_shooting import drifts, goes_astray, windo
 from anglecam.identification.noise import Noise, autoregression, noise_floor
 from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.loop.candidates import Candidate, fit_to_more, log_likelihood_gain, promising, rivals
-from anglecam.loop.cross_validation import Gain, Prediction, compare, predict_unseen, split_records, typical
+from anglecam.loop.cross_validation import Gain, Prediction, compare, predict_held_out, split_records, typical
 from anglecam.loop.refit import effects_of, left_of, recoloured, with_last, without
-from anglecam.loop.residual_test import LEVEL, Gate
+from anglecam.loop.residual_test import LEVEL, ResidualTest
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.loop.stepwise import SURE, Round, Task, applicable, candidates_of, look, smallest, trace
 from anglecam.models.plant import Plant
@@ -66,8 +66,8 @@ class Verdict:
     before_held_out: Prediction
     after_held_out: Prediction
     gain: Gain
-    first_gate: Gate
-    last_gate: Gate
+    first_test: ResidualTest
+    last_test: ResidualTest
     candidates: tuple[Candidate, ...]
     """Those of the first round, strongest evidence first; none where the gate found nothing missing."""
     noise: Noise
@@ -142,7 +142,7 @@ def _begin(
 def _conclude(task: Task, first: Round, last: Round, candidates: Sequence[Candidate]) -> Verdict:
     # both ends are compared under the colour of the noise that the better model leaves
     before = recoloured(first.fit, task.fitted, last.fit.phi)
-    before_told, _ = predict_unseen(before, task.fitted, task.predicted)
+    before_told, _ = predict_held_out(before, task.fitted, task.predicted)
     noise = task.floor or replace(autoregression(last.fit.residuals, "residual"), sigma=last.fit.rmse)
     remains = _remains(task, first, last, before)
     # where something remains nothing is named, so nothing is added
@@ -193,7 +193,7 @@ def _contradicted(task: Task, last: Round, least: float) -> bool:
     if last.told.typical <= most or not task.predicted:
         return last.told.typical > most
     told = predict_output_error(last.fit, task.predicted)
-    own, both = [*last.fit.own, *told.own], [*task.fitted, *task.predicted]
+    own, both = [*last.fit.nuisance, *told.nuisance], [*task.fitted, *task.predicted]
     fit = fit_to_more(last.fit, both, own, task.ledger)
     return typical(fit.residuals[len(task.fitted) :]) > most
 

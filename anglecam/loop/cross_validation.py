@@ -99,7 +99,7 @@ def split_records(records: Sequence[Record], held_out: Sequence[str]) -> tuple[l
     return fitted, [r for r in records if r.name in held_out]
 
 
-def predict_unseen(fit: Fit, fitted: Sequence[Record], held_out: Sequence[Record]) -> tuple[Prediction, Prediction]:
+def predict_held_out(fit: Fit, fitted: Sequence[Record], held_out: Sequence[Record]) -> tuple[Prediction, Prediction]:
     """Predict every recording by a model that was not fitted to it.
 
     Parameters
@@ -131,8 +131,8 @@ def _in_turns(fit: Fit, records: Sequence[Record]) -> Prediction:
     left_out = [_turns(r) for r in records]
     for turn in range(TURNS):
         train = [record.only(frames != turn) for record, frames in zip(records, left_out, strict=True)]
-        left = fit_output_error(fit.model, train, [fit.parameters], own=fit.own, phi=fit.phi)
-        for record, frames, own, error in zip(records, left_out, left.own, errors, strict=True):
+        left = fit_output_error(fit.model, train, [fit.parameters], nuisance=fit.nuisance, phi=fit.phi)
+        for record, frames, own, error in zip(records, left_out, left.nuisance, errors, strict=True):
             told = predicted_angle(left.model, left.parameters, record, own)
             error[frames == turn] = (record.angle - told)[frames == turn]
     tested = tuple(record.only(frames != KEPT) for record, frames in zip(records, left_out, strict=True))

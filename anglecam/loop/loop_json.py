@@ -12,7 +12,7 @@ from anglecam.identification.output_error import predict_output_error
 from anglecam.identification.systematic import full_sigma
 from anglecam.loop.candidates import Candidate
 from anglecam.loop.close import Verdict
-from anglecam.loop.cross_validation import predict_unseen
+from anglecam.loop.cross_validation import predict_held_out
 from anglecam.loop.next_experiment.design import Experiment, separating_experiment, write_command
 
 MODEL_NAMES = ("a_per_s", "b_per_s2", "c_per_s2")
@@ -86,12 +86,12 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
         },
         "held_out_gain": {"ratio": verdict.gain.ratio, "interval_95": list(verdict.gain.interval_95)},
         "held_out": list(dict.fromkeys(r.name for r in verdict.held_out)),
-        "p_value": verdict.first_gate.p_value,
-        "p_value_after": verdict.last_gate.p_value,
+        "p_value": verdict.first_test.p_value,
+        "p_value_after": verdict.last_test.p_value,
         "model": {name: model[name] for name in MODEL_NAMES if name in model},
         "detectable": [
             {"id": name, "smallest": size_of(name).told(smallest)[0], "unit": split_unit(size_of(name).name)[1]}
-            for name, smallest in verdict.last_gate.detectable.items()
+            for name, smallest in verdict.last_test.detectable.items()
             if name not in named
         ],
         "candidates": [
@@ -108,7 +108,7 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
 def sentence(verdict: Verdict) -> str:
     """Say the verdict in one sentence that a student understands."""
     before, after = (f"{np.degrees(p.rmse):.3g}°" for p in (verdict.before_held_out, verdict.after_held_out))
-    if verdict.verdict == "nothing_missing" and not verdict.first_gate.passed:
+    if verdict.verdict == "nothing_missing" and not verdict.first_test.passed:
         return (
             f"Nothing is missing that this camera could show: what θ̈ = c·u − a·θ̇ − b·θ leaves over ({before} on "
             f"recordings that it was not fitted to) is not noise alone, but no larger than errors of the measurement "
@@ -196,7 +196,7 @@ def _held_out_error(candidate: Candidate, verdict: Verdict) -> float:
         return candidate.told.rmse
     if verdict.held_out:
         return predict_output_error(candidate.fit, verdict.held_out).rmse
-    return predict_unseen(candidate.fit, verdict.fitted, ())[0].rmse
+    return predict_held_out(candidate.fit, verdict.fitted, ())[0].rmse
 
 
 def _values(verdict: Verdict) -> list[dict[str, float]]:

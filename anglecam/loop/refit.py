@@ -25,7 +25,7 @@ def left_of(ledger: Sequence[Effect], fit: Fit) -> list[Effect]:
 
 def recoloured(fit: Fit, records: Sequence[Record], phi: float) -> Fit:
     """Fit again with the noise's autocorrelation ``phi`` from frame to frame."""
-    return fit_output_error(fit.model, records, [fit.parameters], own=fit.own, phi=phi)
+    return fit_output_error(fit.model, records, [fit.parameters], nuisance=fit.nuisance, phi=phi)
 
 
 def without(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
@@ -33,7 +33,7 @@ def without(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
     own = [p.name for p in effect.parameters]
     keep = [i for i, name in enumerate(fit.model.names) if name not in own]
     smaller = replace(plant_of(fit), effects=tuple(e for e in effects_of(fit) if e is not effect))
-    return fit_output_error(smaller, records, [fit.parameters[keep]], own=fit.own, phi=fit.phi)
+    return fit_output_error(smaller, records, [fit.parameters[keep]], nuisance=fit.nuisance, phi=fit.phi)
 
 
 def with_last(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
@@ -41,7 +41,7 @@ def with_last(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
     own = [p.name for p in effect.parameters]
     order = sorted(range(len(fit.model.names)), key=lambda i: fit.model.names[i] in own)
     moved = replace(plant_of(fit), effects=tuple(sorted(effects_of(fit), key=lambda e: e is effect)))
-    return fit_output_error(moved, records, [fit.parameters[order]], own=fit.own, phi=fit.phi)
+    return fit_output_error(moved, records, [fit.parameters[order]], nuisance=fit.nuisance, phi=fit.phi)
 
 
 def plant_of(fit: Fit) -> Plant:

@@ -39,7 +39,7 @@ class Test:
 
 
 @dataclass(frozen=True)
-class Gate:
+class ResidualTest:
     """The outcome of all tests together."""
 
     p_value: float
@@ -58,7 +58,7 @@ class Gate:
 
 def test_residual(
     fit: Fit, records: Sequence[Record], ways: Sequence[Direction], rng: np.random.Generator, finest: float
-) -> Gate:
+) -> ResidualTest:
     """Test the residual of a fitted plant.
 
     Parameters
@@ -76,7 +76,7 @@ def test_residual(
 
     Returns
     -------
-    Gate
+    ResidualTest
         Calibrated at `DRAWS` draws.
     """
     absorbed = absorbed_space(fit)
@@ -103,7 +103,7 @@ def test_residual(
     needed = float(-(special.ndtri(critical) + special.ndtri(0.05)) * np.sqrt(fit.cost / free))
     needed = max(needed, finest * math.sqrt(n))
     tests = tuple(Test(name, float(p[0])) for name, p in p_each.items())
-    return Gate(float(p_value), tests, torque_gain, _detectable(ways, needed))
+    return ResidualTest(float(p_value), tests, torque_gain, _detectable(ways, needed))
 
 
 def _p_of_effects(ways: Sequence[Direction], residuals: Floats, energy: Floats, free: int) -> dict[str, Floats]:

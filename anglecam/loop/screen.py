@@ -109,7 +109,7 @@ def changes(fit: Fit, records: Sequence[Record], effects: Sequence[Effect]) -> l
             values = np.append(fit.parameters, own_parameters)
             return [
                 richer.predict(values, record.time, record.command, own[: plant.states], record.view)
-                for record, own in zip(records, fit.own, strict=True)
+                for record, own in zip(records, fit.nuisance, strict=True)
             ]
 
         base = predict(effect.null)  # with the effect in place: what the integrator errs by is the same then
@@ -156,7 +156,7 @@ def starts_of(effect: Effect) -> list[Floats]:
     first = size.starts[0]
     starts = []
     for i, parameter in enumerate(effect.parameters):
-        for value in () if parameter.late else parameter.starts:
+        for value in () if parameter.staged else parameter.starts:
             own = effect.null
             own[0], own[i] = first, value
             starts.append(own)

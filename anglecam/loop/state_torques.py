@@ -47,7 +47,7 @@ def torque_responses(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
     times = [_between(record.time) for record in records]
     paths = [
         plant.run(fit.parameters, time, record.command, own[: plant.states])
-        for time, record, own in zip(times, records, fit.own, strict=True)
+        for time, record, own in zip(times, records, fit.nuisance, strict=True)
     ]
     whole = np.concatenate(paths)
     angles = np.linspace(whole[:, 0].min(), whole[:, 0].max(), ANGLES)

@@ -29,9 +29,9 @@ from anglecam.loop.candidates import (
     promising,
     side_by_side,
 )
-from anglecam.loop.cross_validation import Prediction, compare, predict_unseen
+from anglecam.loop.cross_validation import Prediction, compare, predict_held_out
 from anglecam.loop.refit import effects_of, left_of, recoloured, without
-from anglecam.loop.residual_test import Gate, test_residual
+from anglecam.loop.residual_test import ResidualTest, test_residual
 from anglecam.loop.screen import Change, Forecast, changes, directions, forecasts
 
 MOST_EFFECTS = 3
@@ -81,7 +81,7 @@ class Round:
     """Of what is held out by declaration, or of all block by block where nothing is."""
     unseen: Prediction
     """Of every frame by a model that was not fitted to it."""
-    gate: Gate
+    gate: ResidualTest
     forecasts: tuple[Forecast, ...]
     """What is worth a fit, most promising first."""
 
@@ -91,7 +91,7 @@ def look(task: Task, fit: Fit) -> Round:
     moved = changes(fit, task.fitted, left_of(task.ledger, fit))
     fit = recoloured(fit, task.fitted, _colour(task, fit, moved))
     ways = directions(fit, task.fitted, moved)
-    told, unseen = predict_unseen(fit, task.fitted, task.predicted)
+    told, unseen = predict_held_out(fit, task.fitted, task.predicted)
     gate = test_residual(fit, task.fitted, ways, task.rng, NEGLIGIBLE * task.camera)
     return Round(fit, told, unseen, gate, tuple(promising(forecasts(fit, ways))))
 
@@ -188,7 +188,7 @@ def _added(task: Task, best: Candidate) -> Round:
         if unseen is None:
             break
         reduced = without(fit, effect, task.fitted)
-        _, less = predict_unseen(reduced, task.fitted, task.predicted)
+        _, less = predict_held_out(reduced, task.fitted, task.predicted)
         if compare(less, unseen, task.rng).interval_95[0] <= 0.0:
             fit, unseen = reduced, less
     return look(task, fit)
@@ -212,7 +212,7 @@ def _colour(task: Task, fit: Fit, moved: Sequence[Change]) -> float:
     the distance from the pivot, which no model enters, says where colour ends and structure begins.
     """
     likely = forecasts(fit, directions(fit, task.fitted, moved))[:LIKELIEST]
-    fits = [fit, *side_by_side(lambda one: fit_with(fit, task.fitted, one, late=False), likely)]
+    fits = [fit, *side_by_side(lambda one: fit_with(fit, task.fitted, one, staged=False), likely)]
     best = min(fits, key=lambda one: one.cost)
     phi = autoregression(best.residuals, "residual").phi
     return phi if task.floor is None else min(phi, max(0.0, task.floor.phi + 1.645 * task.floor.phi_error))

@@ -16,7 +16,7 @@ from anglecam.camera.tilt import Tilt
 from anglecam.data.command import Command
 from anglecam.data.typing import Flags, Floats
 from anglecam.io.rig import Rig
-from anglecam.measurement.detections import Sighting
+from anglecam.measurement.detections import Detections
 from anglecam.measurement.registration_pass import Registered
 from anglecam.measurement.sigma import PlaceErrors, angle_sigma, place_errors
 from anglecam.vision.pivot.marker import Pivot
@@ -48,7 +48,7 @@ class Angles:
     """Direction from pivot to mouth from the picture's horizontal, upward positive for either facing, rad."""
     sigma: Floats
     """Standard uncertainty of ``line`` less ``neutral``, rad."""
-    mouth_px: Floats
+    mark_px: Floats
     """(n, 2) px."""
     pivot: Pivot
     neutral: float
@@ -69,15 +69,15 @@ class Angles:
     @property
     def lever_px(self) -> Floats:
         """Pivot to mouth, (n,) px."""
-        return np.asarray(np.hypot(*(self.mouth_px - self.pivot.centre_px).T))
+        return np.asarray(np.hypot(*(self.mark_px - self.pivot.centre_px).T))
 
 
-def coarse_angles(seen: Sighting, ok: NDArray[np.bool_], time: Floats, rig: Rig, command: Command | None) -> Angles:
+def coarse_angles(seen: Detections, ok: NDArray[np.bool_], time: Floats, rig: Rig, command: Command | None) -> Angles:
     """Read angles from the mouth's centroid.
 
     Parameters
     ----------
-    seen : Sighting
+    seen : Detections
         Mouth and pivot.
     ok : ndarray
         (frames,) which n of them count.
@@ -112,7 +112,7 @@ def coarse_angles(seen: Sighting, ok: NDArray[np.bool_], time: Floats, rig: Rig,
 
 
 def angles_of_places(
-    mouth_px: Floats,
+    mark_px: Floats,
     pivot: Pivot,
     errors: PlaceErrors,
     lens: Lens,
@@ -126,7 +126,7 @@ def angles_of_places(
 
     Parameters
     ----------
-    mouth_px : ndarray
+    mark_px : ndarray
         (n, 2) places in the plane of motion, px.
     pivot : Pivot
         In the plane of motion.
@@ -148,22 +148,22 @@ def angles_of_places(
     Angles
         Without registration.
     """
-    arm = mouth_px - pivot.centre_px
+    arm = mark_px - pivot.centre_px
     # y goes down in the image; a face that looks to the left is mirrored, so that an upward nod is positive.
     line = np.unwrap(np.arctan2(-arm[:, 1], _ahead(arm[:, 0], rig)))
     line -= 2.0 * np.pi * np.round(np.median(line) / (2.0 * np.pi))
     lever = np.hypot(*arm.T)
     neutral, resting = neutral_of(rig, command, time, line, lever)
-    view = _view_errors(lens, mouth_px, pivot.centre_px, line, neutral, resting, rig)
+    view = _view_errors(lens, mark_px, pivot.centre_px, line, neutral, resting, rig)
     aside = thick_px * np.hypot(*lens.parallax) * (line - neutral) / lever
-    known = angle_sigma(mouth_px, pivot.centre_px, pivot.covariance_px2, errors, resting)
+    known = angle_sigma(mark_px, pivot.centre_px, pivot.covariance_px2, errors, resting)
     unsteady = mean_off_middle(time, line, rig.camera.exposure_s)
     sigma = np.sqrt(known**2 + view.sigma**2 + aside**2 + unsteady**2)
-    return Angles(line, sigma, mouth_px, pivot, neutral, resting, errors, view, unsteady)
+    return Angles(line, sigma, mark_px, pivot, neutral, resting, errors, view, unsteady)
 
 
 def _angles_of_head(
-    seen: Sighting, head: RigidMotion, ok: Flags, time: Floats, rig: Rig, command: Command | None
+    seen: Detections, head: RigidMotion, ok: Flags, time: Floats, rig: Rig, command: Command | None
 ) -> Angles:
     """Read angles from the rigid head: of the line from the pivot to its middle."""
     turn, sigma = head.turn[ok], head.sigma[ok]

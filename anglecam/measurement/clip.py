@@ -22,11 +22,11 @@ from anglecam.io.rig import Rig
 from anglecam.io.session import recording_name
 from anglecam.measurement.angles import Angles, coarse_angles, turns
 from anglecam.measurement.clock_sync import DARK, note_on, offset_of, on_clip_clock, see_lamp
-from anglecam.measurement.detections import Sighting
+from anglecam.measurement.detections import Detections
 from anglecam.measurement.fine_angles import fine_angles
-from anglecam.measurement.mark_pass import sight_clip
+from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
-from anglecam.measurement.rigid_body_pass import sight_head
+from anglecam.measurement.rigid_body_pass import detect_rigid_body
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.video.film import decoded_once
 from anglecam.vision.mark.outline_turn import outline_turn
@@ -42,7 +42,7 @@ class Measurement:
     """What was measured in a clip, and how."""
 
     series: AngleSeries
-    sighting: Sighting
+    detections: Detections
     """The coarse pass."""
     angles: Angles
     """The measured frames, and what their uncertainties are made of."""
@@ -63,23 +63,23 @@ class Measurement:
         """What the angles were read off."""
         if self.why_coarse is None:
             return "whole head"
-        return "mouth" if self.sighting.head is None else "head's key frames"
+        return "mouth" if self.detections.head is None else "head's key frames"
 
     @property
     def truncated(self) -> str | None:
         """What could not be read of a file that ends too early."""
-        return self.sighting.truncated
+        return self.detections.truncated
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What the user should know, a line each."""
         coarse = () if self.why_coarse is None else (f"measured by the {self.by} alone: {self.why_coarse}",)
-        return (*self.sighting.notes, *coarse, *(note for note in (self.zero, self.clock) if note is not None))
+        return (*self.detections.notes, *coarse, *(note for note in (self.zero, self.clock) if note is not None))
 
     @property
     def contours_px(self) -> tuple[NDArray[np.int32] | None, ...]:
         """Each frame's (k, 2) outline of the mouth, where one was found."""
-        return tuple(None if r is None else r.contour_px for r in self.sighting.regions)
+        return tuple(None if r is None else r.contour_px for r in self.detections.regions)
 
 
 @decoded_once()
@@ -114,7 +114,7 @@ def measure_clip(
     lamp = see_lamp(path, rig) if changes else None
     offset = offset_of(command, lamp)
     command = on_clip_clock(command, offset)
-    seen = sight_clip(path, rig, progress)
+    seen = detect_mark(path, rig, progress)
     ok = np.array([s == OK for s in seen.status])
     row = _mouth_rows(seen)
     time = measurement_time(seen.time, row, seen.size[1], rig.camera.row_time_s)
@@ -132,12 +132,12 @@ def measure_clip(
             row = np.where(found, registered.row, row)
             time = measurement_time(seen.time, row, seen.size[1], rig.camera.row_time_s)
             angles = coarse_angles(seen, ok, time, rig, command)
-            filmed = seen.in_picture(_among(ok, angles.mouth_px))[ok]
+            filmed = seen.in_picture(_among(ok, angles.mark_px))[ok]
             angles = fine_angles(angles, registered, np.flatnonzero(ok), filmed, time[ok], rig, command)
         elif _only_the_path_tells(seen, rig):
             # a pivot that only a mouth's path tells is far less sure than one that the whole head turns about
-            head = sight_head(path, rig)
-            if isinstance(head, Sighting):
+            head = detect_rigid_body(path, rig)
+            if isinstance(head, Detections):
                 rigid = np.array([s == OK for s in head.status])
                 other = coarse_angles(head, rigid, head.time, rig, command)
                 if (other.sigma**2).mean() < (angles.sigma**2).mean():
@@ -148,7 +148,7 @@ def measure_clip(
     return Measurement(series, seen, angles, why_coarse, zero, DARK if dark else note_on(offset))
 
 
-def _only_the_path_tells(seen: Sighting, rig: Rig) -> bool:
+def _only_the_path_tells(seen: Detections, rig: Rig) -> bool:
     """Tell whether the pivot is where the mouth's path has its centre, and a rigid head could be followed instead."""
     followable = seen.head is None and seen.shakes is None and seen.lens.is_identity
     return followable and seen.marker is None and rig.pivot.near is None
@@ -161,12 +161,12 @@ def _among(ok: NDArray[np.bool_], places_px: Floats) -> Floats:
     return among
 
 
-def _rolls(seen: Sighting) -> Floats:
+def _rolls(seen: Detections) -> Floats:
     """Return how far the camera rolled in each frame, rad."""
     return np.zeros(len(seen.time)) if seen.shakes is None else np.array([move.roll for move in seen.shakes])
 
 
-def _mouth_rows(seen: Sighting) -> Floats:
+def _mouth_rows(seen: Detections) -> Floats:
     """Return the rows of the picture in which the mouth was seen."""
     nowhere = np.full(2, np.nan)
     places = np.array([nowhere if r is None else r.centre_px for r in seen.regions])
@@ -175,7 +175,7 @@ def _mouth_rows(seen: Sighting) -> Floats:
     return np.asarray(seen.in_picture(places)[:, 1])
 
 
-def _carried_along(seen: Sighting, start: Start, registered: Registered, angles: Angles) -> NDArray[np.bool_]:
+def _carried_along(seen: Detections, start: Start, registered: Registered, angles: Angles) -> NDArray[np.bool_]:
     """Tell in which of the doubtful frames the mouth is where the head carries it: all of it is seen, but smeared."""
     off = registered.turn - start.turn - start.turn_per_row * (registered.row - start.row)
     sure, lever = np.isfinite(start.sigma) & np.isfinite(off), float(np.median(angles.lever_px))
@@ -187,7 +187,7 @@ def _carried_along(seen: Sighting, start: Start, registered: Registered, angles:
         return np.asarray(seen.smeared & (np.hypot(along, outward) < _CARRIED_PX))
 
 
-def _start(seen: Sighting, ok: NDArray[np.bool_], time: Floats, row: Floats, angles: Angles, rig: Rig) -> Start:
+def _start(seen: Detections, ok: NDArray[np.bool_], time: Floats, row: Floats, angles: Angles, rig: Rig) -> Start:
     """Lay the coarse turns among all the clip's frames."""
     n = len(time)
     turn, sigma, speed = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n)
@@ -223,7 +223,7 @@ def _series(
     path: Path,
     rig: Rig,
     time: Floats,
-    seen: Sighting,
+    seen: Detections,
     ok: NDArray[np.bool_],
     angles: Angles,
     lamp: tuple[float, float] | None,
@@ -234,7 +234,7 @@ def _series(
     lines[ok], sigmas[ok] = angles.line, angles.sigma
     for i in _duplicates(lines, sigmas, seen.repeated):
         status[i] = "duplicate"
-    mouths = seen.in_picture(_among(ok, angles.mouth_px))
+    mouths = seen.in_picture(_among(ok, angles.mark_px))
     pivots = seen.in_picture(np.broadcast_to(angles.pivot.centre_px, (len(time), 2)))
     from_mark = seen.head is None and angles.registered is None
     evidence = CameraEvidence(
@@ -247,7 +247,7 @@ def _series(
     return series_of_angles(recording_name(path), time, status, ok, angles, mouths, pivots, rig, evidence)
 
 
-def _outline_turn(seen: Sighting, ok: NDArray[np.bool_]) -> tuple[float, float] | None:
+def _outline_turn(seen: Detections, ok: NDArray[np.bool_]) -> tuple[float, float] | None:
     regions = [seen.regions[i] for i in np.flatnonzero(ok)]
     whole = [region for region in regions if region is not None]
     if seen.circle is None or not whole:
@@ -256,7 +256,7 @@ def _outline_turn(seen: Sighting, ok: NDArray[np.bool_]) -> tuple[float, float] 
     return outline_turn(whole, np.unwrap(np.arctan2(arm[:, 1], arm[:, 0])))
 
 
-def _marker(seen: Sighting) -> tuple[float, float] | None:
+def _marker(seen: Detections) -> tuple[float, float] | None:
     if seen.head is not None or seen.shakes is not None or seen.lens.calibration is not None:
         return None
     if seen.marker is not None:

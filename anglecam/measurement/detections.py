@@ -41,7 +41,7 @@ _DEPTH = 0.15
 
 
 @dataclass(frozen=True)
-class Sighting:
+class Detections:
     """The mouth through a clip; sequences have an entry a frame."""
 
     time: Floats

@@ -56,7 +56,7 @@ def fine_angles(
     Angles
         With registration.
     """
-    turn, noise, pose, pull = found.turn[rows], found.noise[rows], found.pose[rows], found.pull[rows]
+    turn, noise, pose, pull = found.turn[rows], found.noise[rows], found.pose[rows], found.pivot_sensitivity[rows]
     seen = np.isfinite(turn)
     signed = turn if rig.facing == "right" else -turn
     base = float(np.median(coarse.line[seen] - signed[seen]))

@@ -20,22 +20,22 @@ from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
-from anglecam.measurement.detections import Sighting, find_pivot, frames_to_keep, why_truncated
-from anglecam.measurement.rigid_body_pass import sight_head
+from anglecam.measurement.detections import Detections, find_pivot, frames_to_keep, why_truncated
+from anglecam.measurement.rigid_body_pass import detect_rigid_body
 from anglecam.video.frames import Sample, inspect_clip, read_frames, sample_frames
 from anglecam.vision.image.noise import pixel_noise
-from anglecam.vision.mark.search import Found, find_mouth
+from anglecam.vision.mark.search import Found, find_mark
 from anglecam.vision.mark.segment import Region, find_regions
-from anglecam.vision.mark.track import Track, follow_mouth
+from anglecam.vision.mark.track import Track, follow_mark
 from anglecam.vision.pivot.marker import Marker, Pivot
-from anglecam.vision.stabilise.background_motion import LOST, CameraMove, Steady
-from anglecam.vision.stabilise.learn import learn_steady
+from anglecam.vision.stabilise.background_motion import LOST, CameraMove, BackgroundMotion
+from anglecam.vision.stabilise.learn import learn_background
 
 _SMALLEST_SHARE = 0.25
 """Of the mouth's area; a smaller region is no mouth even if partly hidden."""
 
 
-def sight_clip(path: Path, rig: Rig, progress: Callable[[int, int], None] | None = None) -> Sighting:
+def detect_mark(path: Path, rig: Rig, progress: Callable[[int, int], None] | None = None) -> Detections:
     """Find the mouth in every frame of a clip, and the pivot.
 
     Parameters
@@ -49,7 +49,7 @@ def sight_clip(path: Path, rig: Rig, progress: Callable[[int, int], None] | None
 
     Returns
     -------
-    Sighting
+    Detections
         At least one frame of it with status ``ok``.
 
     Raises
@@ -62,17 +62,17 @@ def sight_clip(path: Path, rig: Rig, progress: Callable[[int, int], None] | None
     sample = sample_frames(path, frames_to_keep(info))
     images = [f.image for f in sample.frames if f.image is not None]
     noise = pixel_noise(images)
-    steady = learn_steady(images)
+    steady = learn_background(images)
     moves = [] if steady is None else [steady.at(image) for image in images]
     near = None if rig.pivot.near is None else lens.rectify(rig.pivot.near)
 
     def placed(i: int, point: Floats) -> Floats:
         return lens.rectify(moves[i].to_reference(point) if moves else point)
 
-    found = find_mouth(images, rig.mouth_rgb, near, placed) if images else None
+    found = find_mark(images, rig.mouth_rgb, near, placed) if images else None
     if found is None:
-        head = sight_head(path, rig) if rig.mouth_rgb is None and images else None
-        if isinstance(head, Sighting):
+        head = detect_rigid_body(path, rig) if rig.mouth_rgb is None and images else None
+        if isinstance(head, Detections):
             return head
         besides = "" if head is None else f"; nor can the head be followed without one: {head}"
         raise InputError(_no_mouth(path, sample, rig) + besides)
@@ -99,7 +99,7 @@ def sight_clip(path: Path, rig: Rig, progress: Callable[[int, int], None] | None
         )
     if found.circle is None:
         notes.append("the mouth does not move in this clip")
-    return Sighting(
+    return Detections(
         time=time,
         status=status,
         regions=track.regions,
@@ -126,7 +126,7 @@ def _follow(
     """Follow the mouth in the plane of motion; where the view is a tilted perspective, once more about its pivot."""
     for again in (lens.tilt != 0.0 and lens.focal_px is not None, False):
         placed = [[_in_plane(region, lens) for region in regions] for regions in candidates]
-        track = follow_mouth(placed, time, found)
+        track = follow_mark(placed, time, found)
         marker, pivot, disagreement = find_pivot(images, rig, track.circle, lens)
         if not again or pivot is None:
             break
@@ -174,7 +174,7 @@ def _in_plane(region: Region, lens: Lens) -> Region:
 
 
 def _read_regions(
-    path: Path, found: Found, count: int, steady: Steady | None, progress: Callable[[int, int], None] | None
+    path: Path, found: Found, count: int, steady: BackgroundMotion | None, progress: Callable[[int, int], None] | None
 ) -> tuple[Floats, list[list[Region]], list[bool], NDArray[np.bool_], tuple[CameraMove, ...] | None]:
     """Find the regions of the mouth's colour in every frame, and how the camera moved if it did.
 

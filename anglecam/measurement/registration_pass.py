@@ -79,7 +79,7 @@ class Registered:
     """Standard uncertainty from the pixels' noise, rad."""
     pose: Floats
     """Standard uncertainty that all frames share in which the head is at the same place, rad."""
-    pull: Floats
+    pivot_sensitivity: Floats
     """(n, 2) change of the turn with an error of the pivot, rad/px."""
     row: Floats
     """Row of the picture to whose exposure the turn refers."""
@@ -203,7 +203,7 @@ def _gathered(found: list[Turn], rows: Floats, look: Look) -> Registered:
         turn=np.array([one.turn for one in found]),
         noise=np.array([one.noise for one in found]),
         pose=np.array([one.pose for one in found]),
-        pull=np.array([one.pull for one in found]),
+        pivot_sensitivity=np.array([one.pivot_sensitivity for one in found]),
         row=rows,
         pivot_px=look.pivot_px,
         pivot_covariance_px2=look.pivot_covariance_px2,

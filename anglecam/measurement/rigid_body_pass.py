@@ -9,14 +9,14 @@ import numpy as np
 from anglecam.camera.lens import lens_from_rig
 from anglecam.data.series import OK
 from anglecam.io.rig import Rig
-from anglecam.measurement.detections import Sighting, find_pivot, frames_to_keep, why_truncated
+from anglecam.measurement.detections import Detections, find_pivot, frames_to_keep, why_truncated
 from anglecam.video.frames import inspect_clip, read_frames, sample_frames
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.circle import Circle
-from anglecam.vision.rigid_body.rigid import follow_head
+from anglecam.vision.rigid_body.rigid import follow_rigid_body
 
 
-def sight_head(path: Path, rig: Rig) -> Sighting | str:
+def detect_rigid_body(path: Path, rig: Rig) -> Detections | str:
     """Follow the rigid head in place of a mouth.
 
     Parameters
@@ -28,20 +28,20 @@ def sight_head(path: Path, rig: Rig) -> Sighting | str:
 
     Returns
     -------
-    Sighting or str
+    Detections or str
         Why not, in a few words.
 
     Raises
     ------
     InputError
-        As `sight_clip`, for a file that cannot be read.
+        As `detect_mark`, for a file that cannot be read.
     """
     info = inspect_clip(path)
     lens = lens_from_rig(rig, (info.width, info.height), path)
     sample = sample_frames(path, frames_to_keep(info))
     images = [f.image for f in sample.frames if f.image is not None]
     noise = pixel_noise(images)
-    head = follow_head(read_frames(path), images, noise)
+    head = follow_rigid_body(read_frames(path), images, noise)
     if isinstance(head, str):
         return head
     stamps, repeated, before = [], [], None
@@ -62,7 +62,7 @@ def sight_head(path: Path, rig: Rig) -> Sighting | str:
     if pivot is None or OK not in head.status:
         return "it hardly turns"
     notes = ["the rigid head alone is measured, without a mouth", *([disagreement] if disagreement else [])]
-    return Sighting(
+    return Detections(
         time=np.array(stamps),
         status=head.status,
         regions=(None,) * len(stamps),

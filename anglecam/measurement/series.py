@@ -21,7 +21,7 @@ def series_of_angles(
     status: Sequence[str],
     ok: Flags,
     angles: Angles,
-    mouth_px: Floats,
+    mark_px: Floats,
     pivot_px: Floats,
     rig: Rig,
     evidence: CameraEvidence,
@@ -40,7 +40,7 @@ def series_of_angles(
         (frames,) to which of them ``angles`` belong.
     angles : Angles
         Of those n frames.
-    mouth_px, pivot_px : ndarray
+    mark_px, pivot_px : ndarray
         (frames, 2) where the picture shows them, px.
     rig : Rig
         Whose ``pixel_error_px`` the bounds are worked out for, besides the contract's.
@@ -67,7 +67,7 @@ def series_of_angles(
         sigma=among(angles.sigma),
         status=tuple(status),
         line=lines,
-        mouth_px=np.where(told[:, None], mouth_px, np.nan),
+        mark_px=np.where(told[:, None], mark_px, np.nan),
         pivot_px=np.where(told[:, None], pivot_px, np.nan),
         evidence=evidence,
         bounds={r: worst_case(r, levers) for r in {*CONTRACT_RADII_PX, *rig.pixel_error_px}},

@@ -69,7 +69,7 @@ class PlaceErrors:
 
 
 def place_errors(
-    mouth_px: NDArray[np.float64],
+    mark_px: NDArray[np.float64],
     off_px: NDArray[np.float64],
     across_px: NDArray[np.float64],
     along_px: NDArray[np.float64],
@@ -81,7 +81,7 @@ def place_errors(
 
     Parameters
     ----------
-    mouth_px : ndarray
+    mark_px : ndarray
         (n, 2) places, px.
     off_px : ndarray
         (n,) distance from the pivot less the fitted radius, px.
@@ -94,7 +94,7 @@ def place_errors(
     PlaceErrors
         Both parts.
     """
-    _, pose, count = np.unique(np.round(mouth_px).astype(int), axis=0, return_inverse=True, return_counts=True)
+    _, pose, count = np.unique(np.round(mark_px).astype(int), axis=0, return_inverse=True, return_counts=True)
     pose = pose.reshape(-1)
     mean = np.bincount(pose, off_px) / count
     share = (across_px / np.median(across_px)) ** 2
@@ -117,7 +117,7 @@ def place_errors(
 
 
 def angle_sigma(
-    mouth_px: NDArray[np.float64],
+    mark_px: NDArray[np.float64],
     pivot_px: NDArray[np.float64],
     pivot_covariance_px2: NDArray[np.float64],
     errors: PlaceErrors,
@@ -135,7 +135,7 @@ def angle_sigma(
 
     Parameters
     ----------
-    mouth_px : ndarray
+    mark_px : ndarray
         (n, 2) places, px.
     pivot_px, pivot_covariance_px2 : ndarray
         (2,) px and (2, 2) px².
@@ -149,15 +149,15 @@ def angle_sigma(
     ndarray
         (n,) rad.
     """
-    arm = mouth_px - pivot_px
+    arm = mark_px - pivot_px
     lever = np.hypot(*arm.T)
     along = np.column_stack([-arm[:, 1], arm[:, 0]]) / lever[:, None]
     if neutral is None:
         place = errors.noise_px**2 + errors.pose_px**2
         turned = along
     else:
-        apart2 = ((mouth_px - mouth_px[neutral].mean(axis=0)) ** 2).sum(axis=1)
-        poses = len(np.unique(np.round(mouth_px[neutral]).astype(int), axis=0))
+        apart2 = ((mark_px - mark_px[neutral].mean(axis=0)) ** 2).sum(axis=1)
+        poses = len(np.unique(np.round(mark_px[neutral]).astype(int), axis=0))
         rest = float((errors.noise_px[neutral] ** 2).mean()) / int(neutral.sum())
         # A neutral that is the mean over many poses errs little, and little of it is shared with any one of them.
         pose = errors.pose_px**2 * (1.0 + 1.0 / poses - 2.0 / poses * np.exp(-apart2 / 2.0))

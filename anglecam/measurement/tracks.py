@@ -69,7 +69,7 @@ class MeasuredTracks:
 class _Points:
     """Mouth and pivot in every frame of the film."""
 
-    mouth_px: Floats
+    mark_px: Floats
     """(frames, 2) NaN where missing."""
     pivot_px: Floats
     """(frames, 2)."""
@@ -107,7 +107,7 @@ def measure_tracks(path: Path, rig: Rig, command: Command | None = None) -> Meas
         Where the rig does not say which points are mouth and pivot.
     """
     marks, points = _read_points(path, rig)
-    mouth, pivot, size = points.mouth_px, points.pivot_px, points.size
+    mouth, pivot, size = points.mark_px, points.pivot_px, points.size
     seen, based = np.isfinite(mouth[:, 0]), np.isfinite(pivot[:, 0])
     ok = seen & based
     lens = lens_from_rig(rig, size or (1, 1), path).looking_at(np.median(pivot[ok], axis=0))
@@ -142,8 +142,8 @@ def _read_points(path: Path, rig: Rig) -> tuple[Marks, _Points]:
         raise RigError(f"{path}: which of {known} is which? marks: {{mouth: …, pivot: …}} in rig.yaml says it")
     least = tracks.usual_limit if marks.least_likelihood is None else marks.least_likelihood
     pair = choose_pair(tracks, marks.mouth, marks.pivot, least)
-    rows = len(pair.mouth_px)
-    both = int(np.isfinite(pair.mouth_px + pair.pivot_px).all(axis=1).sum())
+    rows = len(pair.mark_px)
+    both = int(np.isfinite(pair.mark_px + pair.pivot_px).all(axis=1).sum())
     if both < _LEAST_FRAMES:
         raise InputError(
             f"{path}: {marks.mouth} and {marks.pivot} are both there in {both} of {rows} frames only (likelihood at"
@@ -168,7 +168,7 @@ def _read_points(path: Path, rig: Rig) -> tuple[Marks, _Points]:
     else:
         time = np.arange(rows) / marks.rate_hz
     missing = ((0, len(time) - rows), (0, 0))
-    mouth, pivot = (np.pad(places, missing, constant_values=np.nan) for places in (pair.mouth_px, pair.pivot_px))
+    mouth, pivot = (np.pad(places, missing, constant_values=np.nan) for places in (pair.mark_px, pair.pivot_px))
     return marks, _Points(mouth, pivot, time, size, film, f"{marks.mouth} ({tracks.software})", tuple(notes))
 
 

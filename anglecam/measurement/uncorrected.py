@@ -66,10 +66,10 @@ def _with_evidence(series: AngleSeries, only_pivot: bool | None) -> AngleSeries:
 
 def _from_mark(series: AngleSeries) -> AngleSeries | None:
     marker_px = series.evidence.marker_px
-    if marker_px is None or series.mouth_px is None or series.pivot_px is None or series.line is None:
+    if marker_px is None or series.mark_px is None or series.pivot_px is None or series.line is None:
         return None
     ok = series.ok
-    arm = series.mouth_px[ok] - np.asarray(marker_px)
+    arm = series.mark_px[ok] - np.asarray(marker_px)
     line = np.full(len(ok), np.nan)
     line[ok] = np.unwrap(np.arctan2(-arm[:, 1], _side(series) * arm[:, 0]))
     line -= 2.0 * np.pi * np.round(np.nanmedian(line - series.line) / (2.0 * np.pi))
@@ -88,10 +88,10 @@ def _about_mark(series: AngleSeries) -> Floats:
     """Return the angle that the line from the mark would have if the mark stood beside the pivot and no more."""
     assert series.line is not None
     assert series.pivot_px is not None
-    assert series.mouth_px is not None
+    assert series.mark_px is not None
     centre = np.nanmedian(series.pivot_px, axis=0)
     beside = np.asarray(series.evidence.marker_px) - centre
-    lever = np.nanmedian(np.hypot(*(series.mouth_px - centre).T))
+    lever = np.nanmedian(np.hypot(*(series.mark_px - centre).T))
     ahead, up = _side(series) * beside[0] / lever, -beside[1] / lever
     return np.arctan2(np.sin(series.line) - up, np.cos(series.line) - ahead)
 
@@ -100,8 +100,8 @@ def _side(series: AngleSeries) -> float:
     """Return -1 where the face looks to the left: lines are counted upward from ahead."""
     assert series.line is not None
     assert series.pivot_px is not None
-    assert series.mouth_px is not None
-    return -1.0 if np.nanmedian((series.mouth_px - series.pivot_px)[:, 0] * np.cos(series.line)) < 0.0 else 1.0
+    assert series.mark_px is not None
+    return -1.0 if np.nanmedian((series.mark_px - series.pivot_px)[:, 0] * np.cos(series.line)) < 0.0 else 1.0
 
 
 def _apart(measured: AngleSeries, plain: AngleSeries, angle: Floats, clearly: float = 1.0) -> bool:

@@ -50,7 +50,7 @@ class Curve:
     angle: Floats
     """(n,) Δθ, rad."""
     figures: StepFigures
-    """Steady state in rad/V; NaN where the neck is unstable."""
+    """BackgroundMotion state in rad/V; NaN where the neck is unstable."""
 
     @property
     def stable(self) -> bool:

@@ -89,7 +89,7 @@ def write_page(path: Path, budget: Budget, scene: Scene | None) -> None:
         pivot_sigma=np.sqrt(np.diag(budget.sources.pivot_covariance_px2)),
         median_sigma=math.degrees(float(np.median(budget.sigma))),
         registered=budget.sources.registration is not None,
-        timed=not all(course.in_sigma for course in budget.courses),
+        timed=not all(course.in_sigma for course in budget.terms_over_time),
         frames=[_shown(title, one, content[title.split()[0]]) for title, one in frames],
         decimals=_decimals(budget.typical.combined.standard, 3),
         paper=[
@@ -157,7 +157,7 @@ def budget_table(budget: Budget) -> Table:
 
 def _scene(clip: Path, measured: Measurement, frame: int) -> Scene | None:
     contour = measured.contours_px[frame]
-    mouth, pivot = measured.series.mouth_px, measured.series.pivot_px
+    mouth, pivot = measured.series.mark_px, measured.series.pivot_px
     image = next((f.image for f in read_frames(clip) if f.index == frame), None)
     if image is None or contour is None or mouth is None or pivot is None:
         return None
@@ -217,7 +217,7 @@ def _course_figure(budget: Budget) -> str:
         plot(bottom, budget.total, color=MEASURED, lw=1.8, label="combined")
         if not np.allclose(budget.sigma, budget.total):
             plot(bottom, budget.sigma, color=MEASURED, lw=1.0, ls=":", label="sigma of the series")
-        for course, hue in zip(budget.courses, _HUES, strict=False):
+        for course, hue in zip(budget.terms_over_time, _HUES, strict=False):
             plot(bottom, course.contribution, color=hue, lw=1.0, label=course.name)
         for one, name in ((budget.typical, "typical"), (budget.worst, "worst")):
             for ax in (top, bottom):

@@ -35,7 +35,7 @@ class Scene:
     """(h, w, 3) blue, green, red."""
     contour_px: NDArray[np.int32]
     """(k, 2) outline of the mouth."""
-    mouth_px: Floats
+    mark_px: Floats
     """(2,)."""
     pivot_px: Floats
     """(2,)."""
@@ -81,26 +81,26 @@ def figure8(scene: Scene) -> str:
             ax.set_title(title, fontsize=9, loc="left")
             ax.tick_params(labelsize=7, length=2)
         zoom, lines, *_, ringed = axes.flat
-        _limit(zoom, scene.mouth_px + np.array([[-1.0], [1.0]]) * 2.2 * max(RADII_PX))
+        _limit(zoom, scene.mark_px + np.array([[-1.0], [1.0]]) * 2.2 * max(RADII_PX))
         _draw_lines(zoom, scene)
-        _draw_circles(zoom, scene.mouth_px)
-        both = np.stack([scene.mouth_px, scene.pivot_px])
+        _draw_circles(zoom, scene.mark_px)
+        both = np.stack([scene.mark_px, scene.pivot_px])
         _limit(lines, _widened(both, scene.image.shape))
         _draw_lines(lines, scene)
-        _draw_circles(lines, scene.mouth_px)
+        _draw_circles(lines, scene.mark_px)
         lines.plot(*scene.pivot_px, "o", ms=5, mfc="none", mec=_PIVOT, mew=1.4)
         lines.legend(fontsize=7, loc="best", frameon=True, framealpha=0.85, edgecolor="none")
-        _draw_circles(ringed, scene.mouth_px)
-        ringed.plot(*scene.mouth_px, "+", color=_TRUE, ms=8, mew=1.4)
+        _draw_circles(ringed, scene.mark_px)
+        ringed.plot(*scene.mark_px, "+", color=_TRUE, ms=8, mew=1.4)
         return _svg(figure)
 
 
-def touching_point(pivot_px: Floats, mouth_px: Floats, radius_px: float, side: float) -> Floats:
+def touching_point(pivot_px: Floats, mark_px: Floats, radius_px: float, side: float) -> Floats:
     """Return where a line from the pivot touches the circle about the mouth: the worst place within it.
 
     Parameters
     ----------
-    pivot_px, mouth_px : ndarray
+    pivot_px, mark_px : ndarray
         (2,) px.
     radius_px : float
         Of the circle, less than the lever arm.
@@ -112,7 +112,7 @@ def touching_point(pivot_px: Floats, mouth_px: Floats, radius_px: float, side: f
     ndarray
         (2,) px, at √(R² − r²) from the pivot, asin(r/R) off the line to the mouth.
     """
-    arm = mouth_px - pivot_px
+    arm = mark_px - pivot_px
     lever = float(np.hypot(*arm))
     turn = side * np.arcsin(radius_px / lever)
     c, s = np.cos(turn), np.sin(turn)
@@ -145,12 +145,12 @@ def _edges(crop: Image, filled: Image) -> Image:
 
 
 def _draw_lines(ax: Axes, scene: Scene) -> None:
-    lever = float(np.hypot(*(scene.mouth_px - scene.pivot_px)))
-    ax.plot(*np.stack([scene.pivot_px, scene.mouth_px]).T, color=_TRUE, lw=1.3, label="measured", path_effects=_CASING)
+    lever = float(np.hypot(*(scene.mark_px - scene.pivot_px)))
+    ax.plot(*np.stack([scene.pivot_px, scene.mark_px]).T, color=_TRUE, lw=1.3, label="measured", path_effects=_CASING)
     for radius, (colour, dash), side in zip(RADII_PX, _LINES, (1.0, -1.0), strict=True):
         if radius >= lever:
             continue
-        end = touching_point(scene.pivot_px, scene.mouth_px, radius, side)
+        end = touching_point(scene.pivot_px, scene.mark_px, radius, side)
         off = np.degrees(np.arcsin(radius / lever))
         ax.plot(
             *np.stack([scene.pivot_px, end]).T, color=colour, ls=dash, lw=1.2, label=f"{radius:g} px off: {off:.2f}°"

@@ -107,7 +107,7 @@ def write_report(
         problems=[str(p) for p in problems],
         models=[_model_row(m) for m in models],
         driven=any(r.command is not None for r in verdict.fitted),
-        tests=_test_rows(verdict.first_gate.tests),
+        tests=_test_rows(verdict.first_test.tests),
         candidates=_candidate_rows(verdict, result),
         drawn=figures.MOST,
         effects=_effect_rows(verdict, result),
@@ -168,8 +168,8 @@ def _series_row(series: AngleSeries) -> dict[str, Any]:
     ok = series.ok
     degrees = np.degrees(series.angle[ok])
     lever = None
-    if series.mouth_px is not None and series.pivot_px is not None:
-        lever = float(np.median(np.hypot(*(series.mouth_px - series.pivot_px)[ok].T)))
+    if series.mark_px is not None and series.pivot_px is not None:
+        lever = float(np.median(np.hypot(*(series.mark_px - series.pivot_px)[ok].T)))
     bound = series.bounds.get(6.0)
     return {
         "name": series.name,
@@ -274,7 +274,7 @@ def _detectable_rows(result: dict[str, Any]) -> list[dict[str, Any]]:
 
 def _undetectable(verdict: Verdict) -> list[str]:
     """Name the effects that would not have been seen at any size that was looked at."""
-    told = {*verdict.last_gate.detectable, *(name for a in verdict.accepted for name in a.alias_set)}
+    told = {*verdict.last_test.detectable, *(name for a in verdict.accepted for name in a.alias_set)}
     return [plain(e.id) for e in applicable([*verdict.fitted, *verdict.held_out]) if e.id not in told]
 
 

@@ -101,7 +101,7 @@ def loop_table(verdict: Verdict, experiment: Experiment | None = None) -> Table:
     before, after = np.degrees(verdict.before_held_out.rmse), np.degrees(verdict.after_held_out.rmse)
     table.add_row("error on unseen recordings, ° RMS", f"{before:.4f} before, {after:.4f} after")
     table.add_row("noise floor, ° RMS", f"{np.degrees(verdict.noise.sigma):.4f} ({verdict.noise.source})")
-    table.add_row("p of the base model's residual", f"{verdict.first_gate.p_value:.3f}")
-    if verdict.verdict != "unexplained" and not verdict.last_gate.passed:
+    table.add_row("p of the base model's residual", f"{verdict.first_test.p_value:.3f}")
+    if verdict.verdict != "unexplained" and not verdict.last_test.passed:
         table.add_row("what still shows", "no more than the angle's uncertainty; not traced")
     return table

@@ -83,8 +83,8 @@ def draw_frame(image: Image, measured: Measured, index: int) -> Image:
     if contour is not None:
         cv2.polylines(drawn, [contour], True, _CONTOUR if good else _BAD, 1, cv2.LINE_AA)
     text = f"{series.time[index]:.3f} s  "
-    if good and series.mouth_px is not None and series.pivot_px is not None:
-        pivot, mouth = _fixed(series.pivot_px[index]), _fixed(series.mouth_px[index])
+    if good and series.mark_px is not None and series.pivot_px is not None:
+        pivot, mouth = _fixed(series.pivot_px[index]), _fixed(series.mark_px[index])
         cv2.line(drawn, pivot, mouth, _LINE, 1, cv2.LINE_AA, _SHIFT)
         cv2.circle(drawn, pivot, 3 << _SHIFT, _LINE, 1, cv2.LINE_AA, _SHIFT)
         for radius in RADII_PX:

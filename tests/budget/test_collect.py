@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from anglecam.budget.collect import error_sources
-from anglecam.budget.terms import angle_draws, courses
+from anglecam.budget.terms import angle_draws, terms_over_time
 from anglecam.io.command_csv import read_command
 from anglecam.io.rig import read_rig
 from anglecam.measurement.clip import measure_clip
-from anglecam.measurement.mark_pass import sight_clip
+from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.registration_pass import Registered, register_clip
 from support.drawn import Look, Recording, draw_session
 
@@ -43,7 +43,7 @@ def _once(function):
 @pytest.fixture(scope="module")
 def sighted():
     """Go over the clip once for all tests of this file: what they change, command and neutral, is not looked at."""
-    return _once(sight_clip)
+    return _once(detect_mark)
 
 
 @pytest.fixture(scope="module")
@@ -53,10 +53,10 @@ def registered():
 
 
 def _now_and_then(found: Registered) -> Registered:
-    turn, noise, pose, pull = (x.copy() for x in (found.turn, found.noise, found.pose, found.pull))
+    turn, noise, pose, pull = (x.copy() for x in (found.turn, found.noise, found.pose, found.pivot_sensitivity))
     turn[LOST] = noise[LOST] = pose[LOST] = np.nan
     pull[LOST] = np.nan
-    return replace(found, turn=turn, noise=noise, pose=pose, pull=pull)
+    return replace(found, turn=turn, noise=noise, pose=pose, pivot_sensitivity=pull)
 
 
 @pytest.mark.parametrize(
@@ -70,16 +70,16 @@ def test_a_measured_clips_terms_join_to_its_sigma(clip, sighted, registered, mon
         "always": registered,
         "now and then": lambda *arguments: _now_and_then(registered(*arguments)),
     }
-    monkeypatch.setattr(import_module("anglecam.measurement.clip"), "sight_clip", sighted)
+    monkeypatch.setattr(import_module("anglecam.measurement.clip"), "detect_mark", sighted)
     monkeypatch.setattr(import_module("anglecam.measurement.clip"), "register_clip", readings[head])
     if neutral == "declared":
         rig = rig.model_copy(update={"neutral": -12.0})
     measured = measure_clip(path, rig, command if neutral == "rest" else None)
     sources = error_sources(measured, rig)
     sigma = measured.series.sigma[measured.series.ok]
-    joined = np.sqrt(sum(c.contribution**2 for c in courses(sources) if c.in_sigma))
+    joined = np.sqrt(sum(c.contribution**2 for c in terms_over_time(sources) if c.in_sigma))
     assert joined == pytest.approx(sigma, rel=1e-6)
-    names = {c.name for c in courses(sources)}
+    names = {c.name for c in terms_over_time(sources)}
     assert ("registration" in names) == (head != "never")
     assert ("picture noise" in names) == (head != "always")
     certain = replace(sources, noise_dof=np.inf, pose_dof=np.inf, pivot_dof=np.inf)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anglecam.budget.terms import ErrorSources, angle_draws, courses
+from anglecam.budget.terms import ErrorSources, angle_draws, terms_over_time
 from anglecam.camera.lens import Lens
 from anglecam.camera.tilt import Tilt
 from anglecam.measurement.sigma import PlaceErrors, angle_sigma
@@ -16,7 +16,7 @@ from support.nod import COVARIANCE, PIVOT, REST, N, nod_sources
 
 
 def _joined(sources: ErrorSources) -> np.ndarray:
-    return np.sqrt(sum(c.contribution**2 for c in courses(sources) if c.in_sigma))
+    return np.sqrt(sum(c.contribution**2 for c in terms_over_time(sources) if c.in_sigma))
 
 
 def _spread(sources: ErrorSources, i: int, m: int = 400_000) -> float:
@@ -48,14 +48,14 @@ def test_each_term_alone_is_what_is_drawn_of_it_alone(only):
     }
     sources, _ = nod_sources(**chosen)
     assert _spread(sources, 60) == pytest.approx(_joined(sources)[60], rel=0.006)
-    names = {c.name for c in courses(sources)}
+    names = {c.name for c in terms_over_time(sources)}
     expected = {"noise": {"picture noise", "neutral line"}, "pose": {"pixel grid and codec"}, "pivot": {"pivot"}}
     assert names == expected[only]
 
 
 def test_a_pivots_error_cancels_at_neutral_and_grows_as_the_line_turns():
     sources, _ = nod_sources(noise=0.0, pose=0.0, pivot_covariance_px2=0.01 * np.eye(2))
-    (pivot,) = courses(sources)
+    (pivot,) = terms_over_time(sources)
     expected = 2.0 * np.abs(np.sin(sources.angle / 2.0)) * 0.1 / sources.lever_px
     assert pivot.contribution == pytest.approx(expected, abs=1e-8)
 
@@ -64,8 +64,8 @@ def test_registration_errs_by_its_own_sigma_and_its_own_pull_of_the_pivot():
     pull = np.column_stack([np.linspace(0.0, 4e-4, N), np.linspace(1e-4, -3e-4, N)])
     sigma = np.full(N, 4e-5)
     plain, _ = nod_sources(noise=0.0, pose=0.0)
-    neutral = replace(plain.neutral, registration=4e-5 / math.sqrt(REST.sum()), pull=pull[REST].mean(axis=0))
-    sources = replace(plain, registration=sigma, pivot_pull=pull, neutral=neutral)
+    neutral = replace(plain.neutral, registration=4e-5 / math.sqrt(REST.sum()), pivot_sensitivity=pull[REST].mean(axis=0))
+    sources = replace(plain, registration=sigma, pivot_sensitivity=pull, neutral=neutral)
     off = pull - pull[REST].mean(axis=0)
     expected = sigma**2 * (1.0 + 1.0 / REST.sum()) + np.einsum("ni,ij,nj->n", off, COVARIANCE, off)
     assert _joined(sources) == pytest.approx(np.sqrt(expected), rel=1e-9)
@@ -76,7 +76,7 @@ def test_the_geometrys_own_pull_is_the_geometry():
     sources, _ = nod_sources(lever_px=np.full(N, 200.0))
     along = np.column_stack([np.sin(sources.line), np.cos(sources.line)])
     pull = along / 200.0
-    pulled = replace(sources, pivot_pull=pull, neutral=replace(sources.neutral, pull=pull[REST].mean(axis=0)))
+    pulled = replace(sources, pivot_sensitivity=pull, neutral=replace(sources.neutral, pivot_sensitivity=pull[REST].mean(axis=0)))
     assert _joined(pulled) == pytest.approx(_joined(sources), rel=1e-9)
     assert _spread(pulled, 60) == pytest.approx(_spread(sources, 60), rel=0.006)
 
@@ -110,9 +110,9 @@ def test_the_tilts_term_is_what_is_drawn_of_it():
 def test_errors_of_the_time_count_by_the_speed_and_are_not_in_sigma():
     without, _ = nod_sources()
     sources = replace(without, exposure_s=0.01, clock_s=0.001)
-    timed = {c.name: c for c in courses(sources) if not c.in_sigma}
+    timed = {c.name: c for c in terms_over_time(sources) if not c.in_sigma}
     assert timed["instant within the exposure"].at(40).uncertainty == pytest.approx(0.01 / math.sqrt(12.0))
     assert _joined(sources) == pytest.approx(_joined(without))
-    total = np.sqrt(sum(c.contribution[40] ** 2 for c in courses(sources)))
+    total = np.sqrt(sum(c.contribution[40] ** 2 for c in terms_over_time(sources)))
     assert total > 1.5 * _joined(sources)[40]
     assert _spread(sources, 40) == pytest.approx(total, rel=0.006)

@@ -44,7 +44,7 @@ def test_from_80_percent_off_it_settles_at_the_minimum_of_output_error_and_state
     records = [record(TruePlant(), Recording("steps"), np.random.default_rng(3), sigma_deg=0.2)]
     estimate = fitted(records, TRUE * factors)
     fit = fit_output_error(Plant(), records, [TRUE])
-    bound = cramer_rao_bound(Plant(), fit.parameters, records, fit.own, SIGMA)
+    bound = cramer_rao_bound(Plant(), fit.parameters, records, fit.nuisance, SIGMA)
     assert estimate.settled
     assert np.abs(estimate.parameters - fit.parameters) == pytest.approx(
         0.0, abs=0.01 * np.sqrt(bound.diagonal().min())

@@ -116,7 +116,7 @@ def test_what_hangs_together_with_a_parameter_on_its_bound_is_as_unsure_as_the_b
     for _ in range(200):
         angle = exact + sigma * rng.standard_normal(len(time))
         measured = Record("one", time, angle, None, zero_known=True, sigma=np.full(len(time), sigma))
-        fit = fit_output_error(model, [measured], [np.array([1.0, 0.5])], own=[np.zeros(2)])
+        fit = fit_output_error(model, [measured], [np.array([1.0, 0.5])], nuisance=[np.zeros(2)])
         if fit.parameters[1] > 1.0 - 1e-6:
             assert np.isnan(fit.sigma[1])
             # no surer without the bound; the noise is known to 6 %
@@ -145,5 +145,5 @@ class RunsAway:
 def test_a_start_beside_which_the_plant_runs_away_costs_nothing(beyond):
     time = np.arange(0.0, 2.0, 0.1)
     measured = Record("one", time, 0.5 * time, None, zero_known=True, sigma=np.full(len(time), 0.01))
-    fit = fit_output_error(RunsAway(beyond), [measured], [np.ones(1)], own=[np.zeros(2)])
+    fit = fit_output_error(RunsAway(beyond), [measured], [np.ones(1)], nuisance=[np.zeros(2)])
     assert fit.parameters == pytest.approx([0.5])

@@ -41,7 +41,7 @@ def test_a_series_reads_back_as_it_was_written(tmp_path):
     assert back.status == series.status
     np.testing.assert_allclose(back.time, series.time, rtol=1e-8)
     np.testing.assert_allclose(back.angle, series.angle, atol=np.radians(1e-6))
-    np.testing.assert_allclose(back.mouth_px, series.mouth_px, atol=1e-4)
+    np.testing.assert_allclose(back.mark_px, series.mark_px, atol=1e-4)
 
 
 def test_columns_are_the_contracts_and_an_unmeasured_row_is_empty(tmp_path):

@@ -35,7 +35,7 @@ def series() -> AngleSeries:
         sigma=there(rng.uniform(0.001, 0.002, n)),
         status=tuple(status),
         line=there(rng.normal(size=n)),
-        mouth_px=there(rng.uniform(0, 600, (n, 2))),
+        mark_px=there(rng.uniform(0, 600, (n, 2))),
         pivot_px=there(rng.uniform(0, 600, (n, 2))),
         bounds={r: there(np.full(n, r / 180.0)) for r in (4.0, 6.0, 10.0)},
     )
@@ -57,7 +57,7 @@ def test_netcdf_has_the_dimensions_variables_and_attributes_of_movement(series, 
         assert data.time.dtype == np.float64  # seconds as they are, not taken for a date
         np.testing.assert_array_equal(data.time, series.time)
         mouth = data.position.sel(keypoints="mouth", individuals="head").transpose("time", "space")
-        np.testing.assert_array_equal(mouth, series.mouth_px)
+        np.testing.assert_array_equal(mouth, series.mark_px)
         pivot = data.position.sel(keypoints="pivot", individuals="head", space="y")
         np.testing.assert_array_equal(pivot, series.pivot_px[:, 1])
         np.testing.assert_array_equal(data.angle_deg, np.degrees(series.angle))

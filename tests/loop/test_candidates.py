@@ -63,7 +63,7 @@ def test_in_a_film_what_is_finer_than_the_angle_asks_for_no_late_parameter():
     base = fit_output_error(Plant(), fitted, [np.array([26.0, 524.0, 508.0])])
     (forecast,) = forecasts(base, directions(base, fitted, changes(base, fitted, [effect("coulomb_friction")])))
     sure = fit_with(base, fitted, forecast)
-    size_alone = fit_with(base, fitted, forecast, late=False)
+    size_alone = fit_with(base, fitted, forecast, staged=False)
     distance = apart(sure, size_alone)
     assert len(sure.parameters) > len(size_alone.parameters)
     assert len(fit_with(base, fitted, forecast, camera=0.9 * distance).parameters) == len(sure.parameters)
@@ -94,5 +94,5 @@ def test_a_fit_ends_only_where_nothing_more_is_gained():
     start = [26.0, 524.0, 508.0, *(p.starts[0] for p in gravity.parameters)]
     found = further = fit_output_error(Plant((gravity,)), fitted, [np.array(start)])
     for _ in range(4):
-        further = fit_output_error(further.model, fitted, [further.parameters], own=further.own)
+        further = fit_output_error(further.model, fitted, [further.parameters], nuisance=further.nuisance)
     assert log_likelihood_gain(found.cost, further.cost, len(found.white)) < 0.01

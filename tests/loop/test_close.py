@@ -10,7 +10,7 @@ import pytest
 from anglecam.errors import RigError
 from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.close import close_records
-from anglecam.loop.cross_validation import Prediction, predict_unseen, split_records
+from anglecam.loop.cross_validation import Prediction, predict_held_out, split_records
 from anglecam.loop.loop_json import sentence, verdict_as_dict
 from anglecam.loop.stepwise import applicable
 from anglecam.models.plant import Plant
@@ -141,12 +141,12 @@ def test_a_clock_offset_below_zero_is_found_as_a_dead_time_below_zero():
 def test_nothing_is_fitted_to_what_it_then_predicts():
     records = session(TruePlant(), 16)
     start = np.array([26.0, 524.0, 508.0])
-    _, unseen = predict_unseen(fit_output_error(Plant(), records, [start]), records, [])
+    _, unseen = predict_held_out(fit_output_error(Plant(), records, [start]), records, [])
     assert unseen.rmse == pytest.approx(np.radians(0.05), rel=0.1)
     # half a second of nonsense may not be followed by what predicts it, and by what predicts the rest only a little
     nonsense = np.radians(3.0) * np.sin(40.0 * records[0].time) * (np.abs(records[0].time - 2.6) < 0.25)
     broken = [replace(records[0], angle=records[0].angle + nonsense), *records[1:]]
-    _, spoilt = predict_unseen(fit_output_error(Plant(), broken, [start]), broken, [])
+    _, spoilt = predict_held_out(fit_output_error(Plant(), broken, [start]), broken, [])
     off = spoilt.residuals[0] - unseen.residuals[0]
     inside = np.abs(spoilt.records[0].time - 2.6) < 0.25
     added = np.interp(spoilt.records[0].time, records[0].time, nonsense)
@@ -157,7 +157,7 @@ def test_nothing_is_fitted_to_what_it_then_predicts():
 def test_what_is_held_out_by_declaration_is_predicted_by_the_fit_of_all_others():
     fitted, held_out = split_records(session(TruePlant(), 18), HELD_OUT)
     fit = fit_output_error(Plant(), fitted, [np.array([26.0, 524.0, 508.0])])
-    told, unseen = predict_unseen(fit, fitted, held_out)
+    told, unseen = predict_held_out(fit, fitted, held_out)
     assert [r.name for r in told.records] == HELD_OUT
     assert len(unseen.records) == len(fitted) + 1
 

@@ -28,7 +28,10 @@ def test_what_a_torque_over_angle_or_speed_changes_lies_within_their_curves(colu
     for value in (size, 0.0):
         parameters = np.append(fit.parameters, value)
         paths.append(
-            [richer.predict(parameters, r.time, r.command, own[:2]) for r, own in zip(records, fit.own, strict=True)]
+            [
+                richer.predict(parameters, r.time, r.command, own[:2])
+                for r, own in zip(records, fit.nuisance, strict=True)
+            ]
         )
     change = np.concatenate(paths[0]) - np.concatenate(paths[1])
     left = {}

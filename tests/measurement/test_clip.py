@@ -13,7 +13,7 @@ from anglecam.errors import InputError
 from anglecam.io.command_csv import read_command
 from anglecam.io.rig import Mouth, Pivot, Rig, read_rig
 from anglecam.measurement.clip import measure_clip
-from anglecam.measurement.mark_pass import sight_clip
+from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.sigma import angle_sigma, place_errors, worst_case, worst_case_both_ends
 from support import broken
 from support.drawn import Look, Recording, draw_frames, draw_session, write_clip
@@ -116,7 +116,7 @@ def test_angles_are_right_and_sigma_is_true_beside_a_second_red_object(drawn):
     assert ratio[0] < np.std(error / sigma) < ratio[1]
     assert np.abs(np.mean(error / sigma)) < 2.5
     # Against the centroid's own place: the distractor never won.
-    assert np.hypot(*(series.mouth_px - truth.mouth_px).T).max() < 1.0
+    assert np.hypot(*(series.mark_px - truth.mark_px).T).max() < 1.0
     six = np.degrees(series.bounds[6.0])
     assert (np.abs(error) < six).all()
     np.testing.assert_allclose(six, np.degrees(np.arcsin(6.0 / look.lever_px)), rtol=0.02)
@@ -148,7 +148,7 @@ def test_occluded_frames_are_marked_and_no_wrong_row_is_ok(tmp_path):
     error, _ = _errors(series, SWING)
     assert np.abs(error).max() < 0.12
     assert np.isnan(series.angle[~series.ok]).all()
-    assert np.isnan(series.mouth_px[~series.ok]).all()
+    assert np.isnan(series.mark_px[~series.ok]).all()
 
 
 def test_a_repeated_frame_in_motion_is_a_duplicate_and_at_rest_it_is_not(tmp_path):
@@ -167,7 +167,7 @@ def test_a_clip_at_rest_is_measured_beside_a_larger_red_mug(tmp_path):
     look = Look(lever_px=200.0)
     measured = measure_clip(_film(tmp_path, look, np.zeros(40)), _rig(look))
     assert measured.series.ok.all()
-    assert np.hypot(*(measured.series.mouth_px - look.mouth(np.zeros(40))).T).max() < 1.0
+    assert np.hypot(*(measured.series.mark_px - look.mouth(np.zeros(40))).T).max() < 1.0
     assert np.degrees(np.abs(measured.series.angle)).max() < 0.01
 
 
@@ -177,7 +177,7 @@ def test_a_declared_colour_may_be_30_levels_off(film, rgb):
     measured = measure_clip(film, _rig(look, mouth=Mouth(rgb=rgb)), REST)
     error, _ = _errors(measured.series, SWING)
     assert np.sqrt((error**2).mean()) < 0.03
-    assert np.abs(np.array(measured.sighting.colour_rgb) - look.lips_rgb).max() < 15
+    assert np.abs(np.array(measured.detections.colour_rgb) - look.lips_rgb).max() < 15
 
 
 def test_flicker_and_pale_lips_do_no_harm(tmp_path):
@@ -214,7 +214,7 @@ def test_a_marker_away_from_the_centre_of_rotation_is_reported(tmp_path):
             cv2.circle(frame, (int(x), int(y)), 9, (20, 20, 20), -1, cv2.LINE_AA)
 
     measured = measure_clip(_film(tmp_path, look, edit=paint), _rig(look), REST)
-    assert any("px apart" in note for note in measured.sighting.notes)
+    assert any("px apart" in note for note in measured.detections.notes)
     error, _ = _errors(measured.series, SWING)
     assert np.abs(error).max() < 0.15
 
@@ -238,7 +238,7 @@ def test_a_clip_in_which_nothing_turns_is_one_line(tmp_path):
 def test_a_head_without_lipstick_is_measured_as_a_rigid_body_and_a_red_mug_is_no_mouth_of_it(tmp_path):
     look = Look(lips_rgb=(216, 182, 160))
     measured = measure_clip(_film(tmp_path, look), _rig(look), REST)
-    assert any("rigid head alone" in note for note in measured.sighting.notes)
+    assert any("rigid head alone" in note for note in measured.detections.notes)
     error, sigma = _errors(measured.series, SWING)
     assert measured.series.ok.all()
     assert np.sqrt((error**2).mean()) < 0.05
@@ -251,10 +251,10 @@ def test_what_is_left_of_a_truncated_clip_is_measured_and_the_rest_is_said(film,
     measured = measure_clip(cut, _rig(look), REST)
     read = sum(s != "undecodable" for s in measured.series.status)
     assert 33 < read < 48
-    assert measured.sighting.truncated == f"truncated: {read} of {N} frames could be read"
+    assert measured.detections.truncated == f"truncated: {read} of {N} frames could be read"
     error, _ = _errors(measured.series, SWING[: len(measured.series.time)])
     assert np.sqrt((error**2).mean()) < 0.03
-    assert sight_clip(film, _rig(look)).truncated is None
+    assert detect_mark(film, _rig(look)).truncated is None
 
 
 def test_worst_cases_at_the_papers_arms():

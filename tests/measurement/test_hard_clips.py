@@ -127,7 +127,7 @@ def test_a_declared_rolling_shutter_moves_the_time_of_each_row(tmp_path):
         declare={"camera": {"row_time_s": 3e-5}},
     )
     error, _ = _errors(measured, truth)
-    late = measured.series.time - measured.sighting.time
+    late = measured.series.time - measured.detections.time
     assert 2e-4 < np.ptp(late) < 1e-2
     # undone by the stamps alone it would be a tenth of a degree
     assert np.median(np.abs(error)) < 0.002

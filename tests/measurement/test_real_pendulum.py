@@ -31,8 +31,8 @@ def test_the_ball_is_found_once_the_hand_is_off_it(measured):
 
 
 def test_its_path_is_a_circle_about_a_pivot_above_the_picture(measured):
-    series, circle = measured.series, measured.sighting.circle
-    off = np.hypot(*(series.mouth_px - circle.centre_px).T)[30:] - circle.radius_px
+    series, circle = measured.series, measured.detections.circle
+    off = np.hypot(*(series.mark_px - circle.centre_px).T)[30:] - circle.radius_px
     assert np.sqrt(np.nanmean(off**2)) < 1.3
     assert abs(measured.angles.pivot.centre_px[0] - 650) < 4
     assert abs(measured.angles.pivot.centre_px[1] + 709) < 25
@@ -40,7 +40,7 @@ def test_its_path_is_a_circle_about_a_pivot_above_the_picture(measured):
 
 def test_turning_points_agree_with_the_film_makers_to_one_frame(measured):
     series = measured.series
-    x = series.mouth_px[:, 0]
+    x = series.mark_px[:, 0]
     with (FOLDER / "log.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 17

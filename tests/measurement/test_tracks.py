@@ -128,7 +128,7 @@ def test_missing_and_unlikely_points_leave_empty_rows_with_their_cause(tmp_path)
         dict.fromkeys([30, 31], "no_pivot"),
     )
     assert causes == no_mouth | no_pivot
-    for values in (series.angle, series.sigma, series.line, *series.mouth_px.T, *series.pivot_px.T, series.bounds[6.0]):
+    for values in (series.angle, series.sigma, series.line, *series.mark_px.T, *series.pivot_px.T, series.bounds[6.0]):
         assert np.isnan(values[~series.ok]).all()
     assert np.abs(_pulls(series, SWING)).max() < 5.0
     lenient = Rig(marks=Marks(mouth="nose", pivot="neck", rate_hz=60.0, least_likelihood=0.2))

@@ -28,7 +28,7 @@ def filmed(mark, *, facing=1.0, shown=lambda line: line, noise_px=0.01):
         sigma=np.full(len(TIME), 1e-5),
         status=("ok",) * len(TIME),
         line=line,
-        mouth_px=mouth,
+        mark_px=mouth,
         pivot_px=np.broadcast_to(PIVOT, mouth.shape),
         evidence=CameraEvidence(marker_px=tuple(PIVOT + mark)),
     )
@@ -63,7 +63,7 @@ def test_where_it_cannot_be_said_whether_more_than_the_mark_is_beside_nothing_is
 
 def test_an_angle_read_off_the_mouth_does_not_tell_what_else_than_the_pivot_may_be_wrong():
     bent = filmed((6.0, -4.0), shown=lambda line: line + 0.2 * line**2)
-    arm = bent.mouth_px - PIVOT
+    arm = bent.mark_px - PIVOT
     evidence = replace(bent.evidence, from_mark=True)
     line = np.arctan2(-arm[:, 1], arm[:, 0])
     alone = replace(bent, line=line, evidence=evidence, sigma=np.full(len(TIME), 5e-5))

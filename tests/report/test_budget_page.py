@@ -58,7 +58,7 @@ def test_the_page_holds_the_numbers_and_the_figures(written):
     assert "src=" not in page
     assert f"{math.degrees(budget.bounds[-1].worst):.3f}" in page
     assert "0.408°" in page
-    for course in budget.courses:
+    for course in budget.terms_over_time:
         assert course.name in page
     assert "None" not in page
     assert "nan" not in page.replace("provenance", "")
@@ -70,7 +70,7 @@ def test_the_table_shows_terms_bounds_and_expanded_uncertainty(written):
     with console.capture() as capture:
         console.print(budget_table(budget))
     shown = capture.get()
-    for name in (budget.courses[0].name, "pivot", "expanded, 95 %", "6 px, worst case", "10 px, standard"):
+    for name in (budget.terms_over_time[0].name, "pivot", "expanded, 95 %", "6 px, worst case", "10 px, standard"):
         assert name in shown
 
 

@@ -49,7 +49,7 @@ def cramer_rao_bound(
         for r, o in zip(records, own, strict=True)
     ]
     # a fit that begins at the truth ends there, and leaves its derivatives
-    return parameter_covariance(fit_output_error(model, exact, [parameters], own=own), sigma)
+    return parameter_covariance(fit_output_error(model, exact, [parameters], nuisance=own), sigma)
 
 
 def parameter_covariance(fit: Fit, sigma: float) -> Floats:

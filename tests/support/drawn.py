@@ -45,7 +45,7 @@ class Truth:
     """On the clip's own clock, which is exact: the true time is the same."""
     angle_deg: np.ndarray
     """From neutral, up positive."""
-    mouth_px: np.ndarray
+    mark_px: np.ndarray
     """Centroid of the lips' area, shape (n, 2)."""
     pivot_px: np.ndarray
     """Centre of rotation, shape (2,)."""
@@ -176,7 +176,7 @@ def write_truth(path: Path, truth: Truth) -> None:
             truth.time_s,
             truth.time_s,
             truth.angle_deg,
-            truth.mouth_px,
+            truth.mark_px,
             np.broadcast_to(truth.pivot_px, (n, 2)),
         ]
     )

@@ -38,7 +38,7 @@ class Tracks:
 class Pair:
     """Two points of one individual; arrays over all frames of the tracks."""
 
-    mouth_px: Floats
+    mark_px: Floats
     """(frames, 2) NaN where missing or not likely enough."""
     pivot_px: Floats
     """(frames, 2)."""

@@ -220,7 +220,7 @@ def _candidates(fits: Sequence[Fit], records: Sequence[Record]) -> list[Candidat
 def _angles(fit: Fit, records: Sequence[Record]) -> Floats:
     """Return all measured angles from equilibrium, rad: less the zeros that were fitted."""
     states = fit.model.states
-    return np.concatenate([r.angle - own[states:].sum() for r, own in zip(records, fit.own, strict=True)])
+    return np.concatenate([r.angle - own[states:].sum() for r, own in zip(records, fit.nuisance, strict=True)])
 
 
 def _foresee_all(candidate: Candidate, fits: Sequence[Fit], records: Sequence[Record]) -> list[_Foreseen]:

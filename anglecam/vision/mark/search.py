@@ -46,7 +46,7 @@ class Found:
     """Coarse centre and radius of its path, px; ``None`` where it does not move."""
 
 
-def find_mouth(
+def find_mark(
     images: Sequence[Image],
     rgb: tuple[int, int, int] | None,
     near_px: Floats | None,

@@ -20,7 +20,7 @@ from anglecam.vision.pivot.circle import Circle, fit_circle
 SEEN, ABSENT, HIDDEN, DOUBTFUL = "ok", "no_mouth", "occluded", "ambiguous"
 
 _COARSE_PX = 6.0
-"""Gate about the coarse circle."""
+"""ResidualTest about the coarse circle."""
 _LEAST_GATE_PX = 1.5
 _SPOT_PX = 3.0
 """A region that comes back within this distance while the mouth is elsewhere is part of the scenery."""
@@ -53,7 +53,7 @@ class Track:
     """(n,) frames that are ``occluded`` by the looks of the mouth, but it moves so fast that this may be its blur."""
 
 
-def follow_mouth(candidates: Sequence[Sequence[Region]], time: Floats, found: Found) -> Track:
+def follow_mark(candidates: Sequence[Sequence[Region]], time: Floats, found: Found) -> Track:
     """Choose the mouth's region in every frame.
 
     Parameters

@@ -79,7 +79,7 @@ class Turn:
     """Standard uncertainty from the pixels' noise, rad; another frame's is its own."""
     pose: float
     """Standard uncertainty from what goes with the place on the pixel grid, rad: codec, light; the same at the same."""
-    pull: Floats
+    pivot_sensitivity: Floats
     """(2,) change of the turn with an error of the pivot, rad/px."""
 
 

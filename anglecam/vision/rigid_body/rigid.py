@@ -30,7 +30,7 @@ _AGREE_SHARE = 0.3
 """Of a key's points that must be seen, as one body, for a frame to be measured."""
 
 
-def follow_head(frames: Iterator[Frame], samples: Sequence[Image], noise: float) -> RigidMotion | str:
+def follow_rigid_body(frames: Iterator[Frame], samples: Sequence[Image], noise: float) -> RigidMotion | str:
     """Find how the head is turned in every frame, from nothing but that it is rigid and turns.
 
     Parameters

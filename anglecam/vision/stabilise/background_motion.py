@@ -79,7 +79,7 @@ LOST = CameraMove(np.zeros(2), np.full(2, np.nan), float("nan"), np.full((3, 3),
 
 
 @dataclass(frozen=True)
-class Steady:
+class BackgroundMotion:
     """The scenery as it was learnt; the reference is where the first of the frames learnt from has it."""
 
     picture: Image

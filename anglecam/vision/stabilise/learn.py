@@ -21,7 +21,7 @@ from anglecam.vision.stabilise.background_motion import (
     HIDDEN,
     MARGIN_PX,
     Cuts,
-    Steady,
+    BackgroundMotion,
     brightness,
     cut,
     free_of,
@@ -66,7 +66,7 @@ def shakes(images: Sequence[Image]) -> bool:
     return scenery is not None and scenery.shakes
 
 
-def learn_steady(images: Sequence[Image]) -> Steady | None:
+def learn_background(images: Sequence[Image]) -> BackgroundMotion | None:
     """Learn the scenery where the camera does not stand still.
 
     Parameters
@@ -76,7 +76,7 @@ def learn_steady(images: Sequence[Image]) -> Steady | None:
 
     Returns
     -------
-    Steady or None
+    BackgroundMotion or None
         ``None`` where the camera stands still, or may do so, or too little is seen of the scenery to say how it moves.
     """
     pictures = [brightness(image) for image in images]
@@ -101,7 +101,7 @@ class _Learnt:
     unlike: Floats
 
 
-def _learn(scenery: Scenery, pictures: Sequence[Image], shifts: Floats, rolls: Floats) -> Steady | None:
+def _learn(scenery: Scenery, pictures: Sequence[Image], shifts: Floats, rolls: Floats) -> BackgroundMotion | None:
     """Learn with rolls; then, where these are chance, without, and without the tiles in which something moves."""
     tiles = _part_of(
         scenery, _most_telling(scenery, pictures[0].shape[1::-1], np.quantile(np.abs(shifts), 0.7, axis=0))
@@ -117,7 +117,7 @@ def _learn(scenery: Scenery, pictures: Sequence[Image], shifts: Floats, rolls: F
     cuts = cut(pictures, tiles, shifts, rolls)
     rounds = _BLURRED_ROUNDS + _SHARP_ROUNDS
     learnt = _in_turn(cuts, tiles, shifts, rolls, rounds=rounds, sharp=_SHARP_ROUNDS, rolling=rolling)
-    return Steady(level(pictures[0]), tiles, learnt.patches, learnt.variance, rolling, learnt.unlike)
+    return BackgroundMotion(level(pictures[0]), tiles, learnt.patches, learnt.variance, rolling, learnt.unlike)
 
 
 def _most_telling(scenery: Scenery, size: tuple[int, ...], reach_px: Floats) -> NDArray[np.intp]:

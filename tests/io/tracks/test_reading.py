@@ -111,7 +111,7 @@ def test_the_individual_that_is_there_most_often_is_followed_and_said(tmp_path):
     points[:5, 0, 0] = np.nan
     tracks = read_tracks(write_sleap(tmp_path / "film.h5", points, SCORES, NAMES, ("mia", "max")))
     pair = choose_pair(tracks, "nose", "neck", 0.2)
-    np.testing.assert_array_equal(pair.mouth_px, POINTS[:, 1, 0])
+    np.testing.assert_array_equal(pair.mark_px, POINTS[:, 1, 0])
     assert pair.followed == "max is followed: it shows nose and neck most often (mia 7, max 12 frames)"
 
 
@@ -121,7 +121,7 @@ def test_a_mark_that_belongs_to_no_animal_is_every_animals(tmp_path):
     table = table.loc[:, [column[1:3] in rig + mia for column in table.columns]]
     table.to_csv(tmp_path / "film.csv")
     pair = choose_pair(read_tracks(tmp_path / "film.csv"), "nose", "ear", 0.6)
-    np.testing.assert_allclose(pair.mouth_px, POINTS[:, 0, 0])
+    np.testing.assert_allclose(pair.mark_px, POINTS[:, 0, 0])
     np.testing.assert_allclose(pair.pivot_px, POINTS[:, 1, 2])
     assert pair.followed.startswith("mia is followed")
 
@@ -131,7 +131,7 @@ def test_an_unlikely_point_is_missing_and_one_without_a_likelihood_is_not(tmp_pa
     scores[3, 0, 0], scores[4, 0, 0] = 0.59, np.nan
     tracks = read_tracks(write_deeplabcut(tmp_path / "film.csv", POINTS[:, :1], scores, names=NAMES))
     pair = choose_pair(tracks, "nose", "ear", tracks.usual_limit)
-    assert np.flatnonzero(np.isnan(pair.mouth_px[:, 0])).tolist() == [3]
+    assert np.flatnonzero(np.isnan(pair.mark_px[:, 0])).tolist() == [3]
     assert not np.isnan(pair.pivot_px).any()
 
 

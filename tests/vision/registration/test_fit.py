@@ -47,5 +47,5 @@ def test_sigma_is_true(swing):
 
 def test_the_mouths_place_in_a_frame_stays_what_was_seen_there(swing):
     measured, truth = swing
-    away = measured.series.mouth_px - np.column_stack([truth["mouth_x_px"], truth["mouth_y_px"]])
+    away = measured.series.mark_px - np.column_stack([truth["mouth_x_px"], truth["mouth_y_px"]])
     assert np.hypot(*away.T).max() < 0.5

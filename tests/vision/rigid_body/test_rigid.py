@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from anglecam.video.frames import Frame, read_frames
-from anglecam.vision.rigid_body.rigid import follow_head
+from anglecam.vision.rigid_body.rigid import follow_rigid_body
 from support.drawn import Look, draw_frames
 from support.real import REAL
 from synth.session import render
@@ -56,7 +56,7 @@ def nod(tmp_path_factory):
     truth = np.genfromtxt(folder / "truth" / "nod.truth.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
     clip = folder / "session" / "nod.avi"
     images = [frame.image for frame in read_frames(clip)]
-    return follow_head(read_frames(clip), sampled(images), 1.0), truth
+    return follow_rigid_body(read_frames(clip), sampled(images), 1.0), truth
 
 
 def test_a_nod_of_seventy_degrees_in_a_third_of_a_second_is_followed(nod):
@@ -97,7 +97,7 @@ def swinging():
 
 def test_a_textured_room_and_a_thing_that_swings_are_not_the_head(swinging):
     look, angles, images = swinging
-    motion = follow_head(numbered(images), sampled(images, 8), look.noise)
+    motion = follow_rigid_body(numbered(images), sampled(images, 8), look.noise)
     error, ratio = off(motion, -angles)
     assert rms(error) < 0.01
     assert rms(ratio) < 1.5
@@ -110,7 +110,7 @@ def test_errors_do_not_add_up_with_the_length_of_the_clip_and_every_frame_has_it
     look, angles, images = swinging
     rounds = 3
     long = [None if i == 50 else image for i, image in enumerate(images * rounds)]
-    motion = follow_head(numbered(long), sampled(images, 8), look.noise)
+    motion = follow_rigid_body(numbered(long), sampled(images, 8), look.noise)
     assert [i for i, s in enumerate(motion.status) if s != "ok"] == [50]
     assert motion.status[50] == "undecodable"
     turns = motion.turn.reshape(rounds, -1)
@@ -121,12 +121,12 @@ def test_errors_do_not_add_up_with_the_length_of_the_clip_and_every_frame_has_it
 def test_a_clip_in_which_nothing_turns_says_so(swinging):
     look = swinging[0]
     images = list(draw_frames(look, np.zeros(6), seed=2))
-    assert isinstance(follow_head(numbered(images), sampled(images), look.noise), str)
-    assert isinstance(follow_head(numbered(images[:1] * 20), images[:1] * 5, look.noise), str)
+    assert isinstance(follow_rigid_body(numbered(images), sampled(images), look.noise), str)
+    assert isinstance(follow_rigid_body(numbered(images[:1] * 20), images[:1] * 5, look.noise), str)
 
 
 @pytest.mark.skipif(not FILM.exists(), reason="the real film is not here")
 def test_a_plain_ball_has_nothing_to_tell_its_turn_by():
     """Its centre moves on a circle; whether it turns on its thread is not to be seen."""
     images = [frame.image for frame in itertools.islice(read_frames(FILM), 0, 60)]
-    assert isinstance(follow_head(numbered(images, 24.0), images[::10], 2.0), str)
+    assert isinstance(follow_rigid_body(numbered(images, 24.0), images[::10], 2.0), str)

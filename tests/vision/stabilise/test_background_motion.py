@@ -7,7 +7,7 @@ import yaml
 
 from anglecam.video.frames import read_frames, sample_frames
 from anglecam.vision.stabilise.background_motion import CameraMove
-from anglecam.vision.stabilise.learn import learn_steady, shakes
+from anglecam.vision.stabilise.learn import learn_background, shakes
 from support.drawn import Look, draw_frames
 from synth.session import render
 
@@ -24,7 +24,7 @@ def film(folder, **spec):
 
 
 def follow(clip):
-    steady = learn_steady([frame.image for frame in sample_frames(clip, 32).frames])
+    steady = learn_background([frame.image for frame in sample_frames(clip, 32).frames])
     return steady, [steady.at(frame.image) for frame in read_frames(clip)]
 
 
@@ -89,7 +89,7 @@ def test_a_camera_that_stands_still_does_not_shake_though_head_and_light_do(look
     lit = [np.clip(image * (1.0 + 0.1 * np.sin(k)), 0, 255).astype(np.uint8) for k, image in enumerate(images)]
     assert not shakes(images)
     assert not shakes(lit)
-    assert learn_steady(lit) is None
+    assert learn_background(lit) is None
 
 
 def test_points_come_back():
