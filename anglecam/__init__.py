@@ -10,15 +10,44 @@ from anglecam.errors import AnglecamError, InputError, RigError
 
 if TYPE_CHECKING:
     from anglecam.api import close_loop, identify, measure
+    from anglecam.data.series import AngleSeries
+    from anglecam.effects import Effect
+    from anglecam.io.rig import Rig
+    from anglecam.io.session import Session
+    from anglecam.loop.close import Verdict
 
-__all__ = ["AnglecamError", "InputError", "RigError", "__version__", "close_loop", "identify", "measure"]
+_HOME = {
+    "measure": "anglecam.api",
+    "identify": "anglecam.api",
+    "close_loop": "anglecam.api",
+    "AngleSeries": "anglecam.data.series",
+    "Effect": "anglecam.effects",
+    "Rig": "anglecam.io.rig",
+    "Session": "anglecam.io.session",
+    "Verdict": "anglecam.loop.close",
+}
+"""Modules of the public names; each is loaded when one of its names is first used, to keep the start-up short."""
+
+__all__ = [
+    "AngleSeries",
+    "AnglecamError",
+    "Effect",
+    "InputError",
+    "Rig",
+    "RigError",
+    "Session",
+    "Verdict",
+    "__version__",
+    "close_loop",
+    "identify",
+    "measure",
+]
 __version__ = version("anglecam")
 
 
 def __getattr__(name: str) -> Any:
-    """Load what measures and fits when it is first asked for: a program that needs one room starts without the rest."""
-    if name in __all__:
-        return getattr(import_module("anglecam.api"), name)
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

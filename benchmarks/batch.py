@@ -42,12 +42,13 @@ SINGLE = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL"
 BARE = """
 import sys, cv2
 from pathlib import Path
+from anglecam.video.film import open_film
 from anglecam.measurement.clip import measure_clip
 from anglecam.workflow.clip import write_measurement
 from anglecam.io.session import rig_beside
 cv2.setNumThreads(1)
 for clip in sorted(Path(sys.argv[1]).glob("*.avi")):
-    write_measurement(measure_clip(clip, rig_beside(clip)), None, Path(sys.argv[2]))
+    write_measurement(measure_clip(open_film(clip), rig_beside(clip)), None, Path(sys.argv[2]))
 """
 
 

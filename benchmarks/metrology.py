@@ -25,7 +25,7 @@ from anglecam.camera.calibration import Calibration, write_calibration
 from anglecam.io.command_csv import read_command
 from anglecam.io.rig import read_rig
 from anglecam.measurement.clip import measure_clip
-from anglecam.video.frames import read_frames
+from anglecam.video.film import open_film
 from synth.motion import move
 from synth.session import render
 from synth.spec import read_spec
@@ -117,7 +117,7 @@ def judge(spec_file: Path, name: str) -> tuple[np.ndarray, np.ndarray, int, int]
     clip = next(p for p in session.glob(f"{name}.*") if p.suffix in (".avi", ".mp4", ".mkv"))
     command = session / f"{name}.command.csv"
     rig = read_rig(session / "rig.yaml")
-    series = measure_clip(clip, rig, read_command(command)).series
+    series = measure_clip(open_film(clip), rig, read_command(command)).series
     rows = np.loadtxt(command, delimiter=",", skiprows=1)
     ok = series.ok
     truth = np.degrees(move(spec, recording, rows, float(series.time[-1]) + 0.1).angle(series.time[ok]))
@@ -136,7 +136,7 @@ def bound_deg() -> float:
         spec.write_text(yaml.safe_dump({"rig": {"lever_px": 200.0}, "camera": camera, "recordings": recordings}))
         render(spec, Path(folder) / "session", Path(folder) / "truth")
         truth = np.genfromtxt(Path(folder) / "truth" / "nod.truth.csv", delimiter=",", names=True, dtype=None)
-        frames = [frame.image for frame in read_frames(Path(folder) / "session" / "nod.avi")]
+        frames = [frame.image for frame in open_film(Path(folder) / "session" / "nod.avi").frames()]
     angle = np.radians(truth["angle_deg"])
     bounds = []
     for k in np.flatnonzero(np.abs(np.diff(angle)) > np.radians(0.02)):

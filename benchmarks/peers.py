@@ -34,7 +34,7 @@ from throughput import film
 
 import anglecam
 from anglecam.io.rig import Rig
-from anglecam.video.frames import read_frames
+from anglecam.video.film import open_film
 from synth.spec.picture import Rig as TrueRig
 
 CAMERAS = {"FFV1": {"codec": "ffv1"}, "MJPEG": {"codec": "mjpeg"}, "H.264 crf 18": {"codec": "h264", "crf": 18}}
@@ -70,7 +70,7 @@ class Film:
 
     def pictures(self) -> Iterator[np.ndarray]:
         """Give every frame, blue, green, red."""
-        return (frame.image for frame in read_frames(self.clip))
+        return (frame.image for frame in open_film(self.clip).frames())
 
     def redness(self, room_px: int = ROOM_PX) -> Iterator[np.ndarray]:
         """Give the box of every frame, red over the mean of green and blue."""

@@ -35,7 +35,7 @@ from anglecam.io.session import read_session
 from anglecam.loop.close import close_records
 from anglecam.loop.cross_validation import Prediction, predict_held_out, split_records
 from anglecam.models.plant import Plant
-from anglecam.workflow.recordings import measure_session
+from anglecam.workflow.session import measure_session
 
 Floats = NDArray[np.float64]
 

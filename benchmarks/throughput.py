@@ -30,7 +30,7 @@ import yaml
 
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import measure_clip
-from anglecam.video.frames import read_frames
+from anglecam.video.film import open_film
 from synth.render import workers
 from synth.session import render
 
@@ -81,7 +81,7 @@ def decode(clip: Path) -> None:
 
 
 def read(clip: Path) -> None:
-    for _ in read_frames(clip):
+    for _ in open_film(clip).frames():
         pass
 
 
@@ -96,7 +96,7 @@ def measure(clip: Path) -> list[float]:
         if done in (1, of):
             ends.append(time.perf_counter())
 
-    measure_clip(clip, Rig(), progress=progress)
+    measure_clip(open_film(clip), Rig(), progress=progress)
     return [after - before for before, after in pairwise(ends)]
 
 
@@ -118,7 +118,7 @@ def times(clip: Path, rounds: int) -> list[str]:
         measured.append(whole / base)
         stages.append([part / base for part in parts])
     parts = [f"{median(of):.2f}" for of in zip(*stages, strict=True)]
-    frames = sum(1 for _ in read_frames(clip))
+    frames = sum(1 for _ in open_film(clip).frames())
     rates = [frames / median(decoded), frames / median(d * m for d, m in zip(decoded, measured, strict=True))]
     ratios = [f"{median(reads):.2f}", *parts, *["–"] * (4 - len(parts)), f"**{median(measured):.2f}**"]
     return [*(f"{rate:.0f}" for rate in rates), *ratios]

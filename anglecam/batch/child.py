@@ -24,11 +24,10 @@ from anglecam.data.series import AngleSeries
 from anglecam.errors import AnglecamError, InputError, RigError, blame
 from anglecam.io.netcdf_parquet import read_netcdf, write_netcdf
 from anglecam.io.rig import read_rig
-from anglecam.io.session import Recording, command_beside, read_session, rig_beside
-from anglecam.measurement.clip import Measurement, measure_clip
-from anglecam.video.frames import inspect_clip
-from anglecam.workflow.clip import write_measurement
-from anglecam.workflow.recordings import gather_session, measure_recording, shown_to_loop
+from anglecam.io.session import Recording, read_session
+from anglecam.measurement.clip import Measurement
+from anglecam.measurement.tracks import MeasuredTracks
+from anglecam.workflow.clip import measure_source, open_recording, open_source, write_measurement
 
 _GRACE_S = 60.0
 """After its time limit a process whose starter is gone, and which does not heed that, ends by itself."""
@@ -52,15 +51,15 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     try:
         with blame(clip):
-            rig = read_rig(Path(request["rig"])) if request["rig"] else rig_beside(clip)
-            command = command_beside(clip)
-            info = inspect_clip(clip)
-            found |= {"width_px": info.width, "height_px": info.height, "codec": info.codec}
-            measurement = measure_clip(clip, rig, command)
+            source = open_source(clip, read_rig(Path(request["rig"])) if request["rig"] else None)
+            film = source.film
+            if film is not None:
+                found |= {"width_px": film.width, "height_px": film.height, "codec": film.codec}
+            measurement = measure_source(source)
         found |= _figures(measurement) | {"truncated": measurement.truncated}
         with blame(clip):
             try:
-                write_measurement(measurement, command, into)
+                write_measurement(measurement, source.command, into)
                 if request["keep"]:
                     write_netcdf(measurement.series, Path(request["keep"]))
             except OSError as problem:
@@ -85,15 +84,15 @@ def fit(request: dict[str, Any]) -> dict[str, Any]:
         ``verdict``, ``effects`` and ``problems``, or the ``cause`` why there is no model and whether the
         ``call_is_wrong``.
     """
-    from anglecam.workflow.session import close_session, identify_session  # a second of imports, which no clip needs
+    from anglecam.workflow.session import gather_session, loop_input  # a second of imports, which no clip needs
+    from anglecam.workflow.session_results import write_closed, write_identified
 
     folder, into = Path(request["session"]), Path(request["into"])
     kept: dict[str, str] = request["kept"]
 
     def series_of(recording: Recording) -> tuple[AngleSeries, str | None]:
         if not recording.is_clip:  # tracks by another program
-            with blame(recording.source):
-                tracked = measure_recording(recording.source, opened.rig, recording.command)
+            tracked = measure_source(open_recording(recording.source, opened.rig, recording.command))
             return tracked.series, tracked.truncated
         if recording.source.name not in kept:
             raise InputError(f"{recording.source}: could not be measured")
@@ -103,22 +102,18 @@ def fit(request: dict[str, Any]) -> dict[str, Any]:
         with blame(folder):
             opened = read_session(folder, read_rig(Path(request["rig"])) if request["rig"] else None)
             measured = gather_session(opened, series_of)
-            if not measured.records:
-                raise InputError(f"{folder}: no recording can be used")
             verdict = effects = None
             if request["close"]:
-                names = [name for name in opened.rig.held_out if name in {r.name for r in opened.recordings}]
-                shown = shown_to_loop(opened, measured)
-                found = close_session(opened, measured, shown, into, held_out=names).verdict
+                found = write_closed(measured, loop_input(measured), into).verdict
                 verdict, effects = found.verdict, " + ".join(a.effect.id for a in found.accepted) or None
             else:
-                identify_session(opened, measured, into)
+                write_identified(measured, into)
     except AnglecamError as problem:
         return {"cause": str(problem), "call_is_wrong": isinstance(problem, RigError), "problems": []}
     return {"verdict": verdict, "effects": effects, "problems": [str(problem) for problem in measured.problems]}
 
 
-def _figures(measurement: Measurement) -> dict[str, Any]:
+def _figures(measurement: Measurement | MeasuredTracks) -> dict[str, Any]:
     series = measurement.series
     n, span = len(series.time), float(series.time[-1] - series.time[0])
     sigma = np.degrees(series.sigma[series.ok])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from anglecam.budget.gum import Combined, Comparison, Propagated, combine, compare, propagate
-from anglecam.budget.terms import TermOverTime, ErrorSources, angle_draws, terms_over_time
+from anglecam.budget.terms import ErrorSources, TermOverTime, angle_draws, terms_over_time
 from anglecam.data.series import CONTRACT_RADII_PX
 from anglecam.data.typing import Floats
 from anglecam.measurement.sigma import worst_case, worst_case_both_ends

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -18,8 +17,7 @@ from anglecam.camera.calibration import Calibration
 from anglecam.camera.chessboard import find_corners
 from anglecam.data.typing import Floats
 from anglecam.errors import InputError
-from anglecam.video.film import decoded_once
-from anglecam.video.frames import inspect_clip, read_frames
+from anglecam.video.film import Film
 
 _STRETCHES = 120
 """Parts of the clip from each of which one frame is searched."""
@@ -94,13 +92,13 @@ class _Fit:
     per_view: Floats
 
 
-def calibrate_clip(clip: Path, board: tuple[int, int], square_m: float = 1.0) -> BoardCalibration:
+def calibrate_clip(film: Film, board: tuple[int, int], square_m: float = 1.0) -> BoardCalibration:
     """Calibrate a camera from a clip in which a chessboard is shown to it in many poses.
 
     Parameters
     ----------
-    clip : Path
-        The film.
+    film : Film
+        The clip.
     board : tuple of int
         Inner corners, columns and rows: a board of 10 by 7 squares has (9, 6).
     square_m : float
@@ -116,12 +114,12 @@ def calibrate_clip(clip: Path, board: tuple[int, int], square_m: float = 1.0) ->
     InputError
         Where the clip cannot be read, the board is not seen, seen in too few poses, or never at a slant.
     """
+    clip = film.path
     if min(board) < 3 or not square_m > 0.0:
         raise InputError(f"{clip}: a board needs at least 3×3 inner corners and squares larger than nothing")
-    info = inspect_clip(clip)
-    size = (info.width, info.height)
+    size = film.size
     name = f"chessboard of {board[0]}×{board[1]} inner corners"
-    seen, searched = _search(clip, board)
+    seen, searched = _search(film, board)
     if not seen:
         raise InputError(
             f"{clip}: {name} not seen in any of {searched} frames searched; count the corners where four squares"
@@ -171,17 +169,16 @@ def calibrate_clip(clip: Path, board: tuple[int, int], square_m: float = 1.0) ->
     )
 
 
-@decoded_once()
-def _search(clip: Path, board: tuple[int, int]) -> tuple[list[_Seen], int]:
+def _search(film: Film, board: tuple[int, int]) -> tuple[list[_Seen], int]:
     """Find the board in the sharpest frame of each stretch of a clip; say how many frames were searched."""
     sharpness = [
         -1.0 if f.image is None else float(cv2.Laplacian(cv2.cvtColor(f.image, cv2.COLOR_BGR2GRAY), cv2.CV_32F).var())
-        for f in read_frames(clip)
+        for f in film.frames()
     ]
     stretches = np.array_split(np.arange(len(sharpness)), min(_STRETCHES, len(sharpness)))
     chosen = {int(part[np.argmax(np.array(sharpness)[part])]) for part in stretches}
     found: list[_Seen] = []
-    for frame in read_frames(clip):
+    for frame in film.frames():
         if frame.index in chosen and frame.image is not None:
             corners = find_corners(cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY), board)
             if corners is not None:

@@ -28,7 +28,7 @@ from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
 from anglecam.measurement.rigid_body_pass import detect_rigid_body
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
-from anglecam.video.film import decoded_once
+from anglecam.video.film import Film
 from anglecam.vision.mark.outline_turn import outline_turn
 
 _CARRIED_PX = 1.0
@@ -82,15 +82,14 @@ class Measurement:
         return tuple(None if r is None else r.contour_px for r in self.detections.regions)
 
 
-@decoded_once()
 def measure_clip(
-    path: Path, rig: Rig, command: Command | None = None, *, progress: Callable[[int, int], None] | None = None
+    film: Film, rig: Rig, command: Command | None = None, *, progress: Callable[[int, int], None] | None = None
 ) -> Measurement:
     """Measure the nodding angle in every frame of a clip.
 
     Parameters
     ----------
-    path : Path
+    film : Film
         The clip.
     rig : Rig
         What is declared about mouth, pivot, direction, neutral and camera.
@@ -111,10 +110,10 @@ def measure_clip(
         Where the file cannot be read, or no frame of it can be measured: one line with file, count and cause.
     """
     changes = command is not None and command.first_change() is not None
-    lamp = see_lamp(path, rig) if changes else None
+    lamp = see_lamp(film, rig) if changes else None
     offset = offset_of(command, lamp)
     command = on_clip_clock(command, offset)
-    seen = detect_mark(path, rig, progress)
+    seen = detect_mark(film, rig, progress)
     ok = np.array([s == OK for s in seen.status])
     row = _mouth_rows(seen)
     time = measurement_time(seen.time, row, seen.size[1], rig.camera.row_time_s)
@@ -122,7 +121,7 @@ def measure_clip(
     why_coarse: str | None = "the mouth does not move"
     if seen.moves:
         start = _start(seen, ok, time, row, angles, rig)
-        registered = register_clip(path, start, seen.lens, progress)
+        registered = register_clip(film, start, seen.lens, progress)
         why_coarse = registered if isinstance(registered, str) else None
         if isinstance(registered, Registered):
             registered = replace(registered, turn=registered.turn - _rolls(seen))
@@ -136,13 +135,13 @@ def measure_clip(
             angles = fine_angles(angles, registered, np.flatnonzero(ok), filmed, time[ok], rig, command)
         elif _only_the_path_tells(seen, rig):
             # a pivot that only a mouth's path tells is far less sure than one that the whole head turns about
-            head = detect_rigid_body(path, rig)
+            head = detect_rigid_body(film, rig)
             if isinstance(head, Detections):
                 rigid = np.array([s == OK for s in head.status])
                 other = coarse_angles(head, rigid, head.time, rig, command)
                 if (other.sigma**2).mean() < (angles.sigma**2).mean():
                     seen, ok, time, angles = head, rigid, head.time, other
-    series = _series(path, rig, time, seen, ok, angles, lamp)
+    series = _series(film.path, rig, time, seen, ok, angles, lamp)
     zero = why_zero_is_elsewhere(rig, command, time[ok])
     dark = changes and lamp is None and rig.sync.lamp is not None
     return Measurement(series, seen, angles, why_coarse, zero, DARK if dark else note_on(offset))

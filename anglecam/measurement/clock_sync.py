@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from anglecam.camera.shutter import measurement_time
 from anglecam.data.command import Command
 from anglecam.errors import RigError
 from anglecam.io.rig import Rig
-from anglecam.video.frames import inspect_clip, read_frames
+from anglecam.video.film import Film
 from anglecam.vision.image.lamp import lit_between, patch_levels
 
 Interval = tuple[float, float]
@@ -38,13 +37,13 @@ AGREED = Offset(0.0, 0.0)
 DARK = "the lamp is not seen to light; the command's clock is taken for the clip's"
 
 
-def see_lamp(clip: Path, rig: Rig) -> Interval | None:
+def see_lamp(film: Film, rig: Rig) -> Interval | None:
     """Find when the lamp that the rig declares is lit first.
 
     Parameters
     ----------
-    clip : Path
-        A film.
+    film : Film
+        The clip.
     rig : Rig
         Whose ``sync.lamp`` says where the lamp is to be seen.
 
@@ -59,20 +58,19 @@ def see_lamp(clip: Path, rig: Rig) -> Interval | None:
     RigError
         Where the lamp lies outside the picture.
     InputError
-        As `read_frames`.
+        As `Film.frames`.
     """
     place = rig.sync.lamp
     if place is None:
         return None
-    info = inspect_clip(clip)
-    if not (0.0 <= place[0] <= info.width - 1 and 0.0 <= place[1] <= info.height - 1):
-        where, size = f"[{place[0]:g}, {place[1]:g}]", f"{info.width} × {info.height}"
-        raise RigError(f"{clip}: sync: {{lamp: {where}}} lies outside its picture of {size} pixels")
-    frames = [(f.time, None if f.image is None else patch_levels(f.image, place)) for f in read_frames(clip)]
+    if not (0.0 <= place[0] <= film.width - 1 and 0.0 <= place[1] <= film.height - 1):
+        where, size = f"[{place[0]:g}, {place[1]:g}]", f"{film.width} × {film.height}"
+        raise RigError(f"{film.path}: sync: {{lamp: {where}}} lies outside its picture of {size} pixels")
+    frames = [(f.time, None if f.image is None else patch_levels(f.image, place)) for f in film.frames()]
     time = np.array([t for t, _ in frames])
     levels = np.array([np.full(3, np.nan) if level is None else level for _, level in frames])
     rows = np.full(len(time), place[1])
-    return lit_between(measurement_time(time, rows, info.height, rig.camera.row_time_s), levels)
+    return lit_between(measurement_time(time, rows, film.height, rig.camera.row_time_s), levels)
 
 
 def offsets(commands: Mapping[str, Command | None], lit: Mapping[str, Interval | None]) -> dict[str, Offset]:

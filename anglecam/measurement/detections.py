@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from anglecam.camera.lens import Lens
 from anglecam.data.typing import Floats, Image
 from anglecam.io.rig import Rig
-from anglecam.video.frames import ClipInfo, Sample
+from anglecam.video.film import Film
 from anglecam.vision.image.median import median_picture
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle
@@ -148,14 +148,6 @@ def _reconciled(marker: Marker | None, circle: Circle | None, lens: Lens) -> tup
     return marker, circle
 
 
-def frames_to_keep(info: ClipInfo) -> int:
+def frames_to_keep(film: Film) -> int:
     """Return how many frames the first reading keeps."""
-    return int(np.clip(_SAMPLE_BYTES // max(3 * info.width * info.height, 1), 8, _SAMPLES))
-
-
-def why_truncated(info: ClipInfo, sample: Sample) -> str | None:
-    """Say how much could be read of a file that ends too early; ``None`` of one that does not."""
-    if not info.cut_short or 0 < info.declared_frames <= sample.decoded:
-        return None
-    of = f" of {info.declared_frames}" if info.declared_frames else ""
-    return f"truncated: {sample.decoded}{of} frames could be read"
+    return int(np.clip(_SAMPLE_BYTES // max(3 * film.width * film.height, 1), 8, _SAMPLES))

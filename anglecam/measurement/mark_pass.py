@@ -20,27 +20,27 @@ from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
-from anglecam.measurement.detections import Detections, find_pivot, frames_to_keep, why_truncated
+from anglecam.measurement.detections import Detections, find_pivot, frames_to_keep
 from anglecam.measurement.rigid_body_pass import detect_rigid_body
-from anglecam.video.frames import Sample, inspect_clip, read_frames, sample_frames
+from anglecam.video.film import Film, Sample
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.mark.search import Found, find_mark
 from anglecam.vision.mark.segment import Region, find_regions
 from anglecam.vision.mark.track import Track, follow_mark
 from anglecam.vision.pivot.marker import Marker, Pivot
-from anglecam.vision.stabilise.background_motion import LOST, CameraMove, BackgroundMotion
+from anglecam.vision.stabilise.background_motion import LOST, BackgroundMotion, CameraMove
 from anglecam.vision.stabilise.learn import learn_background
 
 _SMALLEST_SHARE = 0.25
 """Of the mouth's area; a smaller region is no mouth even if partly hidden."""
 
 
-def detect_mark(path: Path, rig: Rig, progress: Callable[[int, int], None] | None = None) -> Detections:
+def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | None = None) -> Detections:
     """Find the mouth in every frame of a clip, and the pivot.
 
     Parameters
     ----------
-    path : Path
+    film : Film
         The clip.
     rig : Rig
         What is declared about mouth, pivot and camera.
@@ -57,9 +57,9 @@ def detect_mark(path: Path, rig: Rig, progress: Callable[[int, int], None] | Non
     InputError
         Where the file cannot be read, or no frame of it can be measured: one line with file, count and cause.
     """
-    info = inspect_clip(path)
-    lens = lens_from_rig(rig, (info.width, info.height), path)
-    sample = sample_frames(path, frames_to_keep(info))
+    path = film.path
+    lens = lens_from_rig(rig, film.size, path)
+    sample = film.sample(frames_to_keep(film))
     images = [f.image for f in sample.frames if f.image is not None]
     noise = pixel_noise(images)
     steady = learn_background(images)
@@ -71,12 +71,12 @@ def detect_mark(path: Path, rig: Rig, progress: Callable[[int, int], None] | Non
 
     found = find_mark(images, rig.mouth_rgb, near, placed) if images else None
     if found is None:
-        head = detect_rigid_body(path, rig) if rig.mouth_rgb is None and images else None
+        head = detect_rigid_body(film, rig) if rig.mouth_rgb is None and images else None
         if isinstance(head, Detections):
             return head
         besides = "" if head is None else f"; nor can the head be followed without one: {head}"
         raise InputError(_no_mouth(path, sample, rig) + besides)
-    time, filmed, decoded, repeated, shakes = _read_regions(path, found, sample.count, steady, progress)
+    time, filmed, decoded, repeated, shakes = _read_regions(film, found, sample.count, steady, progress)
     candidates = filmed if shakes is None else [_unshaken(r, move) for r, move in zip(filmed, shakes, strict=True)]
     images = [_levelled(image, move) for image, move in zip(images, moves, strict=True)] if moves else images
     lens, track, marker, pivot, disagreement = _follow(candidates, time, found, images, rig, lens)
@@ -114,8 +114,8 @@ def detect_mark(path: Path, rig: Rig, progress: Callable[[int, int], None] | Non
         noise=noise,
         repeated=repeated,
         colour_rgb=found.model.mean_rgb,
-        size=(info.width, info.height),
-        truncated=why_truncated(info, sample),
+        size=film.size,
+        truncated=film.why_truncated(sample),
         notes=tuple(notes),
     )
 
@@ -174,7 +174,7 @@ def _in_plane(region: Region, lens: Lens) -> Region:
 
 
 def _read_regions(
-    path: Path, found: Found, count: int, steady: BackgroundMotion | None, progress: Callable[[int, int], None] | None
+    film: Film, found: Found, count: int, steady: BackgroundMotion | None, progress: Callable[[int, int], None] | None
 ) -> tuple[Floats, list[list[Region]], list[bool], NDArray[np.bool_], tuple[CameraMove, ...] | None]:
     """Find the regions of the mouth's colour in every frame, and how the camera moved if it did.
 
@@ -186,7 +186,7 @@ def _read_regions(
     repeated: list[bool] = []
     moves: list[CameraMove] = []
     before = None
-    for frame in read_frames(path):
+    for frame in film.frames():
         image = frame.image
         if steady is not None:
             moves.append(LOST if image is None else steady.at(image, frame.predicted))

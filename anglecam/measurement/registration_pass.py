@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from anglecam.camera.lens import Lens
 from anglecam.data.typing import Floats, Image
-from anglecam.video.frames import inspect_clip, read_frames
+from anglecam.video.film import Film
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.marker import Pivot
 from anglecam.vision.registration.fit import LOST, Look, Turn, find_turn, nearest_fit
@@ -97,7 +96,7 @@ class Registered:
 
 
 def register_clip(
-    path: Path, start: Start, lens: Lens, progress: Callable[[int, int], None] | None = None
+    film: Film, start: Start, lens: Lens, progress: Callable[[int, int], None] | None = None
 ) -> Registered | str:
     """Find the head's turn in every frame.
 
@@ -106,7 +105,7 @@ def register_clip(
 
     Parameters
     ----------
-    path : Path
+    film : Film
         The clip.
     start : Start
         Where the head is, coarsely.
@@ -120,17 +119,16 @@ def register_clip(
     Registered or str
         Why not, in a few words, where the head cannot be registered or is no better for it.
     """
-    info = inspect_clip(path)
     n, known = len(start.turn), np.flatnonzero(np.isfinite(start.sigma))
     if len(known) < _FEWEST:
         return f"the mouth is seen in {len(known)} frames only"
-    plane = plane_of(lens, (info.width, info.height))
-    planes = 1 if info.coarse_colour else 3
-    most = int(np.clip(_BYTES // (planes * info.width * info.height), _FEWEST, _LEARNT))
+    plane = plane_of(lens, film.size)
+    planes = 1 if film.coarse_colour else 3
+    most = int(np.clip(_BYTES // (planes * film.width * film.height), _FEWEST, _LEARNT))
     wanted = _spread_out(start.turn, known, most)
     glimpses = [
         _glimpse(start, frame.index, frame.image)
-        for frame in read_frames(path, brightness=info.coarse_colour)
+        for frame in film.frames(brightness=film.coarse_colour)
         if frame.index in wanted and frame.image is not None
     ]
     by_turn = np.argsort([g.turn for g in glimpses])
@@ -151,7 +149,7 @@ def register_clip(
     centred = replace(start, pivots_px=start.pivots_px + apart)
     found, rows = [LOST] * n, start.row.copy()
     before: Image | None = None
-    for frame in read_frames(path, brightness=info.coarse_colour):
+    for frame in film.frames(brightness=film.coarse_colour):
         i, image = frame.index, frame.image
         if i < n and np.isfinite(start.turn[i]) and image is not None:
             one = _glimpse(centred, i, image)

@@ -2,26 +2,24 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from anglecam.camera.lens import lens_from_rig
 from anglecam.data.series import OK
 from anglecam.io.rig import Rig
-from anglecam.measurement.detections import Detections, find_pivot, frames_to_keep, why_truncated
-from anglecam.video.frames import inspect_clip, read_frames, sample_frames
+from anglecam.measurement.detections import Detections, find_pivot, frames_to_keep
+from anglecam.video.film import Film
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.circle import Circle
 from anglecam.vision.rigid_body.rigid import follow_rigid_body
 
 
-def detect_rigid_body(path: Path, rig: Rig) -> Detections | str:
+def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
     """Follow the rigid head in place of a mouth.
 
     Parameters
     ----------
-    path : Path
+    film : Film
         The clip.
     rig : Rig
         What is declared about pivot and camera.
@@ -36,16 +34,15 @@ def detect_rigid_body(path: Path, rig: Rig) -> Detections | str:
     InputError
         As `detect_mark`, for a file that cannot be read.
     """
-    info = inspect_clip(path)
-    lens = lens_from_rig(rig, (info.width, info.height), path)
-    sample = sample_frames(path, frames_to_keep(info))
+    lens = lens_from_rig(rig, film.size, film.path)
+    sample = film.sample(frames_to_keep(film))
     images = [f.image for f in sample.frames if f.image is not None]
     noise = pixel_noise(images)
-    head = follow_rigid_body(read_frames(path), images, noise)
+    head = follow_rigid_body(film.frames(), images, noise)
     if isinstance(head, str):
         return head
     stamps, repeated, before = [], [], None
-    for frame in read_frames(path):
+    for frame in film.frames():
         stamps.append(frame.time)
         same = frame.image is not None and before is not None and np.array_equal(frame.image, before)
         repeated.append(same)
@@ -77,7 +74,7 @@ def detect_rigid_body(path: Path, rig: Rig) -> Detections | str:
         noise=noise,
         repeated=np.array(repeated),
         colour_rgb=None,
-        size=(info.width, info.height),
-        truncated=why_truncated(info, sample),
+        size=film.size,
+        truncated=film.why_truncated(sample),
         notes=tuple(notes),
     )

@@ -20,13 +20,13 @@ from anglecam.data.series import OK, AngleSeries
 from anglecam.data.typing import Flags, Floats
 from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Marks, Rig
-from anglecam.io.session import clip_beside, recording_name
+from anglecam.io.session import recording_name
 from anglecam.io.tracks.files import read_tracks
 from anglecam.io.tracks.tracks import choose_pair
 from anglecam.measurement.angles import Angles, angles_of_places
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.measurement.sigma import PlaceErrors
-from anglecam.video.frames import inspect_clip, read_frames
+from anglecam.video.film import Film
 from anglecam.vision.pivot.marker import Pivot
 
 _SHORTEST_PX = 1.0
@@ -49,8 +49,6 @@ class MeasuredTracks:
     """What the angles were read off."""
     notes: tuple[str, ...]
     """What the user should know, a line each."""
-    film: Path | None
-    """The clip that the tracks were made from."""
     truncated: str | None = None
     """What of the film could not be read."""
 
@@ -77,12 +75,11 @@ class _Points:
     """(frames,) s."""
     size: tuple[int, int] | None
     """Of the picture; ``None`` where the film is not there."""
-    film: Path | None
     by: str
     notes: tuple[str, ...]
 
 
-def measure_tracks(path: Path, rig: Rig, command: Command | None = None) -> MeasuredTracks:
+def measure_tracks(path: Path, rig: Rig, command: Command | None = None, *, film: Film | None = None) -> MeasuredTracks:
     """Measure the nodding angle in every frame from two tracked points.
 
     Parameters
@@ -93,6 +90,8 @@ def measure_tracks(path: Path, rig: Rig, command: Command | None = None) -> Meas
         Whose ``marks`` name the points; facing, neutral, camera and bounds count as for a clip.
     command : Command, optional
         What was commanded; its first change ends the rest that defines neutral.
+    film : Film, optional
+        The clip that the tracks were made from; its frames date the rows.
 
     Returns
     -------
@@ -106,7 +105,7 @@ def measure_tracks(path: Path, rig: Rig, command: Command | None = None) -> Meas
     RigError
         Where the rig does not say which points are mouth and pivot.
     """
-    marks, points = _read_points(path, rig)
+    marks, points = _read_points(path, rig, film)
     mouth, pivot, size = points.mark_px, points.pivot_px, points.size
     seen, based = np.isfinite(mouth[:, 0]), np.isfinite(pivot[:, 0])
     ok = seen & based
@@ -131,10 +130,10 @@ def measure_tracks(path: Path, rig: Rig, command: Command | None = None) -> Meas
     evidence = CameraEvidence(picture_px=size, marker_px=marker, from_mark=True)
     series = series_of_angles(recording_name(path), time, status, ok, angles, mouth, shown, rig, evidence)
     zero = why_zero_is_elsewhere(rig, command, time[ok])
-    return MeasuredTracks(series, angles, points.by, (*points.notes, *([zero] if zero else [])), points.film)
+    return MeasuredTracks(series, angles, points.by, (*points.notes, *([zero] if zero else [])))
 
 
-def _read_points(path: Path, rig: Rig) -> tuple[Marks, _Points]:
+def _read_points(path: Path, rig: Rig, film: Film | None) -> tuple[Marks, _Points]:
     """Read the two points that the rig names, in as many frames as the film has."""
     tracks, marks = read_tracks(path), rig.marks
     if marks is None:
@@ -149,15 +148,17 @@ def _read_points(path: Path, rig: Rig) -> tuple[Marks, _Points]:
             f"{path}: {marks.mouth} and {marks.pivot} are both there in {both} of {rows} frames only (likelihood at"
             f" least {least:g})"
         )
-    film = clip_beside(path)
     notes = [] if pair.followed is None else [pair.followed]
     size = None
     if film is not None:
-        size, time, undecodable = _read_times(film)
+        size, time = film.size, film.times
+        undecodable = film.undecodable
         if rows > len(time):
-            raise InputError(f"{path}: {rows} frames, but {film.name} has {len(time)}: it was not made from this clip")
+            raise InputError(
+                f"{path}: {rows} frames, but {film.path.name} has {len(time)}: it was not made from this clip"
+            )
         if undecodable:
-            notes.append(f"{undecodable} frames of {film.name} cannot be decoded; {path.name} may count past them")
+            notes.append(f"{undecodable} frames of {film.path.name} cannot be decoded; {path.name} may count past them")
     elif marks.rate_hz is None:
         raise InputError(
             f"{path}: nothing says when its frames were taken: put the clip {recording_name(path)}.… beside it, or"
@@ -169,14 +170,7 @@ def _read_points(path: Path, rig: Rig) -> tuple[Marks, _Points]:
         time = np.arange(rows) / marks.rate_hz
     missing = ((0, len(time) - rows), (0, 0))
     mouth, pivot = (np.pad(places, missing, constant_values=np.nan) for places in (pair.mark_px, pair.pivot_px))
-    return marks, _Points(mouth, pivot, time, size, film, f"{marks.mouth} ({tracks.software})", tuple(notes))
-
-
-def _read_times(film: Path) -> tuple[tuple[int, int], Floats, int]:
-    """Return a film's width and height, its frames' own time stamps, s, and how many of them cannot be decoded."""
-    info = inspect_clip(film)
-    frames = [(frame.time, frame.image is None) for frame in read_frames(film, brightness=True)]
-    return (info.width, info.height), np.array([time for time, _ in frames]), sum(lost for _, lost in frames)
+    return marks, _Points(mouth, pivot, time, size, f"{marks.mouth} ({tracks.software})", tuple(notes))
 
 
 def _cause(ok: bool, seen: bool, based: bool) -> str:

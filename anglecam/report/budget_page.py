@@ -20,7 +20,7 @@ from anglecam.io.rig import Rig
 from anglecam.measurement.clip import Measurement
 from anglecam.report.figure8 import Scene, figure8
 from anglecam.report.figures import AFTER, BEFORE, FAINT, MEASURED, STYLE, _svg
-from anglecam.video.frames import read_frames
+from anglecam.video.film import Film
 
 _HUES = ("#1f6f8b", "#c4432b", "#d39b23", "#6a4c93", "#3d7a4a", "#8a939c", "#b5651d", "#2b6cff", "#444b53")
 _MANY = 1000
@@ -29,13 +29,13 @@ _GAP = 1.5
 """Frame intervals; where frames are missing a curve is broken."""
 
 
-def write_budget(clip: Path, measured: Measurement, rig: Rig, out: Path) -> Budget:
+def write_budget(film: Film, measured: Measurement, rig: Rig, out: Path) -> Budget:
     """Write ``NAME.budget.json`` and ``NAME.budget.html`` of a measured clip.
 
     Parameters
     ----------
-    clip : Path
-        The film; one frame of it is shown.
+    film : Film
+        The clip; one frame of it is shown.
     measured : Measurement
         What was measured in it.
     rig : Rig
@@ -53,9 +53,9 @@ def write_budget(clip: Path, measured: Measurement, rig: Rig, out: Path) -> Budg
     InputError
         Where the film can no longer be read.
     """
-    budget = budget_of(clip.stem, error_sources(measured, rig), rig.pixel_error_px)
-    write_json(out / f"{clip.stem}.budget.json", budget_as_dict(budget))
-    write_page(out / f"{clip.stem}.budget.html", budget, _scene(clip, measured, budget.typical.frame))
+    budget = budget_of(film.path.stem, error_sources(measured, rig), rig.pixel_error_px)
+    write_json(out / f"{film.path.stem}.budget.json", budget_as_dict(budget))
+    write_page(out / f"{film.path.stem}.budget.html", budget, _scene(film, measured, budget.typical.frame))
     return budget
 
 
@@ -155,10 +155,10 @@ def budget_table(budget: Budget) -> Table:
     return table
 
 
-def _scene(clip: Path, measured: Measurement, frame: int) -> Scene | None:
+def _scene(film: Film, measured: Measurement, frame: int) -> Scene | None:
     contour = measured.contours_px[frame]
     mouth, pivot = measured.series.mark_px, measured.series.pivot_px
-    image = next((f.image for f in read_frames(clip) if f.index == frame), None)
+    image = next((f.image for f in film.frames() if f.index == frame), None)
     if image is None or contour is None or mouth is None or pivot is None:
         return None
     return Scene(image, contour, mouth[frame], pivot[frame])

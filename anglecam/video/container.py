@@ -1,103 +1,128 @@
-"""Whether a film's file is shorter than its own container says.
+"""Open a film's container within limits.
 
-A decoder reads what is left of a cut file and ends without a word, so the container's own book-keeping is asked:
-the RIFF size of AVI, the box sizes of MP4 and MOV, the segment size of Matroska. Frame counts in headers are not
-asked: in real files they lie, and the file is whole all the same.
+A film may come from anybody. FFmpeg also reads play lists, which point to other files or into the network, and
+interprets a name such as ``concat:a|b`` as an instruction. Only containers that hold their film themselves are read
+here, and only from the named file. A few bytes can claim pictures and counts that exceed any memory. Whatever exceeds
+the limits below is refused, judged by what is decoded and not by what a header promises.
 """
 
 from __future__ import annotations
 
+import contextlib
+import sys
+import threading
+from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
 
-_UNKNOWN_RIFF_SIZES = (0, 0xFFFFFFFF)
-"""What writers that cannot go back leave in the size of a RIFF chunk."""
-_SEGMENT = 0x18538067
+import av
+
+from anglecam.errors import InputError
+from anglecam.video.truncation import is_cut_short
+
+MOST_PIXELS = 8192 * 8192
+"""Per picture: twice those of 8K film (7680 × 4320), as many as in films for domes."""
+LEAST_SIDE, LONGEST_SIDE = 32, 16_384
+"""px; a smaller picture shows nothing to measure, and OpenCV's remapping ends at 32,767."""
+MOST_FRAMES = 1_000_000
+"""Nine hours at 30 Hz, two and a half at 120 Hz."""
+LONGEST_S = 7 * 24 * 3600.0
+"""From the first frame to the last, s: a week."""
+MOST_STREAMS = 64
+"""A camera writes a few: pictures, sound, time code, its motion."""
+_OPENING_BYTES = 768 * 2**20
+"""Memory that opening may take. FFmpeg builds a film's whole index at once, and its entries may cost no byte in the file.
+The index of `MOST_FRAMES` takes 80 MB; the rest is for the first pictures, which FFmpeg decodes to learn their format."""
+_ONE_AT_A_TIME = threading.Lock()
+"""The memory limit holds for the process: a second thread would mistake the first one's limit for the original."""
+_CONTAINERS = "avi,matroska,webm,mov,mp4,asf,flv,mpegts,mpeg,ogg,nut,mxf"
+"""FFmpeg's names of the containers that store time stamps and refer to no other file."""
 
 
-def is_cut_short(path: Path) -> bool:
-    """Tell whether bytes are missing at the end of an AVI, MP4, MOV or Matroska file.
+def open_container(path: Path) -> av.container.InputContainer:
+    """Open a film whose first picture stream can be decoded within the limits.
 
     Parameters
     ----------
     path : Path
-        The film.
+        The file.
 
     Returns
     -------
-    bool
-        False also where the container does not state its length, or is none of these.
+    InputContainer
+        With at least one video stream; its decoder refuses pictures that are too large.
+
+    Raises
+    ------
+    InputError
+        Where the file is missing, empty, not a film, or beyond the limits: one line with the file and the cause.
     """
-    size = path.stat().st_size
-    with path.open("rb") as stream:
-        head = stream.read(12)
-        stream.seek(0)
-        if head[:4] == b"RIFF":
-            return _riff_end(stream, size) > size
-        if head[:4] == b"\x1a\x45\xdf\xa3":
-            return _matroska_end(stream) > size
-        if head[4:8] in (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip"):
-            return _boxes_end(stream, size) > size
-    return False
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if not path.is_file():
+        raise InputError(f"{path}: not a file")
+    limits = {"max_pixels": str(MOST_PIXELS)}
+    try:
+        if path.stat().st_size == 0:
+            raise InputError(f"{path}: empty file")
+        with _limited_memory():
+            container = av.open(
+                f"file:{path}",
+                options=limits | {"format_whitelist": _CONTAINERS, "protocol_whitelist": "file"},
+                metadata_errors="replace",
+            )
+    except (av.error.FFmpegError, OSError, ValueError) as error:
+        if path.suffix.lower() in (".mp4", ".mov") and is_cut_short(path):
+            raise InputError(f"{path}: truncated: its index is missing, no frame can be read") from error
+        reason = getattr(error, "strerror", None) or "unknown format"
+        raise InputError(f"{path}: not a readable video file ({reason})") from error
+    fault = _fault(container)
+    if fault is not None:
+        container.close()
+        raise InputError(f"{path}: {fault}")
+    container.streams.video[0].codec_context.options = limits
+    return container
 
 
-def _riff_end(stream: BinaryIO, size: int) -> int:
-    """Follow the top-level RIFF chunks (OpenDML files have several) to where the last one says it ends."""
-    position = 0
-    while position < size:
-        stream.seek(position)
-        header = stream.read(8)
-        if header[:4] != b"RIFF":
-            break
-        length = int.from_bytes(header[4:], "little")
-        if length in _UNKNOWN_RIFF_SIZES:
-            return size
-        # A chunk of odd length is padded, but the last one of a file need not be.
-        position += 8 + length
-        if position < size:
-            position += length % 2
-    return position
+@contextlib.contextmanager
+def _limited_memory() -> Iterator[None]:
+    """Limit this process to `_OPENING_BYTES` of additional memory while the block runs, where the system can do so.
+
+    FFmpeg reports memory that is refused as an error.
+    """
+    if not sys.platform.startswith("linux"):
+        yield
+        return
+    import resource
+
+    with _ONE_AT_A_TIME:
+        before = resource.getrlimit(resource.RLIMIT_DATA)
+        held = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
+        limits = [limit for limit in before if limit != resource.RLIM_INFINITY]
+        resource.setrlimit(resource.RLIMIT_DATA, (min([held + _OPENING_BYTES, *limits]), before[1]))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_DATA, before)
 
 
-def _boxes_end(stream: BinaryIO, size: int) -> int:
-    """Follow the top-level boxes of an ISO base media file (ISO/IEC 14496-12, 4.2) to where the last one ends."""
-    position = 0
-    while position < size:
-        stream.seek(position)
-        header = stream.read(16)
-        length = int.from_bytes(header[:4], "big")
-        if length == 0:  # by definition: to the end of the file
-            return size
-        if length == 1:
-            length = int.from_bytes(header[8:16], "big")
-        if length < 8:
-            return size
-        position += length
-    return position
-
-
-def _matroska_end(stream: BinaryIO) -> int:
-    """Return where the segment of a Matroska file says it ends (RFC 8794, 4–6), 0 where its size is unknown."""
-    for _ in range(2):
-        element = _read_vint(stream, keep_marker=True)
-        length = _read_vint(stream, keep_marker=False)
-        if length is None:
-            return 0
-        if element == _SEGMENT:
-            return stream.tell() + length
-        stream.seek(length, 1)
-    return 0
-
-
-def _read_vint(stream: BinaryIO, *, keep_marker: bool) -> int | None:
-    """Read one variable-length integer; all value bits set means unknown."""
-    first = stream.read(1)
-    if not first or first[0] == 0:
-        return None
-    more = 8 - first[0].bit_length()
-    raw = int.from_bytes(first + stream.read(more), "big")
-    if keep_marker:
-        return raw
-    value_bits = 7 * (more + 1)
-    value = raw & ((1 << value_bits) - 1)
-    return None if value == (1 << value_bits) - 1 else value
+def _fault(container: av.container.InputContainer) -> str | None:
+    """Return what is wrong with a container's declarations, ``None`` where nothing is."""
+    if not container.streams.video:
+        return "no video stream in it"
+    if len(container.streams) > MOST_STREAMS:
+        return f"it claims {len(container.streams)} streams; more than {MOST_STREAMS} are not read"
+    stream = container.streams.video[0]
+    if stream.codec_context is None:
+        return "its pictures have an unknown codec"
+    width, height = stream.width, stream.height
+    if width < 1 or height < 1 or not stream.time_base:
+        # a decoder that refuses a size reports none
+        return f"it does not say how large its pictures are, or claims more than {MOST_PIXELS:,} px"
+    if min(width, height) < LEAST_SIDE:
+        return f"pictures of {width} × {height} px are too small; {LEAST_SIDE} on a side are the least"
+    if max(width, height) > LONGEST_SIDE or width * height > MOST_PIXELS:
+        return (
+            f"it claims pictures of {width} × {height} px; more than {MOST_PIXELS:,} px, or {LONGEST_SIDE:,} on a side,"
+            " are not read"
+        )
+    return None

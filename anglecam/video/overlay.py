@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from anglecam.data.series import OK, AngleSeries
 from anglecam.data.typing import Floats, Image
 from anglecam.io.files import write_whole
-from anglecam.video.frames import Frame, read_frames
+from anglecam.video.film import Film, Frame
 
 RADII_PX = (6.0, 10.0)
 """Circles of the paper's pixel errors about the mouth."""
@@ -38,13 +38,13 @@ class Measured(Protocol):
         """Each frame's (k, 2) outline of the mouth, where one was found."""
 
 
-def write_overlay(clip: Path, measured: Measured, path: Path) -> None:
+def write_overlay(film: Film, measured: Measured, path: Path) -> None:
     """Write ``NAME.overlay.mp4``: the clip in H.264, each frame at its own time, with what was measured in it.
 
     Parameters
     ----------
-    clip : Path
-        The film that was measured.
+    film : Film
+        The clip that was measured.
     measured : Measured
         What was found in it.
     path : Path
@@ -53,10 +53,10 @@ def write_overlay(clip: Path, measured: Measured, path: Path) -> None:
     Raises
     ------
     InputError
-        As `read_frames`.
+        As `Film.frames`.
     """
     with write_whole(path) as unfinished, av.open(str(unfinished), mode="w") as container:
-        _encode(container, read_frames(clip), measured)
+        _encode(container, film.frames(), measured)
 
 
 def draw_frame(image: Image, measured: Measured, index: int) -> Image:

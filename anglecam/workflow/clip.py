@@ -1,26 +1,123 @@
-"""What measuring leaves in a folder, for one clip at a time."""
+"""One clip, or tracks of points in its place: open, measure, write the results.
+
+The command line, the batch and the Python API all measure through these functions, so that every check is in one place.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from anglecam.data.command import Command
+from anglecam.errors import InputError, blame
 from anglecam.io.files import write_json
+from anglecam.io.netcdf_parquet import Also, write_also
+from anglecam.io.rig import Rig
 from anglecam.io.series_csv import write_series
-from anglecam.io.session import SERIES_ENDING
-from anglecam.measurement.clip import Measurement
+from anglecam.io.session import SERIES_ENDING, clip_beside, command_beside, rig_beside
+from anglecam.io.tracks.files import TRACKS_ENDINGS
+from anglecam.measurement.clip import Measurement, measure_clip
 from anglecam.measurement.clock_sync import offset_of, on_clip_clock
 from anglecam.measurement.step_response import Response, responses, responses_as_dicts
-from anglecam.measurement.tracks import MeasuredTracks
-from anglecam.report.figures import plot_series
+from anglecam.measurement.tracks import MeasuredTracks, measure_tracks
+from anglecam.video.film import Film, open_film
+
+Progress = Callable[[int, int], None]
+"""Called with the frames done and the frames in all."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """What is measured, and what is declared about it."""
+
+    path: Path
+    """The clip, or the tracks in its place."""
+    rig: Rig
+    command: Command | None
+    film: Film | None
+    """The clip, opened; of tracks the clip that they were made from, ``None`` where it is not in the same folder."""
+
+    @property
+    def is_tracks(self) -> bool:
+        """Whether another program has found the points already."""
+        return self.path.suffix.lower() in TRACKS_ENDINGS
+
+
+def open_source(path: Path, rig: Rig | None = None) -> Source:
+    """Open a clip or tracks, and read what is declared in the same folder.
+
+    Parameters
+    ----------
+    path : Path
+        A film, or a file of tracks.
+    rig : Rig, optional
+        In place of the ``rig.yaml`` in the folder of ``path``.
+
+    Returns
+    -------
+    Source
+        Ready to be measured.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read, its command file is wrong, or it holds angles already.
+    RigError
+        Where the rig file is wrong.
+    """
+    with blame(path):
+        return _open(path, rig_beside(path) if rig is None else rig, command_beside)
+
+
+def open_recording(path: Path, rig: Rig, command: Command | None) -> Source:
+    """Open one recording of a session, whose rig and command have been read; raises as `open_source`."""
+    with blame(path):
+        return _open(path, rig, lambda _: command)
+
+
+def _open(path: Path, rig: Rig, command_of: Callable[[Path], Command | None]) -> Source:
+    if path.name.endswith(SERIES_ENDING):
+        raise InputError(f"{path}: holds angles already; identify or close the folder that contains it")
+    clip = clip_beside(path) if path.suffix.lower() in TRACKS_ENDINGS else path
+    return Source(path, rig, command_of(path), None if clip is None else open_film(clip))
+
+
+def measure_source(source: Source, *, progress: Progress | None = None) -> Measurement | MeasuredTracks:
+    """Measure the angle in every frame.
+
+    Parameters
+    ----------
+    source : Source
+        From `open_source` or `open_recording`.
+    progress : callable, optional
+        See `Progress`; tracks are measured without it.
+
+    Returns
+    -------
+    Measurement or MeasuredTracks
+        Both have ``series``, ``angles``, ``pivot``, ``by``, ``notes``, ``truncated`` and ``contours_px``.
+
+    Raises
+    ------
+    InputError, RigError
+        As `measure_clip` and `measure_tracks`. A fault of anglecam becomes an `InputError` that names the file.
+    """
+    with blame(source.path):
+        if source.is_tracks or source.film is None:
+            return measure_tracks(source.path, source.rig, source.command, film=source.film)
+        return measure_clip(source.film, source.rig, source.command, progress=progress)
 
 
 def write_measurement(
-    measurement: Measurement | MeasuredTracks, command: Command | None, out: Path
+    measurement: Measurement | MeasuredTracks,
+    command: Command | None,
+    out: Path,
+    also: Iterable[Also] = (),
 ) -> tuple[Response, ...]:
-    """Write ``NAME.angles.csv``, a plot and, where the angle goes from rest to rest, ``NAME.responses.json``.
+    """Write ``NAME.angles.csv``, a plot and, where the angle moves from rest to rest, ``NAME.responses.json``.
 
     Parameters
     ----------
@@ -30,12 +127,16 @@ def write_measurement(
         What was commanded.
     out : Path
         Folder for the files.
+    also : iterable of Also
+        Further formats of the series.
 
     Returns
     -------
     tuple of Response
-        How the angle answered every change.
+        The response to each change of the command.
     """
+    from anglecam.report.figures import plot_series  # matplotlib takes a second to load
+
     series = measurement.series
     command = on_clip_clock(command, offset_of(command, series.evidence.lamp_s))
     write_series(series, out / f"{series.name}{SERIES_ENDING}")
@@ -44,4 +145,20 @@ def write_measurement(
     if answers:
         write_json(out / f"{series.name}.responses.json", responses_as_dicts(answers))
     plot_series(series, out / f"{series.name}.png")
+    write_also(series, also, out / series.name)
     return answers
+
+
+def write_clip_overlay(source: Source, measurement: Measurement | MeasuredTracks, out: Path) -> None:
+    """Write ``NAME.overlay.mp4``.
+
+    Raises
+    ------
+    InputError
+        Where the clip of tracks is missing.
+    """
+    from anglecam.video.overlay import write_overlay
+
+    if source.film is None:
+        raise InputError(f"{source.path}: no overlay, because the clip is not in the folder of the tracks")
+    write_overlay(source.film, measurement, out / f"{measurement.series.name}.overlay.mp4")

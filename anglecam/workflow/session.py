@@ -1,142 +1,276 @@
-"""What identifying and closing leave in a folder, for one session at a time."""
+"""One session: measure its recordings, fit a model, close the loop.
+
+The command line, the batch and the Python API all go through these functions, so that every check is in one place.
+`anglecam.workflow.session_results` writes what they return.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from anglecam.errors import RigError
-from anglecam.identification.export import fitted_model, transfer_as_dict, write_mat
-from anglecam.identification.identify import Estimator, Identified, declared_start, identify_records
-from anglecam.io.files import write_json
-from anglecam.io.series_csv import write_series
-from anglecam.io.session import CORRECTED, SERIES_ENDING, Session
-from anglecam.loop.close import Verdict, close_records
-from anglecam.loop.correct import corrected
-from anglecam.loop.cross_validation import split_records
-from anglecam.loop.loop_json import next_experiment, verdict_as_dict, write_next_command
-from anglecam.loop.next_experiment.design import Experiment
-from anglecam.neck.large_angle import LargeAngleNeck
-from anglecam.report.page import write_report
-from anglecam.terminal import make_folder
-from anglecam.workflow.recordings import Measured, Shown
+from anglecam.data.command import Command
+from anglecam.data.record import Record, record_from_series
+from anglecam.data.series import AngleSeries
+from anglecam.errors import InputError, RigError
+from anglecam.io.rig import Rig
+from anglecam.io.series_csv import read_series, write_series
+from anglecam.io.session import SERIES_ENDING, Recording, Session
+from anglecam.measurement.clock_sync import note_on, offsets, on_clip_clock
+from anglecam.measurement.tracks import MeasuredTracks
+from anglecam.measurement.uncorrected import uncorrected
+from anglecam.workflow.clip import measure_source, open_recording
+
+if TYPE_CHECKING:
+    from anglecam.identification.identify import Estimator, Identified
+    from anglecam.loop.close import Verdict
+    from anglecam.neck.large_angle import LargeAngleNeck
 
 
 @dataclass(frozen=True)
-class Closed:
-    """What closing the loop gave."""
+class MeasuredSession:
+    """A session whose recordings have been measured or read."""
 
-    models: tuple[Identified, Identified]
-    """The paper's filter and output error."""
-    verdict: Verdict
-    experiment: Experiment | None
-    """What to record next, where that would tell something."""
+    session: Session
+    series: tuple[AngleSeries, ...]
+    records: tuple[Record, ...]
+    """One for each of ``series`` that has enough measured frames."""
+    problems: tuple[InputError, ...]
+    """The causes why recordings cannot be used."""
+    notes: tuple[str, ...] = ()
+    """Messages to the user, a line each, such as which animal was followed in tracks."""
+
+    def split(self, hold_out: Sequence[str] = ()) -> tuple[list[Record], list[Record]]:
+        """Return the records to fit and those to predict only.
+
+        Parameters
+        ----------
+        hold_out : sequence of str
+            Recordings to hold out besides those that the rig file names.
+
+        Raises
+        ------
+        InputError
+            Where no recording can be used.
+        RigError
+            Where a name in ``hold_out`` is no recording, or nothing is left to fit.
+        """
+        folder = self.session.directory
+        if not self.records:
+            raise InputError(f"{folder}: no recording can be used")
+        require_recordings(self.session, hold_out)
+        names = {*self.session.rig.held_out, *hold_out}
+        fitted = [record for record in self.records if record.name not in names]
+        if not fitted:
+            raise RigError(f"{folder}: every recording that can be used is held out; nothing is left to fit")
+        return fitted, [record for record in self.records if record.name in names]
 
 
-def identify_session(
-    opened: Session, measured: Measured, out: Path, estimator: Estimator = "oe2", neck: LargeAngleNeck | None = None
-) -> Identified:
-    """Fit a model to what is not held out of a session and write it as ``model.json`` and ``model.mat``.
+@dataclass(frozen=True)
+class LoopInput:
+    """A session as the loop starts from it: for each recording the angle as the picture shows it."""
+
+    series: tuple[AngleSeries, ...]
+    records: tuple[Record, ...]
+    """In the order of ``series``."""
+    differs: bool
+    """Whether these angles differ from the measured ones, because measuring corrected an effect of the camera."""
+
+
+def require_recordings(session: Session, names: Sequence[str]) -> None:
+    """Raise `RigError` where one of ``names``, which are to be held out, is no recording of the session."""
+    unknown = sorted(set(names) - {recording.name for recording in session.recordings})
+    if unknown:
+        raise RigError(f"hold out {unknown[0]}: no such recording in {session.directory}")
+
+
+def measure_session(
+    session: Session,
+    *,
+    out: Path | None = None,
+    progress: Callable[[str, int, int], None] = lambda name, done, total: None,
+) -> MeasuredSession:
+    """Measure all clips and tracks of a session and read all its series.
 
     Parameters
     ----------
-    opened : Session
+    session : Session
         From `anglecam.io.session.read_session`.
-    measured : Measured
-        Its recordings.
-    out : Path
-        Folder for the files.
-    estimator : {'ekf', 'oe2', 'oe3', 'neck'}
-        See `anglecam.identification.identify.identify_records`.
+    out : Path, optional
+        Folder in which ``NAME.angles.csv`` of every measured recording is written.
+    progress : callable
+        Called with a clip's name, the frames done and the frames in total, 0 if unknown.
+
+    Returns
+    -------
+    MeasuredSession
+        In the order of the recordings' names.
+    """
+    notes: list[str] = []
+
+    def measured(recording: Recording) -> tuple[AngleSeries, str | None]:
+        name = recording.name
+        source = open_recording(recording.source, session.rig, recording.command)
+        measurement = measure_source(source, progress=lambda done, total: progress(name, done, total))
+        if out is not None:
+            write_series(measurement.series, out / f"{name}{SERIES_ENDING}")
+        if isinstance(measurement, MeasuredTracks):
+            notes.extend(f"{recording.source}: {note}" for note in measurement.notes)
+        return measurement.series, measurement.truncated
+
+    gathered = gather_session(session, measured)
+    return replace(gathered, notes=(*notes, *gathered.notes))
+
+
+def gather_session(
+    session: Session, series_of: Callable[[Recording], tuple[AngleSeries, str | None]]
+) -> MeasuredSession:
+    """Read all series of a session and take those of its clips and tracks from ``series_of``.
+
+    Parameters
+    ----------
+    session : Session
+        From `anglecam.io.session.read_session`.
+    series_of : callable
+        From a recording to its series and, where its file ends too early, how much of it could be read.
+
+    Returns
+    -------
+    MeasuredSession
+        In the order of the recordings' names.
+    """
+    series, records, problems = [], [], list(session.problems)
+    commands: dict[str, Command | None] = {}
+    for recording in session.recordings:
+        try:
+            if recording.is_series:
+                one = read_series(recording.source)
+            else:
+                one, truncated = series_of(recording)
+                if truncated:
+                    problems.append(InputError(f"{recording.source}: {truncated}"))
+            series.append(one)
+            commands[one.name] = recording.command
+        except InputError as problem:
+            problems.append(problem)
+    ahead = offsets(commands, {one.name: one.evidence.lamp_s for one in series})
+    for one in series:
+        offset = ahead[one.name]
+        try:
+            records.append(_record(one, on_clip_clock(commands[one.name], offset), offset.sigma, session.rig))
+        except InputError as problem:
+            problems.append(problem)
+    notes = [f"{one.name}: {note}" for one in series if (note := note_on(ahead[one.name]))]
+    notes += [f"{r.name}: no command that changes; treated as a free swing" for r in records if r.command is None]
+    return MeasuredSession(session, tuple(series), tuple(records), tuple(problems), tuple(notes))
+
+
+def loop_input(measured: MeasuredSession) -> LoopInput:
+    """Return a session's angles as the pictures show them, where measuring corrected an effect of the camera.
+
+    The loop then starts from the uncorrected angles and can attribute the effect; see `uncorrected`.
+
+    Parameters
+    ----------
+    measured : MeasuredSession
+        From `measure_session`.
+
+    Returns
+    -------
+    LoopInput
+        Of the recordings that can be used.
+    """
+    series, differs = uncorrected(measured.series)
+    usable = {record.name for record in measured.records}
+    kept = tuple(one for one in series if one.name in usable)
+    if not differs:
+        return LoopInput(kept, measured.records, differs)
+    rig = measured.session.rig
+    dated = {record.name: (record.command, record.clock_sigma) for record in measured.records}
+    return LoopInput(kept, tuple(_record(one, *dated[one.name], rig) for one in kept), differs)
+
+
+def identify_session(
+    measured: MeasuredSession,
+    estimator: Estimator = "oe2",
+    *,
+    hold_out: Sequence[str] = (),
+    neck: LargeAngleNeck | None = None,
+) -> Identified:
+    """Fit a model to the recordings of a session that are not held out.
+
+    Parameters
+    ----------
+    measured : MeasuredSession
+        From `measure_session`.
+    estimator : str
+        One of `anglecam.identification.identify.ESTIMATORS`.
+    hold_out : sequence of str
+        Recordings to predict only, besides those that the rig file names.
     neck : LargeAngleNeck, optional
-        What is known of the neck, for ``neck``.
+        What is known of the neck, for the estimator ``neck``; the paper's otherwise.
 
     Returns
     -------
     Identified
-        The model.
+        The model, its uncertainty, its errors.
 
     Raises
     ------
     AnglecamError
-        Where nothing is left to fit, or it cannot be fitted.
+        As `MeasuredSession.split`, and where the model cannot be fitted.
     """
-    fitted = [r for r in measured.records if r.name not in opened.rig.held_out]
-    held_out = [r for r in measured.records if r.name in opened.rig.held_out]
-    if not fitted:
-        raise RigError(f"{opened.directory}: every recording that can be used is held out; nothing is left to fit")
-    model = identify_records(fitted, opened.rig, estimator, held_out=held_out, neck=neck)
-    _write_model(model, out, "model")
-    return model
+    from anglecam.identification.identify import identify_records
+
+    fitted, held_out = measured.split(hold_out)
+    return identify_records(fitted, measured.session.rig, estimator, held_out=held_out, neck=neck)
 
 
 def close_session(
-    opened: Session,
-    measured: Measured,
-    shown: Shown,
-    out: Path,
+    measured: MeasuredSession,
     *,
-    held_out: list[str],
+    hold_out: Sequence[str] = (),
+    shown: LoopInput | None = None,
     progress: Callable[[str], None] = lambda stage: None,
-) -> Closed:
-    """Find what the model lacks, and write models, ``loop.json``, ``report.html`` and the command to play next.
+) -> Verdict:
+    """Find what the base model lacks in a session.
 
     Parameters
     ----------
-    opened : Session
-        From `anglecam.io.session.read_session`.
-    measured : Measured
-        Its recordings.
-    shown : Shown
-        From `anglecam.workflow.recordings.shown_to_loop`.
-    out : Path
-        Folder for the files.
-    held_out : list of str
-        Recordings to predict only.
+    measured : MeasuredSession
+        From `measure_session`.
+    hold_out : sequence of str
+        Recordings to predict only, besides those that the rig file names.
+    shown : LoopInput, optional
+        From `loop_input`, where the caller has it already.
     progress : callable
-        Told each stage.
+        Called with the name of each stage.
 
     Returns
     -------
-    Closed
-        Models, verdict and the experiment to do next.
+    Verdict
+        What was added, the evidence, the error before and after.
 
     Raises
     ------
     AnglecamError
-        Where nothing can be fitted.
+        As `MeasuredSession.split`, and where no model can be fitted.
     """
-    fitted, unseen = split_records(shown.records, held_out)
-    progress("extended Kalman filter")
-    ekf, model = (identify_records(fitted, opened.rig, name, held_out=unseen) for name in ("ekf", "oe2"))
-    starts = [declared_start(opened.rig)]
-    verdict = close_records(shown.records, held_out=held_out, starts=starts, progress=progress)
-    progress("report")
-    _write_model(ekf, out, "ekf")
-    _write_model(model, out, "model")
-    experiment = next_experiment(verdict)
-    write_next_command(experiment, out)
-    result = verdict_as_dict(verdict, experiment)
-    write_json(out / "loop.json", result)
-    _write_corrected(shown, verdict, out / CORRECTED)
-    title, models = opened.directory.resolve().name, (ekf, model)
-    page = out / "report.html"
-    write_report(page, title, verdict, result, experiment, measured.series, list(models), measured.problems)
-    return Closed(models, verdict, experiment)
+    from anglecam.identification.identify import declared_start
+    from anglecam.loop.close import close_records
+
+    rig = measured.session.rig
+    measured.split(hold_out)
+    records = (loop_input(measured) if shown is None else shown).records
+    names = list(dict.fromkeys((*rig.held_out, *hold_out)))
+    return close_records(records, held_out=names, starts=[declared_start(rig)], progress=progress)
 
 
-def _write_model(model: Identified, out: Path, name: str) -> None:
-    """Write a model as ``NAME.json`` and for MATLAB as ``NAME.mat``."""
-    exported = fitted_model(model)
-    write_json(out / f"{name}.json", model.as_dict() | {"transfer_function": transfer_as_dict(exported)})
-    write_mat(exported, out / f"{name}.mat")
-
-
-def _write_corrected(shown: Shown, verdict: Verdict, folder: Path) -> None:
-    """Write the series that the loop saw without what it found the camera to do, if it found anything."""
-    for series, record in zip(shown.series, shown.records, strict=True):
-        right = corrected(series, verdict.after, record.view)
-        if right is not None:
-            make_folder(folder)
-            write_series(right, folder / f"{series.name}{SERIES_ENDING}")
+def _record(series: AngleSeries, command: Command | None, clock_sigma: float, rig: Rig) -> Record:
+    declared = rig.model.gravity_deg
+    upright = None if declared is None else math.radians(declared)
+    record = record_from_series(series, command, zero_known=rig.neutral != "auto", upright=upright)
+    return replace(record, clock_sigma=clock_sigma)

@@ -27,7 +27,7 @@ from rich.table import Table
 from anglecam.errors import InputError
 from anglecam.io.session import read_session
 from anglecam.loop.close import close_records
-from anglecam.workflow.recordings import measure_session, shown_to_loop
+from anglecam.workflow.session import loop_input, measure_session
 from benchmarks.blind.judged import Line, judge, show, told
 from synth.session import render
 from synth.spec import Spec, read_spec
@@ -96,7 +96,7 @@ def close(case: Case, kept: Path) -> Line:
         As from `benchmarks.blind.judged.judge`, with ``right`` and ``wrong``, which says what is not.
     """
     session, measured = pickle.loads((kept / MEASURED).read_bytes())
-    records = shown_to_loop(session, measured).records
+    records = loop_input(measured).records
     start = time.perf_counter()
     verdict = close_records(records, held_out=case.spec.declare["held_out"])
     seconds = time.perf_counter() - start

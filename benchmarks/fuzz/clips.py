@@ -205,10 +205,11 @@ def readers() -> dict[str, Reader]:
     """Return the one reader of clips."""
     from anglecam.io.rig import Rig
     from anglecam.measurement.clip import measure_clip
+    from anglecam.video.film import open_film
 
     cv2.setNumThreads(1)
     av.logging.set_level(av.logging.PANIC)
-    return {"clip": lambda path: measure_clip(path, Rig())}
+    return {"clip": lambda path: measure_clip(open_film(path), Rig())}
 
 
 def main() -> None:

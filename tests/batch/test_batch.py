@@ -15,6 +15,7 @@ from anglecam.batch.run import Options, run_batch
 from anglecam.errors import RigError
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import measure_clip
+from anglecam.video.film import open_film
 from anglecam.workflow.clip import write_measurement
 from support.tiny import FRAMES, SIZE, results, tiny_clip, tiny_lab
 from support.tiny import run_batch as run
@@ -45,7 +46,7 @@ def test_each_clip_has_what_measure_writes_in_the_folder_it_has_below_the_one_as
     lab, out, _ = done
     for name, rig in (("b.avi", Rig()), ("mon/a.avi", Rig()), ("tue/a.avi", Rig(facing="left"))):
         clip = lab / name
-        measured = measure_clip(clip, rig)
+        measured = measure_clip(open_film(clip), rig)
         write_measurement(measured, None, tmp_path / clip.parent.name)
         for ending in (".angles.csv", ".png"):
             alone = (tmp_path / clip.parent.name / f"{clip.stem}{ending}").read_bytes()

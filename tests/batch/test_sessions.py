@@ -16,8 +16,8 @@ from anglecam.batch.work import Settings
 from anglecam.data.series import AngleSeries
 from anglecam.io.series_csv import write_series
 from anglecam.io.session import read_session
-from anglecam.workflow.recordings import measure_session
-from anglecam.workflow.session import identify_session
+from anglecam.workflow.session import measure_session
+from anglecam.workflow.session_results import write_identified
 from support.motion import Plant
 from support.series import session as make_records
 from support.tiny import tiny_clip, tiny_lab
@@ -55,7 +55,7 @@ def test_a_session_is_identified_as_alone_and_done_again_only_if_something_has_c
     told = [str(problem) for problem in result.problems]
     opened = read_session(lab / "neck")
     measured = measure_session(opened)
-    identify_session(opened, measured, tmp_path / "alone")
+    write_identified(measured, tmp_path / "alone")
     model = (out / "neck" / "model.json").read_bytes()
     assert model == (tmp_path / "alone" / "model.json").read_bytes()
     assert [row.model for row in result.rows] == ["neck/model.json", None]

@@ -15,6 +15,7 @@ from anglecam.io.rig import read_rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.registration_pass import Registered, register_clip
+from anglecam.video.film import open_film
 from support.drawn import Look, Recording, draw_session
 
 LOST = slice(5, None, 9)
@@ -74,7 +75,7 @@ def test_a_measured_clips_terms_join_to_its_sigma(clip, sighted, registered, mon
     monkeypatch.setattr(import_module("anglecam.measurement.clip"), "register_clip", readings[head])
     if neutral == "declared":
         rig = rig.model_copy(update={"neutral": -12.0})
-    measured = measure_clip(path, rig, command if neutral == "rest" else None)
+    measured = measure_clip(open_film(path), rig, command if neutral == "rest" else None)
     sources = error_sources(measured, rig)
     sigma = measured.series.sigma[measured.series.ok]
     joined = np.sqrt(sum(c.contribution**2 for c in terms_over_time(sources) if c.in_sigma))

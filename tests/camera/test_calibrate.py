@@ -12,6 +12,7 @@ from anglecam.camera.chessboard import find_corners
 from anglecam.camera.lens import Lens
 from anglecam.errors import InputError
 from anglecam.report.calibration_figure import plot_calibration
+from anglecam.video.film import open_film
 from support.board import BoardCamera, board_picture, film_board, poses, write_pictures
 
 CAMERA = BoardCamera(k1=-0.15)
@@ -22,7 +23,7 @@ BOARD = (9, 6)
 def found(tmp_path_factory):
     clip = tmp_path_factory.mktemp("board") / "board.mkv"
     film_board(clip, CAMERA, poses(12, seed=2, camera=CAMERA), hold=2)
-    return calibrate_clip(clip, BOARD, 0.025)
+    return calibrate_clip(open_film(clip), BOARD, 0.025)
 
 
 def test_the_lens_is_recovered_within_what_is_stated(found):

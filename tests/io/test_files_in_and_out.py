@@ -15,7 +15,7 @@ from anglecam.io.csv_columns import SERIES_COLUMNS as COLUMNS
 from anglecam.io.rig import Marks, Rig, read_rig
 from anglecam.io.series_csv import read_series, write_series
 from anglecam.io.session import find_measurable, read_session
-from anglecam.workflow.recordings import measure_session
+from anglecam.workflow.session import measure_session
 from support import broken
 
 

@@ -15,6 +15,7 @@ from anglecam.io.rig import Mouth, Pivot, Rig, read_rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.sigma import angle_sigma, place_errors, worst_case, worst_case_both_ends
+from anglecam.video.film import open_film
 from support import broken
 from support.drawn import Look, Recording, draw_frames, draw_session, write_clip
 
@@ -85,7 +86,7 @@ def drawn(request, tmp_path_factory):
     clips = [Recording("stairs", "stairs", duration_s=4.0, amplitude_deg=14.0)]
     truth = draw_session(folder, look=look, recordings=clips, mouth=mouth, hint_error_px=hint, seed=4)["stairs"]
     command = read_command(folder / "stairs.command.csv")
-    return look, limit, ratio, measure_clip(truth.clip, read_rig(folder / "rig.yaml"), command), truth
+    return look, limit, ratio, measure_clip(open_film(truth.clip), read_rig(folder / "rig.yaml"), command), truth
 
 
 BIASED = pytest.mark.xfail(strict=True, reason="the mean error of the clip is larger than its stated uncertainty")
@@ -125,7 +126,7 @@ def test_angles_are_right_and_sigma_is_true_beside_a_second_red_object(drawn):
 
 def test_a_lever_of_120_px_stays_below_a_tenth_of_a_degree(tmp_path):
     look = Look(lever_px=120.0, skin="dark")
-    series = measure_clip(_film(tmp_path, look), _rig(look), REST).series
+    series = measure_clip(open_film(_film(tmp_path, look)), _rig(look), REST).series
     error, _ = _errors(series, SWING)
     assert np.sqrt((error**2).mean()) < 0.1
     assert series.ok.all()
@@ -140,7 +141,7 @@ def test_occluded_frames_are_marked_and_no_wrong_row_is_ok(tmp_path):
             x, y = mouths[i].round().astype(int)
             cv2.rectangle(frames[i], (x + 24 - width, y - 90), (x + 24, y + 90), (90, 120, 60), -1)
 
-    series = measure_clip(_film(tmp_path, look, edit=cover), _rig(look), REST).series
+    series = measure_clip(open_film(_film(tmp_path, look, edit=cover)), _rig(look), REST).series
     wrong = np.zeros(N, bool)
     wrong[[i for i, width in hidden.items() if width >= 14]] = True
     assert all(series.status[i] == "occluded" for i in np.flatnonzero(wrong))
@@ -158,14 +159,14 @@ def test_a_repeated_frame_in_motion_is_a_duplicate_and_at_rest_it_is_not(tmp_pat
 
     look = Look(noise=0.0)
     # the same picture is the same bytes in MJPG too, and is read ten times as fast as FFV1
-    series = measure_clip(_film(tmp_path, look, edit=repeat), _rig(look), REST).series
+    series = measure_clip(open_film(_film(tmp_path, look, edit=repeat)), _rig(look), REST).series
     assert [i for i, s in enumerate(series.status) if s != "ok"] == [30, 31, 48]
     assert {series.status[i] for i in (30, 31, 48)} == {"duplicate"}
 
 
 def test_a_clip_at_rest_is_measured_beside_a_larger_red_mug(tmp_path):
     look = Look(lever_px=200.0)
-    measured = measure_clip(_film(tmp_path, look, np.zeros(40)), _rig(look))
+    measured = measure_clip(open_film(_film(tmp_path, look, np.zeros(40))), _rig(look))
     assert measured.series.ok.all()
     assert np.hypot(*(measured.series.mark_px - look.mouth(np.zeros(40))).T).max() < 1.0
     assert np.degrees(np.abs(measured.series.angle)).max() < 0.01
@@ -174,7 +175,7 @@ def test_a_clip_at_rest_is_measured_beside_a_larger_red_mug(tmp_path):
 @pytest.mark.parametrize("rgb", [(225, 62, 70), (150, 20, 20)])
 def test_a_declared_colour_may_be_30_levels_off(film, rgb):
     look = Look()
-    measured = measure_clip(film, _rig(look, mouth=Mouth(rgb=rgb)), REST)
+    measured = measure_clip(open_film(film), _rig(look, mouth=Mouth(rgb=rgb)), REST)
     error, _ = _errors(measured.series, SWING)
     assert np.sqrt((error**2).mean()) < 0.03
     assert np.abs(np.array(measured.detections.colour_rgb) - look.lips_rgb).max() < 15
@@ -186,7 +187,7 @@ def test_flicker_and_pale_lips_do_no_harm(tmp_path):
             frames[i] = cv2.convertScaleAbs(frame, alpha=1 + 0.1 * np.sin(2.3 * i))
 
     look = Look(lips_rgb=(168, 92, 92))
-    series = measure_clip(_film(tmp_path, look, edit=flicker), _rig(look), REST).series
+    series = measure_clip(open_film(_film(tmp_path, look, edit=flicker)), _rig(look), REST).series
     error, _ = _errors(series, SWING)
     assert series.ok.mean() > 0.97
     assert np.sqrt((error**2).mean()) < 0.03
@@ -195,9 +196,9 @@ def test_flicker_and_pale_lips_do_no_harm(tmp_path):
 def test_neutral_is_what_is_declared_else_the_rest_else_the_median(tmp_path):
     look = Look(marker="disc_bright", facing="left")
     clip = _film(tmp_path, look)
-    declared = measure_clip(clip, _rig(look, neutral=look.neutral_deg - 3.0), REST).series
-    rest = measure_clip(clip, _rig(look, pixel_error_px=(4.0,)), REST).series
-    median = measure_clip(clip, _rig(look)).series
+    declared = measure_clip(open_film(clip), _rig(look, neutral=look.neutral_deg - 3.0), REST).series
+    rest = measure_clip(open_film(clip), _rig(look, pixel_error_px=(4.0,)), REST).series
+    median = measure_clip(open_film(clip), _rig(look)).series
     np.testing.assert_allclose(np.degrees(declared.angle), SWING + 3.0, atol=0.5)  # centroid and centre differ a little
     np.testing.assert_allclose(np.degrees(rest.angle), SWING, atol=0.1)
     assert abs(np.median(median.angle)) < 1e-12
@@ -213,7 +214,7 @@ def test_a_marker_away_from_the_centre_of_rotation_is_reported(tmp_path):
         for frame in frames:
             cv2.circle(frame, (int(x), int(y)), 9, (20, 20, 20), -1, cv2.LINE_AA)
 
-    measured = measure_clip(_film(tmp_path, look, edit=paint), _rig(look), REST)
+    measured = measure_clip(open_film(_film(tmp_path, look, edit=paint)), _rig(look), REST)
     assert any("px apart" in note for note in measured.detections.notes)
     error, _ = _errors(measured.series, SWING)
     assert np.abs(error).max() < 0.15
@@ -222,7 +223,7 @@ def test_a_marker_away_from_the_centre_of_rotation_is_reported(tmp_path):
 def test_a_clip_without_the_declared_mouth_is_one_line_with_counts_and_colour(tmp_path):
     clip = broken.clip_without_mouth(tmp_path)
     with pytest.raises(InputError) as error:
-        measure_clip(clip, Rig(mouth=Mouth(rgb=(190, 35, 40))))
+        measure_clip(open_film(clip), Rig(mouth=Mouth(rgb=(190, 35, 40))))
     assert str(error.value) == f"{clip}: no mouth found in 30 of 30 frames (colour 190,35,40); is it in the picture?"
 
 
@@ -230,14 +231,14 @@ def test_a_clip_in_which_nothing_turns_is_one_line(tmp_path):
     look = Look(lips_rgb=(216, 182, 160), red_object=None)
     clip = _film(tmp_path, look, np.zeros(30))
     with pytest.raises(InputError) as error:
-        measure_clip(clip, Rig())
+        measure_clip(open_film(clip), Rig())
     assert str(error.value).startswith(f"{clip}: no mouth found in 30 of 30 frames (colour auto)")
     assert "\n" not in str(error.value)
 
 
 def test_a_head_without_lipstick_is_measured_as_a_rigid_body_and_a_red_mug_is_no_mouth_of_it(tmp_path):
     look = Look(lips_rgb=(216, 182, 160))
-    measured = measure_clip(_film(tmp_path, look), _rig(look), REST)
+    measured = measure_clip(open_film(_film(tmp_path, look)), _rig(look), REST)
     assert any("rigid head alone" in note for note in measured.detections.notes)
     error, sigma = _errors(measured.series, SWING)
     assert measured.series.ok.all()
@@ -248,13 +249,13 @@ def test_a_head_without_lipstick_is_measured_as_a_rigid_body_and_a_red_mug_is_no
 def test_what_is_left_of_a_truncated_clip_is_measured_and_the_rest_is_said(film, tmp_path):
     look = Look()
     cut = broken.truncated_clip(tmp_path, film)
-    measured = measure_clip(cut, _rig(look), REST)
+    measured = measure_clip(open_film(cut), _rig(look), REST)
     read = sum(s != "undecodable" for s in measured.series.status)
     assert 33 < read < 48
     assert measured.detections.truncated == f"truncated: {read} of {N} frames could be read"
     error, _ = _errors(measured.series, SWING[: len(measured.series.time)])
     assert np.sqrt((error**2).mean()) < 0.03
-    assert detect_mark(film, _rig(look)).truncated is None
+    assert detect_mark(open_film(film), _rig(look)).truncated is None
 
 
 def test_worst_cases_at_the_papers_arms():
@@ -290,6 +291,6 @@ def test_a_mouth_that_rests_in_two_places_is_found_though_the_hint_is_far_from_i
     held = np.concatenate([np.full(45, -15.0), [-10.0, -2.0, 4.0, 3.0, 0.5, -0.3], np.zeros(25)])
     x, y = look.pivot
     rig = Rig(facing=look.facing, pivot=Pivot(near=(x + off[0], y + off[1]), marker="none"))
-    measured = measure_clip(_film(tmp_path, look, held), rig)
+    measured = measure_clip(open_film(_film(tmp_path, look, held)), rig)
     assert set(measured.series.status) == {"ok"}
     assert np.hypot(*(measured.angles.pivot.centre_px - look.pivot)) < 3.0

@@ -20,8 +20,9 @@ from anglecam.io.session import read_session, rig_beside
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.clock_sync import AGREED, offsets
 from anglecam.models.plant import Plant
+from anglecam.video.film import open_film
 from anglecam.vision.image.lamp import lit_between
-from anglecam.workflow.recordings import measure_session
+from anglecam.workflow.session import measure_session
 from synth.session import render
 
 RESTS = (0.81, 0.82, 0.83)
@@ -94,16 +95,16 @@ def test_commands_by_another_clock_are_dated_by_the_lamps_of_all_clips_together(
 
 def test_a_clip_of_its_own_says_that_the_clocks_disagree(late):
     clip = late / "steps-0.avi"
-    measurement = measure_clip(clip, rig_beside(clip), read_command(late / "steps-0.command.csv"))
+    measurement = measure_clip(open_film(clip), rig_beside(clip), read_command(late / "steps-0.command.csv"))
     assert any("dated by the lamp" in note for note in measurement.notes)
 
 
 def test_a_lamp_that_stays_dark_is_missed_and_one_outside_the_picture_is_an_error(filmed):
     clip, command = filmed / "steps-0.avi", read_command(filmed / "steps-0.command.csv")
-    dark = measure_clip(clip, Rig(sync=Sync(lamp=(5.0, 235.0))), command)
+    dark = measure_clip(open_film(clip), Rig(sync=Sync(lamp=(5.0, 235.0))), command)
     assert any("not seen to light" in note for note in dark.notes)
     with pytest.raises(RigError, match=r"sync: \{lamp: \[400, 20\]\} lies outside its picture of 320 × 240 pixels"):
-        measure_clip(clip, Rig(sync=Sync(lamp=(400.0, 20.0))), command)
+        measure_clip(open_film(clip), Rig(sync=Sync(lamp=(400.0, 20.0))), command)
 
 
 def levels(*course):

@@ -15,6 +15,7 @@ from anglecam.camera.calibration import Calibration, write_calibration
 from anglecam.io.command_csv import read_command
 from anglecam.io.rig import read_rig
 from anglecam.measurement.clip import Measurement, measure_clip
+from anglecam.video.film import open_film
 from synth.motion import move
 from synth.session import render
 from synth.spec import read_spec
@@ -33,7 +34,7 @@ def _measure(folder: Path, seconds: float = 1.6, command: dict = SWING, **spec) 
         _write_calibration(folder)
     session = folder / "session"
     clip = next(p for p in session.iterdir() if p.suffix in (".avi", ".mp4"))
-    measured = measure_clip(clip, read_rig(session / "rig.yaml"), read_command(session / "clip.command.csv"))
+    measured = measure_clip(open_film(clip), read_rig(session / "rig.yaml"), read_command(session / "clip.command.csv"))
     spec_read = read_spec(path)
     rows = np.loadtxt(session / "clip.command.csv", delimiter=",", skiprows=1)
     motion = move(spec_read, spec_read.recordings[0], rows, seconds + 0.2)

@@ -19,7 +19,7 @@ from anglecam.io.csv_columns import SERIES_COLUMNS as COLUMNS
 from anglecam.io.rig import Camera, Marks, Rig
 from anglecam.io.session import read_session, recording_name
 from anglecam.measurement.tracks import measure_tracks
-from anglecam.workflow.recordings import measure_session, shown_to_loop
+from anglecam.workflow.session import loop_input, measure_session
 from support.drawn import Look, Plant, Recording, draw_frames, write_clip
 from support.motion import command_rows, move
 from support.tracked import LEVER, PIVOT, SCORER, nod, write_deeplabcut, write_sleap
@@ -251,10 +251,10 @@ def test_the_loop_sees_tracks_as_they_are_measured_and_a_tilted_view_of_them_as_
     truth = _write_session(tmp_path, Plant())
     opened = read_session(tmp_path)
     measured = measure_session(opened)
-    assert not shown_to_loop(opened, measured).differs
+    assert not loop_input(measured).differs
     tilted = replace(opened, rig=opened.rig.model_copy(update={"camera": Camera(tilt_deg=30.0)}))
     undone = measure_session(tilted)
-    shown = shown_to_loop(tilted, undone)
+    shown = loop_input(undone)
     assert shown.differs
     steps = [s.name for s in shown.series].index("steps")
     assert np.degrees(np.std(undone.series[steps].angle)) > 1.05 * np.std(truth["steps"])

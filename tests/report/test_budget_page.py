@@ -15,6 +15,7 @@ from anglecam.io.rig import read_rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.report.budget_page import budget_table, write_budget
 from anglecam.report.figure8 import touching_point
+from anglecam.video.film import open_film
 from support.drawn import Look, Recording, draw_session
 
 
@@ -24,8 +25,8 @@ def written(tmp_path_factory):
     clips = [Recording("stairs", "stairs", duration_s=2.5, amplitude_deg=12.0)]
     truth = draw_session(folder, look=Look(), recordings=clips, seed=4, rig={"pixel_error_px": [6, 10, 3]})["stairs"]
     rig, command = read_rig(folder / "rig.yaml"), read_command(folder / "stairs.command.csv")
-    measured = measure_clip(truth.clip, rig, command)
-    budget = write_budget(truth.clip, measured, rig, folder / "out")
+    measured = measure_clip(open_film(truth.clip), rig, command)
+    budget = write_budget(open_film(truth.clip), measured, rig, folder / "out")
     return budget, measured, folder / "out"
 
 

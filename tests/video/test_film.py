@@ -1,42 +1,42 @@
-"""A short film is decoded once however often a measurement reads it, and nobody else sees what it keeps."""
+"""A short film is decoded once however often it is read, and the pictures are released with it."""
 
 from __future__ import annotations
 
 import itertools
-import threading
 import weakref
 from pathlib import Path
 from types import SimpleNamespace
 
+import av
 import numpy as np
 import pytest
 
 from anglecam.errors import InputError
-from anglecam.video import film as rereading
-from anglecam.video.film import decoded_once, reread
-from anglecam.video.frames import read_frames, sample_frames
+from anglecam.video import film as film_module
+from anglecam.video.film import Film, open_film
 from support.drawn import Look, draw_frames, write_clip
 
-FILM = Path("film.avi")
 BYTES = 1000
 """Of one picture."""
 
 
 class Picture:
-    """What of a decoded picture counts here; it can be asked whether it is still there."""
+    """A decoded picture as far as it counts here; a weak reference shows whether it still exists."""
 
     planes = (SimpleNamespace(buffer_size=BYTES - 300), SimpleNamespace(buffer_size=300))
+    pict_type = None
+    rotation = 90
 
 
 class Decoder:
-    """Decodes a film of twelve frames, the fourth of which is lost, and counts how often it is asked to."""
+    """Decodes a film of twelve frames, the fourth of which is lost, and counts how often it is called."""
 
     def __init__(self):
-        self.asked = 0
+        self.calls = 0
         self.pictures = []
 
     def __call__(self, path):
-        self.asked += 1
+        self.calls += 1
         for k in range(12):
             picture = None if k == 3 else Picture()
             if picture is not None:
@@ -44,78 +44,96 @@ class Decoder:
             yield k / 30, picture
 
 
-def test_a_short_film_is_decoded_once_and_gone_when_the_block_ends():
-    decode = Decoder()
-    with decoded_once():
-        first = list(reread(FILM, decode))
-        assert all(one is other for one, other in zip(first, reread(FILM, decode), strict=True))
-        assert decode.asked == 1
-        del first
-        list(reread(Path("other.avi"), decode))
-        assert decode.asked == 2
-        assert all(picture() is not None for picture in decode.pictures)
-    assert all(picture() is None for picture in decode.pictures)
-    list(reread(FILM, decode))
-    assert decode.asked == 3
+@pytest.fixture
+def decoder(monkeypatch):
+    decoder = Decoder()
+    monkeypatch.setattr(film_module, "decode", decoder)
+    monkeypatch.setattr(film_module, "to_colours", lambda picture: np.zeros((2, 2, 3), np.uint8))
+    return decoder
 
 
-def test_nothing_of_a_film_that_is_too_long_is_kept(monkeypatch):
-    monkeypatch.setattr(rereading, "MOST_BYTES", 10 * BYTES)  # there are eleven pictures
-    decode = Decoder()
-    with decoded_once():
-        for asked in (1, 2, 3):
-            assert len(list(reread(FILM, decode))) == 12
-            assert decode.asked == asked
-            assert all(picture() is None for picture in decode.pictures)
+def new_film():
+    return Film(Path("film.avi"), 2, 2, 12, "ffv1", False, False)
 
 
-def test_the_limit_holds_for_all_films_of_a_block_together(monkeypatch):
-    monkeypatch.setattr(rereading, "MOST_BYTES", 21 * BYTES)
-    decode = Decoder()
-    with decoded_once():
-        for name in ("a", "b", "a", "b"):
-            list(reread(Path(name), decode))
-    assert decode.asked == 3
+def test_a_short_film_is_decoded_once_and_its_pictures_are_released_with_it(decoder):
+    film = new_film()
+    for _ in range(2):
+        assert [frame.index for frame in film.frames()] == list(range(12))
+    assert film.sample(4).count == 12
+    assert decoder.calls == 1
+    assert all(picture() is not None for picture in decoder.pictures)
+    del film
+    assert all(picture() is None for picture in decoder.pictures)
 
 
-def test_a_reading_that_was_broken_off_is_not_taken_for_the_film():
-    decode = Decoder()
-    with decoded_once():
-        assert len(list(itertools.islice(reread(FILM, decode), 5))) == 5
-        assert len(list(reread(FILM, decode))) == 12
+def test_a_long_film_is_decoded_at_every_reading_and_none_of_it_is_kept(decoder, monkeypatch):
+    monkeypatch.setattr(film_module, "MOST_BYTES", 10 * BYTES)  # there are eleven pictures
+    film = new_film()
+    for calls in (1, 2, 3):
+        assert len(list(film.frames())) == 12
+        assert decoder.calls == calls
+        assert all(picture() is None for picture in decoder.pictures)
 
 
-def test_a_fault_is_told_at_every_reading():
+def test_times_and_lost_frames_are_known_after_one_reading(decoder):
+    film = new_film()
+    np.testing.assert_allclose(film.times, np.arange(12) / 30)
+    assert film.undecodable == 1
+    assert film.rotation_deg == 90
+    assert decoder.calls == 1
+
+
+def test_an_interrupted_reading_is_not_taken_for_the_whole_film(decoder):
+    film = new_film()
+    assert len(list(itertools.islice(film.frames(), 5))) == 5
+    assert len(list(film.frames())) == 12
+
+
+def test_an_error_is_raised_at_every_reading(monkeypatch):
     def decode(path):
         yield 0.0, Picture()
         raise InputError(f"{path}: timestamps do not increase")
 
-    with decoded_once():
-        for _ in range(2):
-            with pytest.raises(InputError, match="do not increase"):
-                list(reread(FILM, decode))
+    monkeypatch.setattr(film_module, "decode", decode)
+    monkeypatch.setattr(film_module, "to_colours", lambda picture: np.zeros((2, 2, 3), np.uint8))
+    film = new_film()
+    for _ in range(2):
+        with pytest.raises(InputError, match="do not increase"):
+            list(film.frames())
 
 
-def test_another_thread_has_films_of_its_own():
-    decode = Decoder()
-    with decoded_once():
-        list(reread(FILM, decode))
-        other = threading.Thread(target=lambda: list(reread(FILM, decode)))
-        other.start()
-        other.join()
-    assert decode.asked == 2
-
-
-def test_frames_from_memory_are_those_from_the_file(tmp_path):
+def test_frames_from_memory_equal_those_from_the_file(tmp_path):
     clip = tmp_path / "clip.avi"
     write_clip(clip, draw_frames(Look(), np.arange(8.0)))
-    with decoded_once():
-        list(read_frames(clip))
-        film = clip.read_bytes()
-        clip.write_bytes(b"")
-        kept = [*read_frames(clip), *read_frames(clip, brightness=True), *sample_frames(clip, 4).frames]
-    clip.write_bytes(film)
-    again = [*read_frames(clip), *read_frames(clip, brightness=True), *sample_frames(clip, 4).frames]
+    film = open_film(clip)
+    list(film.frames())
+    content = clip.read_bytes()
+    clip.write_bytes(b"")
+    kept = [*film.frames(), *film.frames(brightness=True), *film.sample(4).frames]
+    clip.write_bytes(content)
+    again = [
+        frame
+        for frames in (
+            open_film(clip).frames(),
+            open_film(clip).frames(brightness=True),
+            open_film(clip).sample(4).frames,
+        )
+        for frame in frames
+    ]
     assert [(f.index, f.time, f.predicted) for f in kept] == [(f.index, f.time, f.predicted) for f in again]
     for one, other in zip(kept, again, strict=True):
         np.testing.assert_array_equal(one.image, other.image)
+
+
+@pytest.mark.parametrize("turn", [0, 90, 180, -90])
+def test_the_rotation_that_players_apply_is_read(tmp_path, turn):
+    path = tmp_path / "phone.mp4"
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("libx264", rate=30)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        stream.set_display_rotation(turn)
+        for _ in range(3):
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.zeros((48, 64, 3), np.uint8), format="bgr24")))
+        container.mux(stream.encode())
+    assert (open_film(path).rotation_deg - turn) % 360 == 0

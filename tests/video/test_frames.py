@@ -10,7 +10,7 @@ import pytest
 
 from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError
-from anglecam.video.frames import inspect_clip, read_frames, sample_frames
+from anglecam.video.film import open_film
 from anglecam.video.overlay import write_overlay
 from support import broken
 
@@ -44,7 +44,7 @@ def avi(tmp_path):
 def test_times_at_a_varying_rate_are_the_files_own(tmp_path, ending, reordered):
     stamps = np.cumsum([0, *np.tile([900, 1100, 1001, 2500], 10)])
     clip = _write(tmp_path / f"vary.{ending}", stamps, options={"bf": reordered})
-    frames = list(read_frames(clip))
+    frames = list(open_film(clip).frames())
     assert [f.index for f in frames] == list(range(len(stamps)))
     np.testing.assert_allclose([f.time for f in frames], stamps / TICKS, atol=1e-6)
     levels = [float(f.image.mean()) for f in frames]
@@ -59,7 +59,7 @@ def test_times_of_reordered_frames_in_avi_start_at_the_clips_start(tmp_path):
         for k in range(20):
             container.mux(stream.encode(av.VideoFrame.from_ndarray(np.full((48, 64, 3), 8 * k, np.uint8), "bgr24")))
         container.mux(stream.encode())
-    times = [f.time for f in read_frames(clip)]
+    times = [f.time for f in open_film(clip).frames()]
     np.testing.assert_allclose(times, np.arange(20) / 30, atol=1e-9)
 
 
@@ -71,14 +71,14 @@ def test_a_packet_that_does_not_decode_keeps_its_row(avi):
     size = int.from_bytes(content[at + 4 : at + 8], "little")
     content[at + 8 : at + 8 + size] = bytes(size)  # the chunk's header stays, the picture does not
     avi.write_bytes(content)
-    frames = list(read_frames(avi))
+    frames = list(open_film(avi).frames())
     assert [f.index for f in frames if f.image is None] == [7]
     np.testing.assert_allclose([f.time for f in frames], np.arange(40) / 30, atol=1e-9)
-    assert sample_frames(avi, 100).decoded == 39
+    assert open_film(avi).sample(100).decoded == 39
 
 
 def test_sampled_frames_are_spread_over_the_whole_clip(avi):
-    sample = sample_frames(avi, 16)
+    sample = open_film(avi).sample(16)
     assert sample.count == sample.decoded == 40
     assert 8 <= len(sample.frames) <= 16
     assert sample.frames[0].index == 0
@@ -90,14 +90,14 @@ def test_a_file_that_is_no_film_is_one_line_with_the_cause(tmp_path, make):
     clip = make(tmp_path)
     cause = {"empty": "empty file", "text": "not a readable video file", "zero_frames": "no frames"}[clip.stem]
     with pytest.raises(InputError) as error:
-        list(read_frames(clip))
+        list(open_film(clip).frames())
     assert str(error.value).startswith(f"{clip}: {cause}")
     assert "\n" not in str(error.value)
 
 
 def test_a_missing_file_and_a_file_with_sound_alone_are_told_apart(tmp_path):
     with pytest.raises(InputError, match="no such file"):
-        inspect_clip(tmp_path / "nowhere.avi")
+        open_film(tmp_path / "nowhere.avi")
     sound = tmp_path / "sound.avi"
     with av.open(str(sound), "w") as container:
         stream = container.add_stream("pcm_s16le", rate=8000)
@@ -105,7 +105,7 @@ def test_a_missing_file_and_a_file_with_sound_alone_are_told_apart(tmp_path):
         samples.sample_rate = 8000
         container.mux(stream.encode(samples))
     with pytest.raises(InputError, match="no video stream"):
-        inspect_clip(sound)
+        open_film(sound)
 
 
 @pytest.mark.parametrize(("ending", "codec"), [("avi", "mjpeg"), ("mkv", "libx264"), ("mp4", "libx264")])
@@ -121,12 +121,12 @@ def test_a_cut_file_is_told_from_a_whole_one(tmp_path, ending, codec):
                     packet.stream = stream
                     target.mux(packet)
         clip = front
-    assert not inspect_clip(clip).cut_short
+    assert not open_film(clip).cut_short
     content = clip.read_bytes()
     cut = tmp_path / f"cut.{ending}"
     cut.write_bytes(content[: int(0.7 * len(content))])
-    assert inspect_clip(cut).cut_short
-    assert 10 <= sum(f.image is not None for f in read_frames(cut)) < 40
+    assert open_film(cut).cut_short
+    assert 10 <= sum(f.image is not None for f in open_film(cut).frames()) < 40
 
 
 def test_an_mp4_without_its_index_says_so(tmp_path):
@@ -134,7 +134,7 @@ def test_an_mp4_without_its_index_says_so(tmp_path):
     cut = tmp_path / "cut.mp4"
     cut.write_bytes(clip.read_bytes()[:-400])
     with pytest.raises(InputError, match="truncated: its index is missing"):
-        inspect_clip(cut)
+        open_film(cut)
 
 
 def test_a_count_that_lies_in_an_intact_file_is_no_failure(avi):
@@ -142,8 +142,8 @@ def test_a_count_that_lies_in_an_intact_file_is_no_failure(avi):
     at = content.index(b"avih") + 8 + 16
     content[at : at + 4] = (4000).to_bytes(4, "little")
     avi.write_bytes(content)
-    assert not inspect_clip(avi).cut_short
-    assert sum(1 for _ in read_frames(avi)) == 40
+    assert not open_film(avi).cut_short
+    assert sum(1 for _ in open_film(avi).frames()) == 40
 
 
 def test_the_overlay_has_every_frame_at_its_own_time(tmp_path):
@@ -158,9 +158,9 @@ def test_the_overlay_has_every_frame_at_its_own_time(tmp_path):
         contours_px = (None,) * n
 
     Measured.series = series
-    write_overlay(clip, Measured(), tmp_path / "new" / "vary.overlay.mp4")
+    write_overlay(open_film(clip), Measured(), tmp_path / "new" / "vary.overlay.mp4")
     with av.open(str(tmp_path / "new" / "vary.overlay.mp4")) as film:
         assert film.streams.video[0].codec_context.name == "h264"
         assert film.streams.video[0].codec_context.pix_fmt == "yuv420p"
-    read = list(read_frames(tmp_path / "new" / "vary.overlay.mp4"))
-    np.testing.assert_allclose([f.time for f in read], [f.time for f in read_frames(clip)], atol=1.2e-5)
+    read = list(open_film(tmp_path / "new" / "vary.overlay.mp4").frames())
+    np.testing.assert_allclose([f.time for f in read], [f.time for f in open_film(clip).frames()], atol=1.2e-5)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from anglecam.errors import InputError
-from anglecam.video.frames import inspect_clip, read_frames, sample_frames
+from anglecam.video.film import open_film
 
 
 def _film(path, sizes=((64, 48),) * 12, stamps=None, codec="mjpeg", container_format=None, **tags) -> Path:
@@ -41,7 +41,7 @@ def _encoder(codec, size):
     return encoder
 
 
-def _refusal(path, read=lambda path: list(read_frames(path))) -> str:
+def _refusal(path, read=lambda path: list(open_film(path).frames())) -> str:
     with pytest.raises(InputError) as caught:
         read(path)
     line = str(caught.value)
@@ -63,13 +63,13 @@ def test_a_header_that_claims_an_absurd_size_is_refused(tmp_path, width, height,
     clip = _film(tmp_path / "size.avi", codec="ffv1")
     data = clip.read_bytes().replace(struct.pack("<II", 64, 48), struct.pack("<II", width, height))
     clip.write_bytes(data)
-    assert says in _refusal(clip, inspect_clip)
+    assert says in _refusal(clip, open_film)
     assert says in _refusal(clip)
 
 
 def test_8k_film_is_within_the_limits(tmp_path):
     clip = _film(tmp_path / "8k.avi", sizes=((7680, 4320),))
-    (frame,) = read_frames(clip, brightness=True)
+    (frame,) = open_film(clip).frames(brightness=True)
     assert frame.image.shape == (4320, 7680, 1)
 
 
@@ -89,11 +89,11 @@ def test_a_container_of_many_streams_is_refused(tmp_path):
 def test_frames_are_counted_as_they_come_and_not_as_a_header_says(tmp_path, monkeypatch):
     clip = _film(tmp_path / "long.avi")
     clip.write_bytes(clip.read_bytes().replace(struct.pack("<I", 12), struct.pack("<I", 2**31 - 1)))
-    assert inspect_clip(clip).declared_frames != 12
-    assert len(list(read_frames(clip))) == 12
-    monkeypatch.setattr("anglecam.video.frames.MOST_FRAMES", 10)
+    assert open_film(clip).declared_frames != 12
+    assert len(list(open_film(clip).frames())) == 12
+    monkeypatch.setattr("anglecam.video.decode.MOST_FRAMES", 10)
     assert "more than 10 frames" in _refusal(clip)
-    assert "more than 10 frames" in _refusal(clip, lambda path: sample_frames(path, 4))
+    assert "more than 10 frames" in _refusal(clip, lambda path: open_film(path).sample(4))
 
 
 def test_a_film_longer_than_a_week_is_refused(tmp_path):
@@ -110,7 +110,7 @@ def test_a_film_whose_pictures_change_their_size_is_refused(tmp_path, codec):
 def test_one_picture_of_another_size_costs_itself_alone(tmp_path):
     sizes = [(64, 48)] * 12
     sizes[5] = (96, 80)
-    frames = list(read_frames(_film(tmp_path / "one.avi", sizes=sizes)))
+    frames = list(open_film(_film(tmp_path / "one.avi", sizes=sizes)).frames())
     assert [k for k, frame in enumerate(frames) if frame.image is None] == [5]
 
 
@@ -156,7 +156,7 @@ def test_a_play_list_does_not_open_what_it_names(tmp_path, text):
 def test_a_name_is_a_name_and_no_instruction(tmp_path, monkeypatch, name):
     _film(tmp_path / "film.avi").rename(tmp_path / name)
     monkeypatch.chdir(tmp_path)
-    assert len(list(read_frames(Path(name)))) == 12
+    assert len(list(open_film(Path(name)).frames())) == 12
 
 
 def test_tags_that_are_no_text_do_no_harm(tmp_path):
@@ -164,4 +164,4 @@ def test_tags_that_are_no_text_do_no_harm(tmp_path):
     data = clip.read_bytes()
     assert b"TITLETITLE" in data
     clip.write_bytes(data.replace(b"TITLETITLE", b"\xff\xfe\xc3\x28\x00TITLE"))
-    assert len(list(read_frames(clip))) == 12
+    assert len(list(open_film(clip).frames())) == 12

@@ -16,7 +16,7 @@ import numpy as np
 
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
-from anglecam.video.frames import Frame
+from anglecam.video.film import Frame
 from anglecam.vision.image.transforms import inverse, moved, turn_of
 from anglecam.vision.rigid_body.bodies import FEWEST, LEAST_TURN, Features, describe, find_turning_body, locate
 from anglecam.vision.rigid_body.keyframes import Key, choose_keys, hold_against

@@ -20,8 +20,8 @@ from anglecam.vision.registration.appearance import STEP_PX, Patches, compare, j
 from anglecam.vision.stabilise.background_motion import (
     HIDDEN,
     MARGIN_PX,
-    Cuts,
     BackgroundMotion,
+    Cuts,
     brightness,
     cut,
     free_of,

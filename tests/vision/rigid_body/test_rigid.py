@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from anglecam.video.frames import Frame, read_frames
+from anglecam.video.film import Frame, open_film
 from anglecam.vision.rigid_body.rigid import follow_rigid_body
 from support.drawn import Look, draw_frames
 from support.real import REAL
@@ -55,8 +55,8 @@ def nod(tmp_path_factory):
     render(folder / "spec.yaml", folder / "session", folder / "truth")
     truth = np.genfromtxt(folder / "truth" / "nod.truth.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
     clip = folder / "session" / "nod.avi"
-    images = [frame.image for frame in read_frames(clip)]
-    return follow_rigid_body(read_frames(clip), sampled(images), 1.0), truth
+    images = [frame.image for frame in open_film(clip).frames()]
+    return follow_rigid_body(open_film(clip).frames(), sampled(images), 1.0), truth
 
 
 def test_a_nod_of_seventy_degrees_in_a_third_of_a_second_is_followed(nod):
@@ -128,5 +128,5 @@ def test_a_clip_in_which_nothing_turns_says_so(swinging):
 @pytest.mark.skipif(not FILM.exists(), reason="the real film is not here")
 def test_a_plain_ball_has_nothing_to_tell_its_turn_by():
     """Its centre moves on a circle; whether it turns on its thread is not to be seen."""
-    images = [frame.image for frame in itertools.islice(read_frames(FILM), 0, 60)]
+    images = [frame.image for frame in itertools.islice(open_film(FILM).frames(), 0, 60)]
     assert isinstance(follow_rigid_body(numbered(images, 24.0), images[::10], 2.0), str)

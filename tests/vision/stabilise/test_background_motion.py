@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import yaml
 
-from anglecam.video.frames import read_frames, sample_frames
+from anglecam.video.film import open_film
 from anglecam.vision.stabilise.background_motion import CameraMove
 from anglecam.vision.stabilise.learn import learn_background, shakes
 from support.drawn import Look, draw_frames
@@ -24,8 +24,8 @@ def film(folder, **spec):
 
 
 def follow(clip):
-    steady = learn_background([frame.image for frame in sample_frames(clip, 32).frames])
-    return steady, [steady.at(frame.image) for frame in read_frames(clip)]
+    steady = learn_background([frame.image for frame in open_film(clip).sample(32).frames])
+    return steady, [steady.at(frame.image) for frame in open_film(clip).frames()]
 
 
 def errors(moves, pivots):

@@ -1,0 +1,175 @@
+"""The commands that work on single clips: `measure`, `budget`, `calibrate`.
+
+The modules that a command needs are imported inside it: loading all of them takes longer than many a call.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from anglecam.cli.options import Out, RigFile
+from anglecam.cli.progress import end, progress_bars
+from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
+from anglecam.io.netcdf_parquet import Also
+from anglecam.io.rig import Rig, read_rig
+from anglecam.io.session import find_clips, find_measurable, recording_name, rig_beside
+from anglecam.terminal import errors, make_folder, screen
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from anglecam.measurement.clip import Measurement
+    from anglecam.measurement.tracks import MeasuredTracks
+    from anglecam.workflow.clip import Source
+
+
+def measure(
+    clips: Annotated[
+        list[Path],
+        typer.Argument(metavar="CLIP", help="Clips, folders of clips, or tracks from DeepLabCut or SLEAP."),
+    ],
+    out: Out,
+    rig: RigFile = None,
+    overlay: Annotated[bool, typer.Option("--overlay", help="Also write NAME.overlay.mp4.")] = False,
+    also: Annotated[
+        list[Also] | None, typer.Option("--also", help="Also write NAME.angles.nc or .parquet; repeatable.")
+    ] = None,
+) -> None:
+    """Measure the angle in every frame: NAME.angles.csv and a plot for each clip, and its response to every change."""
+    from anglecam.report.summary import response_table, series_table
+    from anglecam.workflow.clip import open_source, write_clip_overlay, write_measurement
+
+    declared = read_rig(rig) if rig else None
+    names: dict[str, Path] = {}
+    measured, tables = [], []
+
+    def measure_one(clip: Path, bars: Progress) -> Measurement | MeasuredTracks:
+        name = recording_name(clip)
+        if name in names:
+            raise InputError(f"{clip}: {names[name]} has the same name; measure them to separate folders")
+        names[name] = clip
+        source = open_source(clip, declared)
+        measurement = _measure(source, bars)
+        answers = write_measurement(measurement, source.command, out, also or ())
+        if answers:
+            tables.append(response_table(clip.name, answers))
+        if overlay:
+            write_clip_overlay(source, measurement, out)
+        measured.append(measurement)
+        return measurement
+
+    problems = _for_each(clips, out, lambda folder: _clips_and_tracks(folder, declared), measure_one)
+    if measured:
+        screen.print(series_table(measured))
+    for table in tables:
+        screen.print(table)
+    end(problems)
+
+
+def budget(
+    clips: Annotated[list[Path], typer.Argument(metavar="CLIP", help="Clips, or folders of clips.")],
+    out: Out,
+    rig: RigFile = None,
+) -> None:
+    """Write the budget of the angle's uncertainty: NAME.budget.json and a page for each clip."""
+    from anglecam.measurement.clip import Measurement
+    from anglecam.report.budget_page import budget_table, write_budget
+    from anglecam.workflow.clip import open_source
+
+    declared = read_rig(rig) if rig else None
+
+    def budget_one(clip: Path, bars: Progress) -> Measurement | MeasuredTracks:
+        source = open_source(clip, declared)
+        if source.is_tracks or source.film is None:
+            raise InputError(f"{clip}: a budget needs the pictures; give the clip")
+        measurement = _measure(source, bars)
+        assert isinstance(measurement, Measurement)
+        screen.print(budget_table(write_budget(source.film, measurement, source.rig, out)))
+        return measurement
+
+    end(_for_each(clips, out, find_clips, budget_one))
+
+
+def calibrate(
+    clip: Annotated[Path, typer.Argument(metavar="CLIP", help="A clip of a chessboard, held still in many poses.")],
+    out: Out,
+    board: Annotated[str, typer.Option("--board", help="Inner corners, COLUMNSxROWS.")] = "9x6",
+) -> None:
+    """Find camera matrix and lens distortion from a chessboard: NAME.calibration.yaml and a figure."""
+    from anglecam.camera.calibrate import calibrate_clip
+    from anglecam.camera.calibration import write_calibration
+    from anglecam.report.calibration_figure import plot_calibration
+    from anglecam.video.film import open_film
+
+    try:
+        columns, rows = (int(side) for side in board.lower().split("x"))
+    except ValueError:
+        raise RigError(f"--board {board}: give the number of inner corners, such as 9x6") from None
+    make_folder(out)
+    with blame(clip):
+        found = calibrate_clip(open_film(clip), (columns, rows))
+    write_calibration(found.calibration, out / f"{clip.stem}.calibration.yaml")
+    plot_calibration(found, out / f"{clip.stem}.calibration.png", clip.name)
+    terms = ", ".join(found.terms) or "no distortion"
+    screen.print(f"{out / clip.stem}.calibration.yaml: {len(found.views)} views, {terms}", soft_wrap=True)
+    for note in found.notes:
+        errors.print(printable(note))
+
+
+def _for_each(
+    paths: list[Path],
+    out: Path,
+    list_folder: Callable[[Path], list[Path]],
+    work: Callable[[Path, Progress], Measurement | MeasuredTracks],
+) -> list[AnglecamError]:
+    """Do the work for each clip and return the problems; a problem with one clip does not stop the others."""
+    make_folder(out)
+    problems: list[AnglecamError] = []
+    with progress_bars() as bars:
+        for clip in _expand(paths, problems, list_folder):
+            try:
+                measurement = work(clip, bars)
+                if measurement.truncated:
+                    raise InputError(f"{clip}: {measurement.truncated}")
+            except AnglecamError as problem:
+                problems.append(problem)
+            except OSError as problem:
+                problems.append(InputError(f"{clip}: its results cannot be written ({problem.strerror or problem})"))
+    return problems
+
+
+def _expand(
+    paths: list[Path], problems: list[AnglecamError], list_folder: Callable[[Path], list[Path]]
+) -> Iterator[Path]:
+    for path in paths:
+        if path.is_dir():
+            found = list_folder(path)
+            if not found:
+                problems.append(InputError(f"{path}: no clip in this folder"))
+            yield from found
+        else:
+            yield path
+
+
+def _clips_and_tracks(folder: Path, rig: Rig | None) -> list[Path]:
+    try:
+        found, idle = find_measurable(folder, rig_beside(folder) if rig is None else rig)
+    except RigError:  # every clip of the folder will report it
+        return find_clips(folder)
+    for note in idle:
+        errors.print(printable(note))
+    return found
+
+
+def _measure(source: Source, bars: Progress) -> Measurement | MeasuredTracks:
+    from anglecam.workflow.clip import measure_source
+
+    bar = bars.add_task(source.path.name, total=None)
+    measurement = measure_source(source, progress=lambda n, total: bars.update(bar, completed=n, total=total or None))
+    for note in measurement.notes:
+        screen.print(printable(f"{source.path}: {note}"), soft_wrap=True, highlight=False, markup=False)
+    return measurement

@@ -1,0 +1,14 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Out = Annotated[Path, typer.Option("--out", help="Folder for the results; made if missing.")]
+RigFile = Annotated[
+    Path | None, typer.Option("--rig", help="Rig file for all clips; default: rig.yaml in each clip's folder.")
+]
+SessionFolder = Annotated[Path, typer.Argument(metavar="SESSION", help="Folder of clips or *.angles.csv of one rig.")]

@@ -1,0 +1,109 @@
+"""The commands that work on a session: `identify` and `close`.
+
+The modules that a command needs are imported inside it: loading all of them takes longer than many a call.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from anglecam.cli.options import Out, SessionFolder
+from anglecam.cli.progress import end, progress_bars
+from anglecam.errors import InputError, RigError, printable
+from anglecam.io.session import Session, read_session
+from anglecam.terminal import errors, make_folder, screen
+
+if TYPE_CHECKING:
+    from anglecam.identification.identify import Estimator
+    from anglecam.workflow.session import MeasuredSession
+
+
+def identify(
+    session: SessionFolder,
+    out: Out,
+    estimator: Annotated[str, typer.Option("--estimator", help="One of ekf, oe2, oe3, neck.")] = "oe2",
+    neck: Annotated[
+        Path | None, typer.Option("--neck", help="What is known of the neck, for --estimator neck; else the paper's.")
+    ] = None,
+) -> None:
+    """Fit a model to a session: model.json, and model.mat for MATLAB."""
+    from anglecam.identification.identify import ESTIMATORS
+    from anglecam.io.neck_file import read_neck
+    from anglecam.report.summary import model_table
+    from anglecam.workflow.session_results import write_identified
+
+    if estimator not in ESTIMATORS:  # before any clip is measured
+        raise RigError(f"--estimator {estimator}: choose one of {', '.join(ESTIMATORS)}")
+    chosen: Estimator = estimator  # type: ignore[assignment]
+    if neck is not None and estimator != "neck":
+        raise RigError(f"--neck {neck}: only --estimator neck uses it")
+    declared = read_neck(neck).large_angle if estimator == "neck" else None
+    measured = _measure(read_session(session), out)
+    model = write_identified(measured, out, chosen, declared)
+    screen.print(model_table([model]))
+    for doubt in model.doubts:
+        screen.print(doubt, soft_wrap=True, highlight=False, markup=False)
+    if estimator == "neck" and neck is None:
+        screen.print("the neck is the paper's: one spring, constant γ; declare yours with --neck", soft_wrap=True)
+    end(measured.problems)
+
+
+def close(
+    session: SessionFolder,
+    out: Out,
+    hold_out: Annotated[
+        list[str] | None, typer.Option("--hold-out", metavar="NAME", help="A recording to predict only; repeatable.")
+    ] = None,
+) -> None:
+    """Find what the model lacks: loop.json, report.html and, where it helps, the command to play next."""
+    from anglecam.report.summary import loop_table, model_table
+    from anglecam.workflow.session import loop_input, require_recordings
+    from anglecam.workflow.session_results import write_closed
+
+    opened = read_session(session)
+    require_recordings(opened, hold_out or ())
+    measured = _measure(opened, out)
+    shown = loop_input(measured)
+    if shown.differs:
+        errors.print(
+            "measuring corrected an effect of the camera (lens, slanted view, or a mark beside the axis); the loop "
+            "starts from the uncorrected angles and reports the effect if its size exceeds the stated uncertainty"
+        )
+    with progress_bars() as bars:
+        bar = bars.add_task("", total=None)
+        closed = write_closed(
+            measured,
+            shown,
+            out,
+            hold_out=hold_out or (),
+            progress=lambda stage: bars.update(bar, description=stage),
+        )
+        bars.update(bar, description="done", completed=1, total=1)
+    screen.print(model_table(closed.models))
+    screen.print(loop_table(closed.verdict, closed.experiment))
+    screen.print(f"report: {out / 'report.html'}", soft_wrap=True)
+    end(measured.problems)
+
+
+def _measure(opened: Session, out: Path) -> MeasuredSession:
+    """Measure a session's clips and write their series to ``out``."""
+    from anglecam.workflow.session import measure_session
+
+    make_folder(out)
+    for note in opened.notes:
+        errors.print(printable(note))
+    with progress_bars() as bars:
+        tasks = {r.name: bars.add_task(r.source.name, total=None) for r in opened.recordings if r.is_clip}
+        measured = measure_session(
+            opened, out=out, progress=lambda name, n, total: bars.update(tasks[name], completed=n, total=total or None)
+        )
+    for note in measured.notes:
+        screen.print(printable(note), soft_wrap=True, highlight=False, markup=False)
+    if not measured.records:
+        for problem in measured.problems:
+            errors.print(str(problem))
+        raise InputError(f"{opened.directory}: no recording can be used")
+    return measured

@@ -1,0 +1,115 @@
+"""Identify or close one session and write the results to a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from anglecam.identification.export import fitted_model, transfer_as_dict, write_mat
+from anglecam.identification.identify import Estimator, Identified, identify_records
+from anglecam.io.files import write_json
+from anglecam.io.series_csv import write_series
+from anglecam.io.session import CORRECTED, SERIES_ENDING
+from anglecam.loop.close import Verdict
+from anglecam.loop.correct import corrected
+from anglecam.loop.cross_validation import split_records
+from anglecam.loop.loop_json import next_experiment, verdict_as_dict, write_next_command
+from anglecam.loop.next_experiment.design import Experiment
+from anglecam.neck.large_angle import LargeAngleNeck
+from anglecam.report.page import write_report
+from anglecam.terminal import make_folder
+from anglecam.workflow.session import LoopInput, MeasuredSession, close_session, identify_session
+
+
+@dataclass(frozen=True)
+class Closed:
+    """The results of closing the loop."""
+
+    models: tuple[Identified, Identified]
+    """From the paper's filter and from output error."""
+    verdict: Verdict
+    experiment: Experiment | None
+    """The recommended next recording; ``None`` where no further recording would separate the models."""
+
+
+def write_identified(
+    measured: MeasuredSession, out: Path, estimator: Estimator = "oe2", neck: LargeAngleNeck | None = None
+) -> Identified:
+    """Fit a model to a session and write it as ``model.json`` and ``model.mat``.
+
+    Parameters
+    ----------
+    measured, estimator, neck
+        As of `anglecam.workflow.session.identify_session`, which also states what it raises.
+    out : Path
+        Folder for the files.
+
+    Returns
+    -------
+    Identified
+        The model.
+    """
+    model = identify_session(measured, estimator, neck=neck)
+    _write_model(model, out, "model")
+    return model
+
+
+def write_closed(
+    measured: MeasuredSession,
+    shown: LoopInput,
+    out: Path,
+    *,
+    hold_out: Sequence[str] = (),
+    progress: Callable[[str], None] = lambda stage: None,
+) -> Closed:
+    """Close the loop; write the models, ``loop.json``, ``report.html`` and the command of the next experiment.
+
+    Parameters
+    ----------
+    measured, hold_out, progress
+        As of `anglecam.workflow.session.close_session`, which also states what it raises.
+    shown : LoopInput
+        From `anglecam.workflow.session.loop_input`.
+    out : Path
+        Folder for the files.
+
+    Returns
+    -------
+    Closed
+        Models, verdict and next experiment.
+    """
+    session = measured.session
+    measured.split(hold_out)
+    fitted, held_out = split_records(shown.records, [*session.rig.held_out, *hold_out])
+    progress("extended Kalman filter")
+    ekf, model = (identify_records(fitted, session.rig, name, held_out=held_out) for name in ("ekf", "oe2"))
+    verdict = close_session(measured, hold_out=hold_out, shown=shown, progress=progress)
+    progress("report")
+    _write_model(ekf, out, "ekf")
+    _write_model(model, out, "model")
+    experiment = next_experiment(verdict)
+    write_next_command(experiment, out)
+    result = verdict_as_dict(verdict, experiment)
+    write_json(out / "loop.json", result)
+    _write_corrected(shown, verdict, out / CORRECTED)
+    title, models = session.directory.resolve().name, (ekf, model)
+    page = out / "report.html"
+    write_report(page, title, verdict, result, experiment, measured.series, list(models), measured.problems)
+    return Closed(models, verdict, experiment)
+
+
+def _write_model(model: Identified, out: Path, name: str) -> None:
+    """Write a model as ``NAME.json`` and for MATLAB as ``NAME.mat``."""
+    exported = fitted_model(model)
+    write_json(out / f"{name}.json", model.as_dict() | {"transfer_function": transfer_as_dict(exported)})
+    write_mat(exported, out / f"{name}.mat")
+
+
+def _write_corrected(shown: LoopInput, verdict: Verdict, folder: Path) -> None:
+    """Write the series without the camera's effects that the loop found, where it found any."""
+    for series, record in zip(shown.series, shown.records, strict=True):
+        right = corrected(series, verdict.after, record.view)
+        if right is not None:
+            make_folder(folder)
+            write_series(right, folder / f"{series.name}{SERIES_ENDING}")
