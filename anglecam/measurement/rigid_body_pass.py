@@ -13,7 +13,7 @@ from anglecam.measurement.detections import Detections, find_pivot, frames_to_ke
 from anglecam.video.frames import inspect_clip, read_frames, sample_frames
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.circle import Circle
-from anglecam.vision.rigid_body.rigid import follow_rigid_body
+from anglecam.vision.rigid_body.follow import follow_rigid_body
 
 
 def detect_rigid_body(path: Path, rig: Rig) -> Detections | str:
@@ -54,7 +54,7 @@ def detect_rigid_body(path: Path, rig: Rig) -> Detections | str:
     turned = Circle(
         head.pivot_px,
         lever,
-        head.wander_px,
+        head.pivot_scatter_px,
         np.pad(head.pivot_covariance_px2, (0, 1)) + np.diag([0.0, 0.0, float(np.trace(head.pivot_covariance_px2))]),
         np.ones(len(stamps), bool),
     )
