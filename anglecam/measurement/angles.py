@@ -19,8 +19,8 @@ from anglecam.io.rig import Rig
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.registration_pass import Registered
 from anglecam.measurement.sigma import PlaceErrors, angle_sigma, place_errors
-from anglecam.vision.pivot.marker import Pivot
-from anglecam.vision.rigid_body.one_centre import RigidMotion
+from anglecam.vision.pivot.estimate import PivotEstimate
+from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 
 _THICK = 0.25
 """Standard deviation of the height of what is seen of a mouth, as a share of the root of its area."""
@@ -50,7 +50,7 @@ class Angles:
     """Standard uncertainty of ``line`` less ``neutral``, rad."""
     mark_px: Floats
     """(n, 2) px."""
-    pivot: Pivot
+    pivot: PivotEstimate
     neutral: float
     """Line that counts as zero, rad."""
     resting: NDArray[np.bool_] | None
@@ -113,7 +113,7 @@ def coarse_angles(seen: Detections, ok: NDArray[np.bool_], time: Floats, rig: Ri
 
 def angles_of_places(
     mark_px: Floats,
-    pivot: Pivot,
+    pivot: PivotEstimate,
     errors: PlaceErrors,
     lens: Lens,
     time: Floats,

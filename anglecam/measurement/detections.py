@@ -19,8 +19,9 @@ from anglecam.video.film import Film
 from anglecam.vision.image.median import median_picture
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle
-from anglecam.vision.pivot.marker import Marker, Pivot, choose_pivot, find_marker
-from anglecam.vision.rigid_body.one_centre import RigidMotion
+from anglecam.vision.pivot.estimate import PivotEstimate, combine_pivot
+from anglecam.vision.pivot.marker import RoundMarker, find_marker
+from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 from anglecam.vision.stabilise.background_motion import CameraMove
 
 _SAMPLE_BYTES = 100_000_000
@@ -51,9 +52,9 @@ class Detections:
     """The mouth where it was seen, in the plane of motion."""
     smeared: NDArray[np.bool_]
     """Frames that are ``occluded`` for all that is known, but may be fast motion's blur."""
-    pivot: Pivot
+    pivot: PivotEstimate
     """In the plane of motion."""
-    marker: Marker | None
+    marker: RoundMarker | None
     """The round mark at the pivot, as the picture shows it."""
     circle: Circle | None
     """Fitted to the mouth's path in the plane of motion, where it moved."""
@@ -87,7 +88,7 @@ class Detections:
 
 def find_pivot(
     images: Sequence[Image], rig: Rig, circle: Circle | None, lens: Lens
-) -> tuple[Marker | None, Pivot | None, str | None]:
+) -> tuple[RoundMarker | None, PivotEstimate | None, str | None]:
     """Find the pivot from its marker and from what turns about it.
 
     Parameters
@@ -111,10 +112,10 @@ def find_pivot(
         What to report where the two disagree.
     """
     marker = _find_marker(images, rig, circle, lens)
-    return marker, *choose_pivot(*_reconciled(marker, circle, lens))
+    return marker, *combine_pivot(*_reconciled(marker, circle, lens))
 
 
-def _find_marker(images: Sequence[Image], rig: Rig, circle: Circle | None, lens: Lens) -> Marker | None:
+def _find_marker(images: Sequence[Image], rig: Rig, circle: Circle | None, lens: Lens) -> RoundMarker | None:
     if rig.pivot.marker == "none":
         return None
     few = images[:: max(1, len(images) // _STILL)]
@@ -131,7 +132,9 @@ def _find_marker(images: Sequence[Image], rig: Rig, circle: Circle | None, lens:
     return find_marker(still, lens.distort(circle.centre_px), (axes * reach**2) @ axes.T)
 
 
-def _reconciled(marker: Marker | None, circle: Circle | None, lens: Lens) -> tuple[Marker | None, Circle | None]:
+def _reconciled(
+    marker: RoundMarker | None, circle: Circle | None, lens: Lens
+) -> tuple[RoundMarker | None, Circle | None]:
     """Bring marker and centre of rotation to where they can be compared: the plane of motion.
 
     In a tilted view what stands at another height turns about another centre, beside the pivot's along the parallax:

@@ -17,7 +17,7 @@ from anglecam.data.typing import Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles, neutral_of
 from anglecam.measurement.registration_pass import Registered
-from anglecam.vision.pivot.marker import Pivot
+from anglecam.vision.pivot.estimate import PivotEstimate
 
 
 def fine_angles(
@@ -71,7 +71,7 @@ def fine_angles(
     if resting is None:
         # an absolute line stands on the mouth's mean place on the head, and on the pivot
         sigma = np.sqrt(sigma**2 + float(np.median(coarse.sigma[seen])) ** 2)
-    pivot = Pivot(found.pivot_px, found.pivot_covariance_px2, f"{coarse.pivot.source} and the head's turns")
+    pivot = PivotEstimate(found.pivot_px, found.pivot_covariance_px2, f"{coarse.pivot.source} and the head's turns")
     return replace(
         coarse,
         line=line,

@@ -24,11 +24,12 @@ from anglecam.measurement.detections import Detections, find_pivot, frames_to_ke
 from anglecam.measurement.rigid_body_pass import detect_rigid_body
 from anglecam.video.film import Film, Sample
 from anglecam.vision.image.noise import pixel_noise
-from anglecam.vision.mark.search import Found, find_mark
+from anglecam.vision.mark.search import FoundMark, find_mark
 from anglecam.vision.mark.segment import Region, find_regions
-from anglecam.vision.mark.track import Track, follow_mark
-from anglecam.vision.pivot.marker import Marker, Pivot
-from anglecam.vision.stabilise.background_motion import LOST, BackgroundMotion, CameraMove
+from anglecam.vision.mark.track import MarkTrack, follow_mark
+from anglecam.vision.pivot.estimate import PivotEstimate
+from anglecam.vision.pivot.marker import RoundMarker
+from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
 from anglecam.vision.stabilise.learn import learn_background
 
 _SMALLEST_SHARE = 0.25
@@ -121,8 +122,13 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
 
 
 def _follow(
-    candidates: Sequence[Sequence[Region]], time: Floats, found: Found, images: Sequence[Image], rig: Rig, lens: Lens
-) -> tuple[Lens, Track, Marker | None, Pivot | None, str | None]:
+    candidates: Sequence[Sequence[Region]],
+    time: Floats,
+    found: FoundMark,
+    images: Sequence[Image],
+    rig: Rig,
+    lens: Lens,
+) -> tuple[Lens, MarkTrack, RoundMarker | None, PivotEstimate | None, str | None]:
     """Follow the mouth in the plane of motion; where the view is a tilted perspective, once more about its pivot."""
     for again in (lens.tilt != 0.0 and lens.focal_px is not None, False):
         placed = [[_in_plane(region, lens) for region in regions] for regions in candidates]
@@ -174,7 +180,11 @@ def _in_plane(region: Region, lens: Lens) -> Region:
 
 
 def _read_regions(
-    film: Film, found: Found, count: int, steady: BackgroundMotion | None, progress: Callable[[int, int], None] | None
+    film: Film,
+    found: FoundMark,
+    count: int,
+    steady: BackgroundMotion | None,
+    progress: Callable[[int, int], None] | None,
 ) -> tuple[Floats, list[list[Region]], list[bool], NDArray[np.bool_], tuple[CameraMove, ...] | None]:
     """Find the regions of the mouth's colour in every frame, and how the camera moved if it did.
 
@@ -189,7 +199,7 @@ def _read_regions(
     for frame in film.frames():
         image = frame.image
         if steady is not None:
-            moves.append(LOST if image is None else steady.at(image, frame.predicted))
+            moves.append(UNKNOWN_MOVE if image is None else steady.at(image, frame.predicted))
         time.append(frame.time)
         decoded.append(image is not None)
         repeated.append(image is not None and before is not None and np.array_equal(image, before))

@@ -17,10 +17,10 @@ from anglecam.camera.lens import Lens
 from anglecam.data.typing import Floats, Image
 from anglecam.video.film import Film
 from anglecam.vision.image.noise import pixel_noise
-from anglecam.vision.pivot.marker import Pivot
-from anglecam.vision.registration.fit import LOST, Look, Turn, find_turn, nearest_fit
-from anglecam.vision.registration.learn import learn
-from anglecam.vision.registration.tiles import Glimpse, choose_tiles, plane_of
+from anglecam.vision.pivot.estimate import PivotEstimate
+from anglecam.vision.registration.learn import learn_appearance
+from anglecam.vision.registration.tiles import FrameView, choose_tiles, motion_plane
+from anglecam.vision.registration.turn import NO_TURN, BodyAppearance, TurnEstimate, find_turn, refine_doubtful_turn
 
 _LEARNT = 120
 """Frames from which the head is learnt, at most."""
@@ -38,7 +38,8 @@ _FEWEST = 12
 """A head seen in fewer frames is not learnt."""
 _FEWEST_TILES = 3
 _YIELDING = 0.5
-"""Of `Look.yielding`: 0.05 to 0.1 in clips of steps and swings, 0.8 in a nod of 70° with six frames on the way."""
+"""Of `BodyAppearance.absorbed_share`: 0.05 to 0.1 in clips of steps and swings, 0.8 in a nod of 70° with six frames on
+the way."""
 _DOUBT_PX = 10.0
 """How far off a guess may be."""
 _AGREE = 4.0
@@ -56,7 +57,7 @@ class Start:
     """Counter-clockwise as seen, from some reference, rad; NaN where it is not known: such a frame is left alone."""
     sigma: Floats
     """Its standard uncertainty, rad; NaN where the turn is a guess that nothing is learnt from."""
-    pivot: Pivot
+    pivot: PivotEstimate
     """In the plane of motion."""
     pivots_px: Floats
     """(n, 2) where it is in each frame, where camera or base move, in the plane of motion, px."""
@@ -86,7 +87,7 @@ class Registered:
     """(2,) centre of rotation as the whole head has it, px."""
     pivot_covariance_px2: Floats
     """(2, 2) px²."""
-    look: Look
+    look: BodyAppearance
     """What was learnt."""
 
     @property
@@ -122,7 +123,7 @@ def register_clip(
     n, known = len(start.turn), np.flatnonzero(np.isfinite(start.sigma))
     if len(known) < _FEWEST:
         return f"the mouth is seen in {len(known)} frames only"
-    plane = plane_of(lens, film.size)
+    plane = motion_plane(lens, film.size)
     planes = 1 if film.coarse_colour else 3
     most = int(np.clip(_BYTES // (planes * film.width * film.height), _FEWEST, _LEARNT))
     wanted = _spread_out(start.turn, known, most)
@@ -139,15 +140,15 @@ def register_clip(
     if len(tiles.corners) < _FEWEST_TILES:
         return "too little of the head is rigid and has edges"
     with threadpool_limits(limits=1, user_api="blas"):  # small systems: threads only wait for one another
-        look = learn(glimpses, tiles, plane, start.pivot)
+        look = learn_appearance(glimpses, tiles, plane, start.pivot)
     del glimpses
-    if look.yielding > _YIELDING:
+    if look.absorbed_share > _YIELDING:
         return "the head is seen in too few poses, or at too much of a slant, to be learnt"
     apart = look.pivot_px - start.pivot.centre_px
     if apart @ np.linalg.solve(look.pivot_covariance_px2 + start.pivot.covariance_px2, apart) > _ASTRAY:
         return "what is rigid in the picture does not turn about the pivot"
     centred = replace(start, pivots_px=start.pivots_px + apart)
-    found, rows = [LOST] * n, start.row.copy()
+    found, rows = [NO_TURN] * n, start.row.copy()
     before: Image | None = None
     for frame in film.frames(brightness=film.coarse_colour):
         i, image = frame.index, frame.image
@@ -158,7 +159,7 @@ def register_clip(
                 rows[i] = look.row_of_middle(one)
                 one = replace(one, turn=one.turn + one.turn_per_row * (rows[i] - one.row), row=rows[i])
             if np.isnan(start.sigma[i]):
-                one = nearest_fit(look, one, _DOUBT_PX)
+                one = refine_doubtful_turn(look, one, _DOUBT_PX)
             found[i] = find_turn(look, one, before if frame.predicted else None)
         before = image
         if progress is not None:
@@ -173,9 +174,9 @@ def register_clip(
     return registered
 
 
-def _glimpse(start: Start, i: int, image: Image) -> Glimpse:
+def _glimpse(start: Start, i: int, image: Image) -> FrameView:
     wander = None if start.wander_px2 is None else start.wander_px2[i]
-    return Glimpse(
+    return FrameView(
         image, float(start.turn[i]), start.pivots_px[i], float(start.turn_per_row[i]), float(start.row[i]), wander
     )
 
@@ -196,7 +197,7 @@ def _spread_out(turn: Floats, known: NDArray[np.intp], most: int) -> set[int]:
     return set(mixed[np.argsort(rank, kind="stable")[: min(most, enough)]].tolist())
 
 
-def _gathered(found: list[Turn], rows: Floats, look: Look) -> Registered:
+def _gathered(found: list[TurnEstimate], rows: Floats, look: BodyAppearance) -> Registered:
     return Registered(
         turn=np.array([one.turn for one in found]),
         noise=np.array([one.noise for one in found]),

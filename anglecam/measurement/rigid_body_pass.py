@@ -11,7 +11,7 @@ from anglecam.measurement.detections import Detections, find_pivot, frames_to_ke
 from anglecam.video.film import Film
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.circle import Circle
-from anglecam.vision.rigid_body.rigid import follow_rigid_body
+from anglecam.vision.rigid_body.follow import follow_rigid_body
 
 
 def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
@@ -51,7 +51,7 @@ def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
     turned = Circle(
         head.pivot_px,
         lever,
-        head.wander_px,
+        head.pivot_scatter_px,
         np.pad(head.pivot_covariance_px2, (0, 1)) + np.diag([0.0, 0.0, float(np.trace(head.pivot_covariance_px2))]),
         np.ones(len(stamps), bool),
     )

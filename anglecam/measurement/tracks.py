@@ -27,7 +27,7 @@ from anglecam.measurement.angles import Angles, angles_of_places
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.measurement.sigma import PlaceErrors
 from anglecam.video.film import Film
-from anglecam.vision.pivot.marker import Pivot
+from anglecam.vision.pivot.estimate import PivotEstimate
 
 _SHORTEST_PX = 1.0
 """A lever shorter than this has no direction worth the name."""
@@ -181,7 +181,7 @@ def _cause(ok: bool, seen: bool, based: bool) -> str:
     return "ambiguous" if based else "no_pivot"
 
 
-def _fixed_pivot(pivot_px: Floats, there: Flags, name: str) -> Pivot | None:
+def _fixed_pivot(pivot_px: Floats, there: Flags, name: str) -> PivotEstimate | None:
     """Return the median of a pivot that moves less than it scatters, ``None`` of one that moves more.
 
     What varies slowly is motion, or the tracker's own wandering; what differs from frame to frame is scatter. The
@@ -194,12 +194,12 @@ def _fixed_pivot(pivot_px: Floats, there: Flags, name: str) -> Pivot | None:
     if (slow2 > fast**2).any():
         return None
     variance = slow2 + np.pi / 2.0 * fast**2 / len(frames)
-    return Pivot(np.median(places, axis=0), np.diag(variance), f"{name}, fixed")
+    return PivotEstimate(np.median(places, axis=0), np.diag(variance), f"{name}, fixed")
 
 
-def _moving_pivot(pivot_px: Floats, name: str) -> Pivot:
+def _moving_pivot(pivot_px: Floats, name: str) -> PivotEstimate:
     """Return the middle of a moving pivot's places; its scatter is in the lever's, frame by frame."""
-    return Pivot(np.median(pivot_px, axis=0), np.zeros((2, 2)), f"{name}, moving")
+    return PivotEstimate(np.median(pivot_px, axis=0), np.zeros((2, 2)), f"{name}, moving")
 
 
 def _place_errors(arm_px: Floats, frames: NDArray[np.intp], farthest_px: float) -> PlaceErrors:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
 from anglecam.report.figures import STYLE, _svg
-from anglecam.vision.mark.colour import FULL, NONE, learn_colour
+from anglecam.vision.mark.colour import EMPTY_LEVEL, FULL_LEVEL, learn_colour
 
 RADII_PX = (6.0, 10.0)
 _TRUE, _SIX, _TEN, _PIVOT = "#d7191c", "#2b6cff", "#12a150", "#ffd400"
@@ -140,7 +140,7 @@ def _edges(crop: Image, filled: Image) -> Image:
     inside, outside = cv2.erode(filled, disc) > 0, cv2.dilate(filled, disc) == 0
     model = learn_colour(crop[inside], crop[outside], crop[outside])
     smooth = cv2.GaussianBlur(model.fraction_map(crop), (3, 3), 0)
-    step = (FULL - NONE) / 2.0
+    step = (FULL_LEVEL - EMPTY_LEVEL) / 2.0
     return cv2.Canny(smooth, step, 2.0 * step) // 255
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from anglecam.data.typing import Floats
 
 
-def turned(turns: float | Floats) -> Floats:
+def rotation(turns: float | Floats) -> Floats:
     """Give the matrices (…, 2, 2) that turn rows of points: v @ M is v turned counter-clockwise as seen, y down.
 
     Parameters
@@ -38,18 +38,18 @@ def fit_rigid(start: Floats, end: Floats) -> Floats:
     a, b = start.mean(axis=0), end.mean(axis=0)
     p, q = start - a, end - b
     turn = np.arctan2((p[:, 1] * q[:, 0] - p[:, 0] * q[:, 1]).sum(), (p * q).sum())
-    rotation = turned(turn).T
+    R = rotation(turn).T
     motion = np.eye(3)
-    motion[:2, :2], motion[:2, 2] = rotation, b - rotation @ a
+    motion[:2, :2], motion[:2, 2] = R, b - R @ a
     return motion
 
 
-def moved(motion: Floats, points: Floats) -> Floats:
+def apply_motion(motion: Floats, points: Floats) -> Floats:
     """Carry points (n, 2) along with a motion (3, 3)."""
     return points @ motion[:2, :2].T + motion[:2, 2]
 
 
-def inverse(motion: Floats) -> Floats:
+def inverse_motion(motion: Floats) -> Floats:
     """Give the motion (3, 3) that undoes another."""
     return np.asarray(np.linalg.inv(motion), dtype=float)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
 
-SMALLEST_PX2 = 12.0
+_MIN_AREA_PX2 = 12.0
 """A smaller patch has no centroid worth the name."""
 _LARGEST_SHARE = 0.04
 """Of the picture; a mouth is smaller."""
@@ -20,7 +20,7 @@ _PER_FRAME = 12
 
 
 @dataclass(frozen=True)
-class Patches:
+class Blobs:
     """The patches of many pictures; arrays of length n."""
 
     frame: NDArray[np.int64]
@@ -37,9 +37,9 @@ class Patches:
     """Its number among the picture's patches."""
 
 
-def cut_out(
+def find_blobs(
     maps: Sequence[NDArray[Any]], level: float, usual: float, placed: Callable[[int, Floats], Floats]
-) -> Patches:
+) -> Blobs:
     """Cut the largest patches out of every picture.
 
     Parameters
@@ -63,7 +63,7 @@ def cut_out(
         _, _, stats, centres = cv2.connectedComponentsWithStats((hue > level).astype(np.uint8), connectivity=8)
         sizes = stats[:, cv2.CC_STAT_AREA]
         largest = _LARGEST_SHARE * hue.size
-        fit = [k for k in np.argsort(-sizes) if k and SMALLEST_PX2 <= sizes[k] <= largest][:_PER_FRAME]
+        fit = [k for k in np.argsort(-sizes) if k and _MIN_AREA_PX2 <= sizes[k] <= largest][:_PER_FRAME]
         for k in fit:
             x, y, w, h = stats[k, :4]
             part = hue[y : y + h, x : x + w]
@@ -73,7 +73,7 @@ def cut_out(
             area.append(sizes[k])
             contrast.append(np.percentile(part[part > level], 75) - usual)
             label.append(k)
-    return Patches(
+    return Blobs(
         np.array(frame, np.int64),
         np.array(filmed, float).reshape(-1, 2),
         np.array(place, float).reshape(-1, 2),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
 
-NONE, FULL = 40.0, 215.0
+EMPTY_LEVEL, FULL_LEVEL = 40.0, 215.0
 """Grey levels of a fraction map that stand for no mouth and for nothing but mouth; the rest is head room."""
 
 _SKIN_SLOPE = 0.5
@@ -50,8 +50,8 @@ class ColourModel:
 
     def fraction_map(self, image: Image) -> Image:
         """Map an image to grey levels from `NONE` to `FULL` by the fraction of mouth in each pixel."""
-        scale = FULL - NONE
-        matrix = np.append(self.weights * scale, self.offset * scale + NONE)[None, :]
+        scale = FULL_LEVEL - EMPTY_LEVEL
+        matrix = np.append(self.weights * scale, self.offset * scale + EMPTY_LEVEL)[None, :]
         return cv2.transform(image, matrix)
 
 

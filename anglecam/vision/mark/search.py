@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
-from anglecam.vision.mark.blobs import cut_out
+from anglecam.vision.mark.blob_tracks import BlobTrack, moving_track, resting_track
+from anglecam.vision.mark.blobs import find_blobs
 from anglecam.vision.mark.colour import ColourModel, chroma_of, hue_contrast, learn_colour
-from anglecam.vision.mark.paths import Track, moving_track, resting_track
 
-LEVELS = (0.3, 0.4, 0.5, 0.6, 0.7)
+_LEVEL_SHARES = (0.3, 0.4, 0.5, 0.6, 0.7)
 """Shares of the way from the picture's usual hue to its most mouth-like one at which patches are cut out."""
 _LEAST_CONTRAST = 8.0
 """Units of a*, b* by which the mouth's hue must stand out; JPEG's own chroma errors reach 3 or 4."""
@@ -33,7 +33,7 @@ _HUE_TOLERANCE = np.radians(25.0)
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundMark:
     """The mouth as the search found it."""
 
     model: ColourModel
@@ -51,7 +51,7 @@ def find_mark(
     rgb: tuple[int, int, int] | None,
     near_px: Floats | None,
     placed: Callable[[int, Floats], Floats],
-) -> Found | None:
+) -> FoundMark | None:
     """Find the mouth and learn its colour from frames spread over a clip.
 
     Parameters
@@ -77,13 +77,13 @@ def find_mark(
     if top - usual < _LEAST_CONTRAST:
         return None
     cuts = []
-    for share in LEVELS:
+    for share in _LEVEL_SHARES:
         level = usual + share * (top - usual)
         if level - usual >= _LEAST_CONTRAST / 2.0:
-            cuts.append((level, cut_out(maps, level, usual, placed)))
+            cuts.append((level, find_blobs(maps, level, usual, placed)))
     # a hint misleads where a slanted view shows the mark on a shaft far from what it turns about
     for hint in (near_px,) if near_px is None else (near_px, None):
-        tracks: list[Track | None] = []
+        tracks: list[BlobTrack | None] = []
         for level, patches in cuts:
             tracks.append(moving_track(patches, images, level, hint))
             if at_rest:
@@ -93,7 +93,7 @@ def find_mark(
             if model is None or (rgb is not None and not _same_hue(model.chroma, chroma_of(rgb))):
                 continue
             area, place = track.patches.area[track.members], track.patches.place[track.members]
-            return Found(model, float(np.median(area)), np.median(place, axis=0), track.circle)
+            return FoundMark(model, float(np.median(area)), np.median(place, axis=0), track.circle)
     return None
 
 
@@ -120,7 +120,7 @@ def _something_moves(images: Sequence[Image]) -> bool:
 
 
 def _learn(
-    images: Sequence[Image], maps: Sequence[NDArray[Any]], track: Track, most_noise: float
+    images: Sequence[Image], maps: Sequence[NDArray[Any]], track: BlobTrack, most_noise: float
 ) -> ColourModel | None:
     """Learn the colour from a track's patches; ``None`` where they do not stand out from what is next to them."""
     inside, around, elsewhere, contrast = [], [], [], []

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
-from anglecam.vision.mark.colour import FULL, NONE, ColourModel
+from anglecam.vision.mark.colour import EMPTY_LEVEL, FULL_LEVEL, ColourModel
 
 _MARGIN_PX = 12
 """Room around a region for the foot of its edges."""
@@ -69,7 +69,7 @@ def find_regions(image: Image, model: ColourModel, smallest_px2: float) -> list[
     """
     fraction = model.fraction_map(image)
     smooth = cv2.GaussianBlur(fraction, (3, 3), 0)
-    half = (NONE + FULL) / 2.0
+    half = (EMPTY_LEVEL + FULL_LEVEL) / 2.0
     core = (smooth >= half).astype(np.uint8)
     patches, _ = cv2.findContours(core, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     sized = sorted(((cv2.contourArea(p), k) for k, p in enumerate(patches) if len(p) >= _FEWEST_EDGE_PX), reverse=True)
@@ -124,7 +124,7 @@ def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], m
 
 def _outline(smooth: Image, own: Image) -> NDArray[Any]:
     """Join the thresholded patch with the Canny edges that run along it, and take the outer contour."""
-    step = (FULL - NONE) / 2.0
+    step = (FULL_LEVEL - EMPTY_LEVEL) / 2.0
     edges = cv2.Canny(smooth, step, 2.0 * step) // 255
     along: Image = cv2.dilate(own, _disc(1))
     contours, _ = cv2.findContours(own | (edges & along), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
@@ -133,7 +133,7 @@ def _outline(smooth: Image, own: Image) -> NDArray[Any]:
 
 def _reach(smooth: Image, filled: Image, model: ColourModel) -> Image:
     """Return the pixels that may hold some of the region: its foot, and the tail that motion blur draws from it."""
-    low = NONE + max(0.25, 4.0 * model.noise) * (FULL - NONE)
+    low = EMPTY_LEVEL + max(0.25, 4.0 * model.noise) * (FULL_LEVEL - EMPTY_LEVEL)
     tail = ((smooth >= low) | (filled > 0)).astype(np.uint8)
     _, labels = cv2.connectedComponents(tail, connectivity=8)
     is_own = np.zeros(labels.max() + 1, np.uint8)
@@ -148,7 +148,7 @@ def _cover(fraction: Image, filled: Image, reach: Image) -> NDArray[Any]:
 
     One scale for the whole picture would let the edge wander as bright and dark wallpaper pass behind it.
     """
-    value = (fraction.astype(np.float32) - NONE) / (FULL - NONE)
+    value = (fraction.astype(np.float32) - EMPTY_LEVEL) / (FULL_LEVEL - EMPTY_LEVEL)
     inside = cv2.erode(filled, _disc(2)).astype(np.float32)
     outside = (1 - reach).astype(np.float32)
     within = _spread(value * inside + _PRIOR, _PRIOR + inside)

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.series import OK
 from anglecam.data.typing import Floats
-from anglecam.vision.mark.search import Found
+from anglecam.vision.mark.search import FoundMark
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle, fit_circle
-
-SEEN, ABSENT, HIDDEN, DOUBTFUL = "ok", "no_mouth", "occluded", "ambiguous"
+from anglecam.vision.status import AMBIGUOUS, NO_MARK, OCCLUDED
 
 _COARSE_PX = 6.0
 """ResidualTest about the coarse circle."""
@@ -40,7 +40,7 @@ _LEAST_OFF_PX = 0.4
 
 
 @dataclass(frozen=True)
-class Track:
+class MarkTrack:
     """The mouth through a clip; tuples with an entry a frame."""
 
     regions: tuple[Region | None, ...]
@@ -53,7 +53,7 @@ class Track:
     """(n,) frames that are ``occluded`` by the looks of the mouth, but it moves so fast that this may be its blur."""
 
 
-def follow_mark(candidates: Sequence[Sequence[Region]], time: Floats, found: Found) -> Track:
+def follow_mark(candidates: Sequence[Sequence[Region]], time: Floats, found: FoundMark) -> MarkTrack:
     """Choose the mouth's region in every frame.
 
     Parameters
@@ -74,7 +74,7 @@ def follow_mark(candidates: Sequence[Sequence[Region]], time: Floats, found: Fou
     likely = [_near(regions, centre, radius, gate, 0.5, 2.0, found.area_px2) for regions in candidates]
     single = [r[0] for r in likely if len(r) == 1 and r[0].whole] or [q for r in likely for q in r]
     if not single:
-        return Track((None,) * len(candidates), (ABSENT,) * len(candidates), None, np.zeros(len(candidates), bool))
+        return MarkTrack((None,) * len(candidates), (NO_MARK,) * len(candidates), None, np.zeros(len(candidates), bool))
     area = float(np.median([r.area_px2 for r in single]))
     if found.circle is not None:
         circle = fit_circle(np.array([r.centre_px for r in single]), start=found.circle)
@@ -84,7 +84,7 @@ def follow_mark(candidates: Sequence[Sequence[Region]], time: Floats, found: Fou
     chosen, status = _choose(candidates, time, centre, radius, gate, area)
     circle = None
     for _ in range(2):
-        ok = [i for i, s in enumerate(status) if s == SEEN]
+        ok = [i for i, s in enumerate(status) if s == OK]
         if found.circle is not None and len(ok) >= 4:
             circle = fit_circle(np.array([chosen[i].centre_px for i in ok]), start=(centre, radius))  # type: ignore[union-attr]
             if circle is not None:
@@ -92,7 +92,7 @@ def follow_mark(candidates: Sequence[Sequence[Region]], time: Floats, found: Fou
         _mark_hidden(chosen, status, time, centre, radius, circle)
     smeared = _smeared(chosen, status, time)
     _join_hidden(status)
-    return Track(tuple(chosen), tuple(status), circle, smeared)
+    return MarkTrack(tuple(chosen), tuple(status), circle, smeared)
 
 
 def _near(
@@ -118,25 +118,25 @@ def _choose(
     known = {int(i): good[i][0].centre_px for i in np.flatnonzero(sure)}
     scenery = _scenery(candidates, known)
     chosen: list[Region | None] = [None] * n
-    status = [ABSENT] * n
+    status = [NO_MARK] * n
     for i in range(n):
         rest = [r for r in likely[i] if not _is_scenery(r, scenery)] if len(likely[i]) > 1 else likely[i]
         if not rest:
             continue
         if len(rest) == 1:
-            chosen[i], status[i] = rest[0], SEEN
+            chosen[i], status[i] = rest[0], OK
             continue
         expected = _interpolate(known, time, i)
         if expected is None:
-            status[i] = DOUBTFUL
+            status[i] = AMBIGUOUS
             continue
         away = np.array([np.hypot(*(r.centre_px - expected)) for r in rest])
         first, second = np.argsort(away)[:2]
         alike = 0.5 < rest[second].area_px2 / rest[first].area_px2 < 2.0
         if alike and away[first] > 0.5 * away[second]:
-            status[i] = DOUBTFUL
+            status[i] = AMBIGUOUS
         else:
-            chosen[i], status[i] = rest[first], SEEN
+            chosen[i], status[i] = rest[first], OK
     return chosen, status
 
 
@@ -183,7 +183,7 @@ def _mark_hidden(
     circle: Circle | None,
 ) -> None:
     """Mark the frames in which size, shape or distance are off what the clip's other frames agree on."""
-    rows = [i for i, r in enumerate(chosen) if r is not None and status[i] in (SEEN, HIDDEN)]
+    rows = [i for i, r in enumerate(chosen) if r is not None and status[i] in (OK, OCCLUDED)]
     if not rows:
         return
     regions = [chosen[i] for i in rows]
@@ -214,19 +214,19 @@ def _mark_hidden(
         moved = np.abs(_departure(area, pose, blur)) / typical * 2.0 * np.sqrt(np.maximum(radial, tangential))
         off |= (d > max(_ROBUST * circle.scatter_px, _LEAST_OFF_PX)) & (moved > 0.5 * d)
     for i, bad in zip(rows, off | ~whole, strict=True):
-        status[i] = HIDDEN if bad else SEEN
+        status[i] = OCCLUDED if bad else OK
 
 
 def _smeared(chosen: Sequence[Region | None], status: Sequence[str], time: Floats) -> NDArray[np.bool_]:
     """Tell which whole but ill-shaped mouths move fast."""
     found = np.zeros(len(chosen), bool)
-    rows = [i for i, r in enumerate(chosen) if r is not None and status[i] in (SEEN, HIDDEN)]
+    rows = [i for i, r in enumerate(chosen) if r is not None and status[i] in (OK, OCCLUDED)]
     if not rows:
         return found
     way = _speed(np.array([chosen[i].centre_px for i in rows]), time[rows])  # type: ignore[union-attr]
     for i, px in zip(rows, way, strict=True):
         region = chosen[i]
-        found[i] = status[i] == HIDDEN and px > _FAST_PX and region is not None and region.whole
+        found[i] = status[i] == OCCLUDED and px > _FAST_PX and region is not None and region.whole
     return found
 
 
@@ -234,8 +234,8 @@ def _join_hidden(status: list[str]) -> None:
     """Call a mouth that is partly hidden before or after it is gone hidden in between."""
     for order in (range(1, len(status)), range(len(status) - 2, -1, -1)):
         for i in order:
-            if status[i] == ABSENT and status[i - order.step] == HIDDEN:
-                status[i] = HIDDEN
+            if status[i] == NO_MARK and status[i - order.step] == OCCLUDED:
+                status[i] = OCCLUDED
 
 
 def _departure(value: Floats, pose: Floats, blur: Floats) -> Floats:

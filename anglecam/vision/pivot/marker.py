@@ -14,7 +14,6 @@ import cv2
 import numpy as np
 
 from anglecam.data.typing import Floats, Image
-from anglecam.vision.pivot.circle import Circle
 
 _RADII_PX = np.arange(3, 25)
 _LEAST_COVERAGE = 0.6
@@ -27,14 +26,10 @@ _FLOOR_PX = 0.03
 """Standard uncertainty of a marker's centre that no number of edge pixels improves: shading, chroma, codec."""
 _SECTORS = 12
 """Gradients within a sector of the circumference share their noise and the slope of the ground behind them."""
-_SURE_RADIUS = 0.2
-"""Relative uncertainty of the path's radius above which its centre says nothing."""
-_DISAGREE = 9.21
-"""99 % point of χ² with two degrees of freedom."""
 
 
 @dataclass(frozen=True)
-class Marker:
+class RoundMarker:
     """A round mark."""
 
     centre_px: Floats
@@ -45,19 +40,7 @@ class Marker:
     """Of its most complete edge, px."""
 
 
-@dataclass(frozen=True)
-class Pivot:
-    """Where the mechanism turns."""
-
-    centre_px: Floats
-    """(2,) px."""
-    covariance_px2: Floats
-    """(2, 2) px²."""
-    source: str
-    """``marker``, ``centre of rotation`` or ``marker and centre of rotation``."""
-
-
-def find_marker(image: Image, about_px: Floats | None, covariance_px2: Floats | None) -> Marker | None:
+def find_marker(image: Image, about_px: Floats | None, covariance_px2: Floats | None) -> RoundMarker | None:
     """Find the round mark nearest to where it is expected.
 
     Parameters
@@ -104,46 +87,7 @@ def find_marker(image: Image, about_px: Floats | None, covariance_px2: Floats | 
     if refined is None:
         return None
     centre, covariance = refined
-    return Marker(centre + [x0, y0], covariance, radius)
-
-
-def choose_pivot(marker: Marker | None, circle: Circle | None) -> tuple[Pivot | None, str | None]:
-    """Join marker and centre of rotation, each by its certainty, or take the motion's word where they disagree.
-
-    Parameters
-    ----------
-    marker : Marker, optional
-        The round mark, if one was found.
-    circle : Circle, optional
-        The mouth's path, if it moved.
-
-    Returns
-    -------
-    pivot : Pivot or None
-        ``None`` where there is neither.
-    note : str or None
-        What to report where they disagree by more than their uncertainties: then the centre of rotation is taken,
-        because about it the mouth keeps its distance.
-    """
-    if circle is not None and not circle.covariance_px2[2, 2] < (_SURE_RADIUS * circle.radius_px) ** 2:
-        circle = None
-    if circle is None:
-        return (None if marker is None else Pivot(marker.centre_px, marker.covariance_px2, "marker")), None
-    turned = Pivot(circle.centre_px, circle.centre_covariance_px2, "centre of rotation")
-    if marker is None:
-        return turned, None
-    apart = marker.centre_px - circle.centre_px
-    spread = marker.covariance_px2 + circle.centre_covariance_px2
-    if apart @ np.linalg.solve(spread, apart) > _DISAGREE:
-        distance, sigma = float(np.hypot(*apart)), float(np.sqrt(np.trace(spread) / 2.0))
-        return turned, (
-            f"marker and centre of rotation are {distance:.2f} px apart (uncertainty {sigma:.2f} px);"
-            " the centre of rotation is used"
-        )
-    information = np.linalg.inv(marker.covariance_px2) + np.linalg.inv(circle.centre_covariance_px2)
-    covariance = np.linalg.inv(information)
-    centre = marker.centre_px - marker.covariance_px2 @ np.linalg.solve(spread, apart)
-    return Pivot(centre, covariance, "marker and centre of rotation"), None
+    return RoundMarker(centre + [x0, y0], covariance, radius)
 
 
 def _gradients(image: Image) -> tuple[Floats, Floats]:

@@ -21,10 +21,12 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from anglecam.data.typing import Floats, Integers
 from anglecam.vision.registration.kernels import gain_equations, normal_equations, turn_equations
 
-STEP_PX = 0.5
+KNOT_SPACING_PX = 0.5
 """Between neighbouring knots: fine enough for an edge that only the pixels have blurred."""
-POWERS = 3
+GAIN_POWERS = 3
 """Of the angle in the gain."""
+HIDDEN_MISFIT = 3.0
+"""Times its usual mean square that a tile misfits in a frame where something hides it."""
 _SMOOTH = 1e-2
 """Weight of the spline's second differences against one observation: it only decides where there is none."""
 _RIDGE = 1e-6
@@ -32,7 +34,7 @@ _RIDGE = 1e-6
 
 
 @dataclass(frozen=True)
-class Views:
+class TileViews:
     """What is shown of tiles, pixel by pixel, in one view after another: a tile in one frame each."""
 
     offsets: Floats
@@ -42,18 +44,18 @@ class Views:
     starts: Integers
     """(views + 1,) where each view's pixels begin."""
 
-    def without(self, out: NDArray[np.bool_]) -> Views:
+    def without(self, out: NDArray[np.bool_]) -> TileViews:
         """Return these with those views (views,) emptied."""
         if not out.any():
             return self
         length = np.diff(self.starts)
         kept = np.repeat(~out, length)
         starts = np.append(0, np.cumsum(np.where(out, 0, length)))
-        return Views(self.offsets[kept], self.values[kept], starts)
+        return TileViews(self.offsets[kept], self.values[kept], starts)
 
 
 @dataclass(frozen=True)
-class Patches:
+class TileAppearance:
     """How tiles of one size look."""
 
     corners: Floats
@@ -69,9 +71,9 @@ class Patches:
         return len(self.corners)
 
 
-def joined(patches: Sequence[Patches]) -> Patches:
+def join_tiles(patches: Sequence[TileAppearance]) -> TileAppearance:
     """Put tiles of one size together."""
-    return Patches(
+    return TileAppearance(
         np.concatenate([p.corners for p in patches]),
         patches[0].side,
         np.concatenate([p.coefficients for p in patches]),
@@ -79,9 +81,9 @@ def joined(patches: Sequence[Patches]) -> Patches:
     )
 
 
-def learn_patch(
-    corner: Floats, side: int, views: Views, turns: Floats, pivot: Floats, gains: Floats | None = None
-) -> Patches:
+def learn_tile(
+    corner: Floats, side: int, views: TileViews, turns: Floats, pivot: Floats, gains: Floats | None = None
+) -> TileAppearance:
     """Fit one tile's look to what frames of known turn show of it.
 
     Parameters
@@ -104,8 +106,8 @@ def learn_patch(
     Patches
         A single one: coefficients for those gains, then gains for those coefficients.
     """
-    n = round(side / STEP_PX) + 3
-    start = np.zeros((POWERS, 3)) if gains is None else gains
+    n = round(side / KNOT_SPACING_PX) + 3
+    start = np.zeros((GAIN_POWERS, 3)) if gains is None else gains
     band, right = normal_equations(views.offsets, views.values, views.starts, turns, pivot, corner, side, n, start)
     lower = _as_lower_band(band, n) + _SMOOTH * _roughness(n)
     lower[0] += _RIDGE
@@ -114,12 +116,12 @@ def learn_patch(
     normal, gradient = gain_equations(
         views.offsets, views.values, views.starts, turns, pivot, corner, side, coefficients
     )
-    found = np.linalg.lstsq(normal, gradient, rcond=1e-9)[0].reshape(1, POWERS, 3)
-    return Patches(corner[None], side, coefficients[None], found)
+    found = np.linalg.lstsq(normal, gradient, rcond=1e-9)[0].reshape(1, GAIN_POWERS, 3)
+    return TileAppearance(corner[None], side, coefficients[None], found)
 
 
 @dataclass(frozen=True)
-class Fit:
+class TileFit:
     """What each view says about its turn: sums over its pixels."""
 
     normal: Floats
@@ -134,7 +136,7 @@ class Fit:
     """(views, planes, 3) what gain and offset of brightness, and variance of blur along the path (px²), the view has
     beyond the look's."""
 
-    def without(self, out: NDArray[np.bool_]) -> Fit:
+    def without(self, out: NDArray[np.bool_]) -> TileFit:
         """Return this with those views taken as if they had no pixels."""
         kept = ~out
         return replace(
@@ -151,7 +153,7 @@ class Fit:
         return self.normal / variance[(*whole, None)], self.gradient / variance[whole]
 
 
-def levelled(views: Views, light: Floats) -> Views:
+def equalise_brightness(views: TileViews, light: Floats) -> TileViews:
     """Take each view's own brightness out of it, less what all views have in common.
 
     Parameters
@@ -171,7 +173,7 @@ def levelled(views: Views, light: Floats) -> Views:
     return replace(views, values=((views.values - each[..., 1]) / (1.0 + each[..., 0])).astype(np.float32))
 
 
-def compare(patches: Patches, views: Views, turns: Floats, pivots: Floats) -> Fit:
+def compare_tiles(patches: TileAppearance, views: TileViews, turns: Floats, pivots: Floats) -> TileFit:
     """Hold looks against what frames show at assumed turns, for a step of Gauss and Newton.
 
     Each view's own brightness (a gain and an offset a colour) is fitted and taken out, and so is what motion during
@@ -194,7 +196,7 @@ def compare(patches: Patches, views: Views, turns: Floats, pivots: Floats) -> Fi
     Fit
         A row a view.
     """
-    return Fit(
+    return TileFit(
         *turn_equations(
             views.offsets,
             views.values,

@@ -16,11 +16,20 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
 from anglecam.vision.image.clusters import group_neighbours
-from anglecam.vision.image.transforms import turned
-from anglecam.vision.pivot.marker import Pivot
-from anglecam.vision.registration.appearance import Fit, Patches, Views, compare, joined, learn_patch, levelled
-from anglecam.vision.registration.fit import HIDDEN, Look, covered, scatter
-from anglecam.vision.registration.tiles import SIDE_PX, Glimpse, Plane, Tiles, look_at
+from anglecam.vision.image.transforms import rotation
+from anglecam.vision.pivot.estimate import PivotEstimate
+from anglecam.vision.registration.appearance import (
+    HIDDEN_MISFIT,
+    TileAppearance,
+    TileFit,
+    TileViews,
+    compare_tiles,
+    equalise_brightness,
+    join_tiles,
+    learn_tile,
+)
+from anglecam.vision.registration.tiles import TILE_SIDE_PX, FrameView, MotionPlane, Tiles, view_tiles
+from anglecam.vision.registration.turn import BodyAppearance, covered_views, group_scatter
 
 _GROUPS = 6
 _ROUNDS = 16
@@ -77,7 +86,7 @@ class _Task:
     """What stays the same from round to round."""
 
     tiles: Tiles
-    views: Sequence[Views]
+    views: Sequence[TileViews]
     start_px: Floats
     """(2,) the pivot to begin with."""
     parallax: Floats
@@ -87,7 +96,7 @@ class _Task:
         """Return the centre that each tile turns about, (tiles, 2) px."""
         return self.start_px + pose.error + pose.heights[:, None] * self.parallax
 
-    def seen(self, pose: _Pose) -> list[Views]:
+    def seen(self, pose: _Pose) -> list[TileViews]:
         """Return the views from those centres."""
         off = pose.error + (pose.heights - self.tiles.heights)[:, None] * self.parallax
         return [replace(v, offsets=v.offsets - shift) for v, shift in zip(self.views, off, strict=True)]
@@ -97,7 +106,7 @@ class _Task:
 class _Round:
     """One round's looks, and where they lead."""
 
-    patches: Sequence[Patches]
+    patches: Sequence[TileAppearance]
     hidden: NDArray[np.bool_]
     """(tiles, frames) views that something covers."""
     variance: Floats
@@ -105,11 +114,13 @@ class _Round:
     covariance: Floats
     """Of pivot and heights if the looks were known, in units of the pixels' noise."""
     pose: _Pose
-    fits: Fit
+    fits: TileFit
     """Of the looks, in the pose that they were learnt for."""
 
 
-def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot) -> Look:
+def learn_appearance(
+    glimpses: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot: PivotEstimate
+) -> BodyAppearance:
     """Learn how the tiles look, where the head turns, and what its turns are, all from the same frames.
 
     Parameters
@@ -132,12 +143,13 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
     lever = float(np.median(np.hypot(*(tiles.corners - start).T)))
     known = np.asarray(np.linalg.inv(pivot.covariance_px2), dtype=float)
     views = [
-        look_at(c[None], h[None], glimpses, plane, start)[0] for c, h in zip(tiles.corners, tiles.heights, strict=True)
+        view_tiles(c[None], h[None], glimpses, plane, start)[0]
+        for c, h in zip(tiles.corners, tiles.heights, strict=True)
     ]
     task = _Task(tiles, views, start, plane.lens.parallax, _Prior(known, 1.0 / (_DEPTH * lever) ** 2))
     pose = _Pose(np.zeros(2), tiles.heights, np.array([g.turn for g in glimpses]))
-    patches: Sequence[Patches] = [
-        learn_patch(c, SIDE_PX, v, pose.turns, o)
+    patches: Sequence[TileAppearance] = [
+        learn_tile(c, TILE_SIDE_PX, v, pose.turns, o)
         for c, v, o in zip(tiles.corners, views, task.centres(pose), strict=True)
     ]
     now = _round(task, pose, patches, None)
@@ -157,7 +169,7 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
     fits = _compare_all(now.patches, task.seen(pose), pose.turns, task.centres(pose)).without(now.hidden)
     normal, gradient = fits.weighted(now.variance)
     groups = group_neighbours(tiles.corners, _GROUPS)
-    total, freedom = scatter(normal, gradient, groups)
+    total, freedom = group_scatter(normal, gradient, groups)
     # two witnesses: groups that disagree about the turn, and a head that seems to leave its pivot, if that stands still
     witnesses = [total / max(freedom - len(pose.turns), 1)]
     if glimpses[0].wander_px2 is None:
@@ -166,8 +178,8 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
     scores = _centre_equations(normal, gradient, pose.turns, task.parallax).scores
     unlike = max(birge**2, _disagreement(now.covariance, scores, groups))
     told = normal[:, :, 0, 0].sum(axis=1)
-    return Look(
-        patches=joined(now.patches),
+    return BodyAppearance(
+        patches=join_tiles(now.patches),
         heights=pose.heights,
         plane=plane,
         pivot_px=start + pose.error,
@@ -175,24 +187,24 @@ def learn(glimpses: Sequence[Glimpse], tiles: Tiles, plane: Plane, pivot: Pivot)
         variance=now.variance,
         groups=groups,
         birge=birge,
-        yielding=_yielding(task, now),
-        middle_px=told @ (tiles.corners + SIDE_PX / 2) / told.sum(),
+        absorbed_share=_yielding(task, now),
+        middle_px=told @ (tiles.corners + TILE_SIDE_PX / 2) / told.sum(),
     )
 
 
 def _round(
     task: _Task,
     pose: _Pose,
-    patches: Sequence[Patches],
+    patches: Sequence[TileAppearance],
     hidden: NDArray[np.bool_] | None,
-    before: Fit | None = None,
+    before: TileFit | None = None,
 ) -> _Round:
     """Learn the looks for a pose, then the pose for those looks."""
     views, centres = task.seen(pose), task.centres(pose)
     before = _compare_all(patches, views, pose.turns, centres) if before is None else before
     out = _hidden(before) if hidden is None else hidden
     patches = [
-        learn_patch(p.corners[0], SIDE_PX, levelled(v, light).without(o), pose.turns, c, p.gains[0])
+        learn_tile(p.corners[0], TILE_SIDE_PX, equalise_brightness(v, light).without(o), pose.turns, c, p.gains[0])
         for p, v, c, light, o in zip(patches, views, centres, before.light, out, strict=True)
     ]
     whole = _compare_all(patches, views, pose.turns, centres)
@@ -202,8 +214,8 @@ def _round(
     equations = _centre_equations(*fits.weighted(variance), pose.turns, task.parallax)
     step, covariance = _centres_error(equations, task.prior, pose.error, pose.heights)
     raised = step[2:] if len(step) > 2 else np.zeros(len(pose.heights))
-    turned = (equations.turn_pull - equations.crossed @ step) / equations.by_turn
-    there = _Pose(pose.error + step[:2], pose.heights + raised, pose.turns + turned)
+    turn_steps = (equations.turn_pull - equations.crossed @ step) / equations.by_turn
+    there = _Pose(pose.error + step[:2], pose.heights + raised, pose.turns + turn_steps)
     return _Round(patches, out, variance, covariance, there, whole)
 
 
@@ -229,10 +241,12 @@ def _swallowed(task: _Task, now: _Round) -> float:
     return float(np.clip(left, 0.0, _LARGEST_SHARE))
 
 
-def _compare_all(patches: Sequence[Patches], views: Sequence[Views], turns: Floats, centres: Floats) -> Fit:
+def _compare_all(
+    patches: Sequence[TileAppearance], views: Sequence[TileViews], turns: Floats, centres: Floats
+) -> TileFit:
     """Compare every tile with every frame: rows are tiles, columns frames."""
-    fits = [compare(p, v, turns, c[None]) for p, v, c in zip(patches, views, centres, strict=True)]
-    return Fit(
+    fits = [compare_tiles(p, v, turns, c[None]) for p, v, c in zip(patches, views, centres, strict=True)]
+    return TileFit(
         np.stack([f.normal for f in fits]),
         np.stack([f.gradient for f in fits]),
         np.stack([f.squares for f in fits]),
@@ -241,14 +255,14 @@ def _compare_all(patches: Sequence[Patches], views: Sequence[Views], turns: Floa
     )
 
 
-def _hidden(fits: Fit) -> NDArray[np.bool_]:
+def _hidden(fits: TileFit) -> NDArray[np.bool_]:
     """Tell in which frames a tile is seen badly: what passes before it is not learnt."""
     mean_square = fits.squares / np.maximum(fits.count, 1)
     # a tile that is out of most pictures has no usual misfit; where it is seen, it is judged badly seen
     usual = np.maximum(np.median(mean_square, axis=1, keepdims=True), _NOTHING)
     # motion blur and the like spoil all tiles alike
     spoilt = np.maximum(np.median(mean_square / usual, axis=0, keepdims=True), 1.0)
-    return np.asarray((mean_square > HIDDEN * spoilt * usual) | covered(fits))
+    return np.asarray((mean_square > HIDDEN_MISFIT * spoilt * usual) | covered_views(fits))
 
 
 @dataclass(frozen=True)
@@ -273,7 +287,7 @@ def _centre_equations(normal: Floats, gradient: Floats, turns: Floats, parallax:
     A turned tile seems displaced by t = (1 − R)·(e + p·h). Every frame's turn is free: it is eliminated. Where there
     is no parallax, heights do not count.
     """
-    moved = np.eye(2) - turned(turns)
+    moved = np.eye(2) - rotation(turns)
     place = np.einsum("kai,tkab,kbj->tij", moved, normal[..., 1:, 1:], moved)
     cross = np.einsum("kai,tka->tki", moved, normal[..., 1:, 0])
     pull = np.einsum("kai,tka->ti", moved, gradient[..., 1:])

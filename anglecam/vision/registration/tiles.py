@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from anglecam.camera.lens import Lens
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.median import median_picture
-from anglecam.vision.image.transforms import turned
-from anglecam.vision.registration.appearance import Views
+from anglecam.vision.image.transforms import rotation
+from anglecam.vision.registration.appearance import TileViews
 
-SIDE_PX = 16
-MOST_TILES = 40
+TILE_SIDE_PX = 16
+_MAX_TILES = 40
 _LOOSE = 6.0
 """Robust standard deviations of the noise beyond which a place of the stack is not rigid, or not lit alike."""
 _LOOSE_SHARE = 0.1
@@ -35,7 +35,7 @@ _HEIGHT_STEP_PX = 1.0
 
 
 @dataclass(frozen=True)
-class Glimpse:
+class FrameView:
     """A frame, and where the coarse measurement has the head in it."""
 
     image: Image
@@ -52,7 +52,7 @@ class Glimpse:
 
 
 @dataclass(frozen=True, eq=False)
-class Plane:
+class MotionPlane:
     """The plane of motion as the pixels of one clip see it."""
 
     lens: Lens
@@ -72,15 +72,15 @@ class Tiles:
     """(tiles,) towards the camera, px; zero in a view that is not tilted."""
 
 
-def plane_of(lens: Lens, size: tuple[int, int]) -> Plane:
+def motion_plane(lens: Lens, size: tuple[int, int]) -> MotionPlane:
     """Lay a picture of (width, height) pixels into the plane of motion."""
     x, y = np.meshgrid(np.arange(size[0], dtype=float), np.arange(size[1], dtype=float))
     ground = np.ascontiguousarray(lens.rectify(np.stack([x, y], axis=-1)))
     steps = [np.hypot(*np.moveaxis(np.diff(ground, axis=axis), -1, 0)).min() for axis in (0, 1)]
-    return Plane(lens, ground, 1.0 / max(min(steps), 0.1))
+    return MotionPlane(lens, ground, 1.0 / max(min(steps), 0.1))
 
 
-def choose_tiles(glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats, noise: float) -> Tiles:
+def choose_tiles(glimpses: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats, noise: float) -> Tiles:
     """Find where the head is rigid and has edges.
 
     Parameters
@@ -115,14 +115,16 @@ def choose_tiles(glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats, no
     # the scenery does not turn: it is steadier as it is filmed
     as_filmed, turned_back = (_by_tile((part**2).sum(axis=2)).sum(axis=(1, 3)) for part in (unturned, spread))
     worth = np.where(rigid & (as_filmed > _STEADIER * turned_back), information.sum(axis=(1, 3)), 0.0)
-    best = [k for k in np.argsort(worth, axis=None)[::-1][:MOST_TILES] if worth.flat[k] > 0]
-    corners = SIDE_PX * np.array([[k % worth.shape[1], k // worth.shape[1]] for k in best], dtype=float).reshape(-1, 2)
+    best = [k for k in np.argsort(worth, axis=None)[::-1][:_MAX_TILES] if worth.flat[k] > 0]
+    corners = TILE_SIDE_PX * np.array([[k % worth.shape[1], k // worth.shape[1]] for k in best], dtype=float).reshape(
+        -1, 2
+    )
     return Tiles(corners, heights.ravel()[best])
 
 
-def look_at(
-    corners: Floats, heights: Floats, glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats
-) -> tuple[Views, Floats]:
+def view_tiles(
+    corners: Floats, heights: Floats, glimpses: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats
+) -> tuple[TileViews, Floats]:
     """Collect what frames show of tiles, and a little around them.
 
     Parameters
@@ -147,10 +149,10 @@ def look_at(
     """
     offsets, values, starts, centres = [], [], [0], []
     beside = heights[:, None] * plane.lens.parallax
-    reach = (0.71 * SIDE_PX + 1.5) * plane.stretch
+    reach = (0.71 * TILE_SIDE_PX + 1.5) * plane.stretch
     for g in glimpses:
-        arm = corners + SIDE_PX / 2 - pivot_px - beside
-        middle = plane.lens.distort(arm @ turned(g.turn) + g.pivot_px + beside)
+        arm = corners + TILE_SIDE_PX / 2 - pivot_px - beside
+        middle = plane.lens.distort(arm @ rotation(g.turn) + g.pivot_px + beside)
         if g.turn_per_row:
             early = g.turn_per_row * (middle[:, 1] - g.row)
             middle = plane.lens.distort(_each_turned(arm, g.turn + early) + g.pivot_px + beside)
@@ -165,14 +167,14 @@ def look_at(
                 g.turn_per_row,
                 g.row,
                 one,
-                SIDE_PX,
+                TILE_SIDE_PX,
                 pivot_px + to_side,
             )
             offsets.append(offset)
             values.append(value)
             starts.append(starts[-1] + len(offset))
         centres.append(middle)
-    return Views(np.concatenate(offsets), np.concatenate(values), np.array(starts)), np.concatenate(centres)
+    return TileViews(np.concatenate(offsets), np.concatenate(values), np.array(starts)), np.concatenate(centres)
 
 
 def _each_turned(arms: Floats, turns: Floats) -> Floats:
@@ -181,19 +183,22 @@ def _each_turned(arms: Floats, turns: Floats) -> Floats:
     return np.column_stack([c * arms[:, 0] + s * arms[:, 1], -s * arms[:, 0] + c * arms[:, 1]])
 
 
-def _find_heights(glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats) -> Floats:
+def _find_heights(glimpses: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats) -> Floats:
     """Find the height at which each tile of the picture is steadiest when frames are turned back, px."""
     height, width = glimpses[0].image.shape[:2]
     slope = float(np.hypot(*plane.lens.parallax))
     if slope == 0.0:
-        return np.zeros((height // SIDE_PX, width // SIDE_PX))
+        return np.zeros((height // TILE_SIDE_PX, width // TILE_SIDE_PX))
     grey = [replace(g, image=g.image.mean(axis=2, keepdims=True).astype(np.uint8)) for g in glimpses[::2]]
     swing = max(float(np.ptp([g.turn for g in glimpses])) / 2.0, 1e-3)
     tallest = _TALLEST * float(np.hypot(*(np.array([width, height]) / 2.0)))
     steps = int(np.clip(tallest * slope * swing / _HEIGHT_STEP_PX, 1, 10))
     heights = np.linspace(-tallest, tallest, 2 * steps + 1)
     restless = np.stack(
-        [_by_tile(_stack(grey, plane, pivot_px, z, 2)[1][..., 0] ** 2, SIDE_PX // 2).mean(axis=(1, 3)) for z in heights]
+        [
+            _by_tile(_stack(grey, plane, pivot_px, z, 2)[1][..., 0] ** 2, TILE_SIDE_PX // 2).mean(axis=(1, 3))
+            for z in heights
+        ]
     )
     # the vertex of the parabola through the steadiest height and its neighbours
     at = np.clip(restless.argmin(axis=0), 1, len(heights) - 2)
@@ -203,7 +208,7 @@ def _find_heights(glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats) -
 
 
 def _stack(
-    glimpses: Sequence[Glimpse], plane: Plane, pivot_px: Floats, heights: float | Floats, step: int = 1
+    glimpses: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats, heights: float | Floats, step: int = 1
 ) -> tuple[Image, Image, NDArray[np.bool_]]:
     """Turn frames back as what stands at a height turns, or each pixel at its own; return middle, spread, what all saw.
 
@@ -215,7 +220,7 @@ def _stack(
     arms = np.stack([x, y], axis=-1).reshape(-1, 2) - pivot_px - beside
     pile, whole = [], np.ones(x.shape, bool)
     for g in glimpses:
-        there = plane.lens.distort(arms @ turned(g.turn) + g.pivot_px + beside)
+        there = plane.lens.distort(arms @ rotation(g.turn) + g.pivot_px + beside)
         if g.turn_per_row:
             early = g.turn_per_row * (there[:, 1] - g.row)
             there = plane.lens.distort(_each_turned(arms, g.turn + early) + g.pivot_px + beside)
@@ -230,7 +235,7 @@ def _by_pixel(heights: Floats, shape: tuple[int, int]) -> float | Floats:
     """Give every pixel its tile's height."""
     if not heights.any():
         return 0.0
-    rows, columns = (np.minimum(np.arange(n) // SIDE_PX, m - 1) for n, m in zip(shape, heights.shape, strict=True))
+    rows, columns = (np.minimum(np.arange(n) // TILE_SIDE_PX, m - 1) for n, m in zip(shape, heights.shape, strict=True))
     return heights[np.ix_(rows, columns)]
 
 
@@ -240,7 +245,7 @@ def _middle_and_spread(pile: Image) -> tuple[Image, Image]:
     return middle, spread
 
 
-def _by_tile(part: Image, side: int = SIDE_PX) -> Image:
+def _by_tile(part: Image, side: int = TILE_SIDE_PX) -> Image:
     rows, columns = part.shape[0] // side, part.shape[1] // side
     return part[: rows * side, : columns * side].reshape(rows, side, columns, side)
 

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.clusters import group_neighbours
-from anglecam.vision.image.transforms import fit_rigid, inverse, moved, turn_of
-from anglecam.vision.rigid_body.bodies import FEWEST, LEAST_TURN, find_body
+from anglecam.vision.image.transforms import apply_motion, fit_rigid, inverse_motion, turn_of
+from anglecam.vision.rigid_body.feature_matching import MIN_POINTS, MIN_TURN, fit_body_motion
 
-GROUPS = 8
+POINT_GROUPS = 8
 """Of points that lie together."""
 _KEY_EVERY = np.radians(8.0)
 _MOST_KEYS = 15
@@ -48,7 +48,7 @@ _FLOOR_PX = 0.02
 
 
 @dataclass(frozen=True)
-class Key:
+class Keyframe:
     """A frame that others are held against."""
 
     pose: Floats
@@ -64,7 +64,7 @@ class Key:
 
 
 @dataclass(frozen=True)
-class Seen:
+class KeyframeMatch:
     """The head in one frame, held against a key."""
 
     motion: Floats
@@ -77,7 +77,7 @@ class Seen:
     """By how much more groups of points scatter in turn than single points would let them; about 1 if independent."""
 
 
-def hold_against(key: Key, grey: Image, guess: Floats) -> Seen | None:
+def match_keyframe(key: Keyframe, grey: Image, guess: Floats) -> KeyframeMatch | None:
     """Find the motion from key to frame: turn the frame back by the guess, and follow what is still off.
 
     Parameters
@@ -94,7 +94,7 @@ def hold_against(key: Key, grey: Image, guess: Floats) -> Seen | None:
     Seen or None
         ``None`` where too few points move as one body.
     """
-    if len(key.points) < FEWEST:
+    if len(key.points) < MIN_POINTS:
         return None
     at = (key.points - key.corner).astype(np.float32)
     seen = None
@@ -106,24 +106,24 @@ def hold_against(key: Key, grey: Image, guess: Floats) -> Seen | None:
         )
         there, forth = _follow(key.image, straight, at)
         back, home = _follow(straight, key.image, there)
-        found = moved(from_part, there.astype(float))
+        found = apply_motion(from_part, there.astype(float))
         height, width = grey.shape
         inside = ((found >= 0) & (found <= [width - 1, height - 1])).all(axis=1)
         followed = forth & home & inside & (np.hypot(*(back - at).T) < _RETURN_PX)
-        body = find_body(key.points[followed], found[followed], _FINE_PX)
+        body = fit_body_motion(key.points[followed], found[followed], _FINE_PX)
         if body is None:
             return None
         motion, among = body
         inlier = np.zeros(len(key.points), bool)
         inlier[np.flatnonzero(followed)[among]] = True
-        seen = Seen(motion, inlier, *_scatter(motion, key.points[inlier], found[inlier], key.group[inlier]))
-        if abs(turn_of(motion @ inverse(guess))) < _AGAIN:
+        seen = KeyframeMatch(motion, inlier, *_scatter(motion, key.points[inlier], found[inlier], key.group[inlier]))
+        if abs(turn_of(motion @ inverse_motion(guess))) < _AGAIN:
             break
         guess = motion
     return seen
 
 
-def choose_keys(images: Sequence[Image], poses: dict[int, Floats], head: Floats) -> tuple[list[Key], float]:
+def choose_keyframes(images: Sequence[Image], poses: dict[int, Floats], head: Floats) -> tuple[list[Keyframe], float]:
     """Keep sharp frames at turns that differ, with the corners that move with the head in other samples.
 
     Parameters
@@ -143,11 +143,11 @@ def choose_keys(images: Sequence[Image], poses: dict[int, Floats], head: Floats)
         Standard deviation of one key's word on the turn of another, rad.
     """
     turns = {i: turn_of(pose) for i, pose in poses.items()}
-    hulls = {i: _hull(images[i], moved(pose, head)) for i, pose in poses.items()}
+    hulls = {i: _hull(images[i], apply_motion(pose, head)) for i, pose in poses.items()}
     sharp = {i: _sharpness(images[i], hulls[i]) for i in poses}
     enough = _SHARP_SHARE * max(sharp.values())
-    apart = max(LEAST_TURN, np.ptp(list(turns.values())) / 6)
-    keys: dict[int, Key] = {}
+    apart = max(MIN_TURN, np.ptp(list(turns.values())) / 6)
+    keys: dict[int, Keyframe] = {}
     for i in sorted(poses, key=lambda i: -sharp[i]):
         gap = _KEY_EVERY if sharp[i] >= enough else _BLURRED_KEY_EVERY
         if len(keys) == _MOST_KEYS or any(abs(turns[i] - turns[k]) < gap for k in keys):
@@ -156,12 +156,12 @@ def choose_keys(images: Sequence[Image], poses: dict[int, Floats], head: Floats)
         witnesses = sorted((k for k in turns if abs(turns[k] - turns[i]) >= apart), key=lambda k: turns[k])
         votes, asked = np.zeros(len(key.points)), 0
         for k in witnesses[:: max(1, len(witnesses) // _WITNESSES)]:
-            seen = hold_against(key, images[k], poses[k] @ inverse(poses[i]))
+            seen = match_keyframe(key, images[k], poses[k] @ inverse_motion(poses[i]))
             if seen is not None:
                 votes, asked = votes + seen.inlier, asked + 1
         kept = votes > 0.5 * asked
-        if kept.sum() >= FEWEST:
-            keys[i] = replace(key, points=key.points[kept], group=group_neighbours(key.points[kept], GROUPS))
+        if kept.sum() >= MIN_POINTS:
+            keys[i] = replace(key, points=key.points[kept], group=group_neighbours(key.points[kept], POINT_GROUPS))
     return _hold_together(list(keys.values()), [images[i] for i in keys])
 
 
@@ -175,7 +175,7 @@ def _sharpness(image: Image, hull: Image) -> float:
     return float(cv2.Laplacian(cv2.GaussianBlur(image, (0, 0), 1.5), cv2.CV_32F)[hull > 0].std())
 
 
-def _hold_together(keys: list[Key], images: Sequence[Image]) -> tuple[list[Key], float]:
+def _hold_together(keys: list[Keyframe], images: Sequence[Image]) -> tuple[list[Keyframe], float]:
     """Measure every key against every other, and give it the mean of what they say of its pose.
 
     Returns
@@ -188,31 +188,31 @@ def _hold_together(keys: list[Key], images: Sequence[Image]) -> tuple[list[Key],
     pairs: dict[tuple[int, int], Floats] = {}
     for i, key in enumerate(keys):
         for j, other in enumerate(keys):
-            seen = None if i == j else hold_against(key, images[j], other.pose @ inverse(key.pose))
+            seen = None if i == j else match_keyframe(key, images[j], other.pose @ inverse_motion(key.pose))
             if seen is not None:
                 pairs[i, j] = seen.motion
     poses, said = [key.pose for key in keys], np.zeros(0)
     for _ in range(_ROUNDS if pairs else 0):
-        off = {(i, j): motion @ poses[i] @ inverse(poses[j]) for (i, j), motion in pairs.items()}
+        off = {(i, j): motion @ poses[i] @ inverse_motion(poses[j]) for (i, j), motion in pairs.items()}
         said = np.array([turn_of(o) for o in off.values()])
         for j in range(1, len(keys)):
             about = keys[j].points
-            votes = [moved(o, about) for (_, of), o in off.items() if of == j]
+            votes = [apply_motion(o, about) for (_, of), o in off.items() if of == j]
             if votes:
                 poses[j] = fit_rigid(about, np.mean([about, *votes], axis=0)) @ poses[j]
     spread = float(np.sqrt(np.mean(said**2))) if len(said) else 0.0
     return [replace(key, pose=pose) for key, pose in zip(keys, poses, strict=True)], spread
 
 
-def _key(image: Image, pose: Floats, hull: Image) -> Key:
+def _key(image: Image, pose: Floats, hull: Image) -> Keyframe:
     corners = cv2.goodFeaturesToTrack(image, _CORNERS, _CORNER_SHARE, _APART_PX, mask=hull, blockSize=5)
     points = np.zeros((0, 2)) if corners is None else np.array(corners, dtype=float)[:, 0]
     if not len(points):
-        return Key(pose, np.zeros(2), image[:0], points, np.zeros(0, np.intp))
+        return Keyframe(pose, np.zeros(2), image[:0], points, np.zeros(0, np.intp))
     low = np.maximum(np.floor(points.min(axis=0)).astype(int) - _MARGIN_PX, 0)
     high = np.minimum(np.ceil(points.max(axis=0)).astype(int) + _MARGIN_PX, image.shape[::-1])
     part = np.ascontiguousarray(image[low[1] : high[1], low[0] : high[0]])
-    return Key(pose, low.astype(float), part, points, group_neighbours(points, GROUPS))
+    return Keyframe(pose, low.astype(float), part, points, group_neighbours(points, POINT_GROUPS))
 
 
 def _follow(here: Image, there: Image, points: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
@@ -225,7 +225,7 @@ def _follow(here: Image, there: Image, points: NDArray[np.float32]) -> tuple[NDA
 
 def _scatter(motion: Floats, start: Floats, end: Floats, group: NDArray[np.intp]) -> tuple[float, float]:
     """Return the variance of a point's place, and how much more than that groups of neighbours scatter in turn."""
-    off = end - moved(motion, start)
+    off = end - apply_motion(motion, start)
     variance = max(float((off**2).sum() / (2 * len(off) - 3)), _FLOOR_PX**2)
     arm = end - end.mean(axis=0)
     pull = off[:, 0] * arm[:, 1] - off[:, 1] * arm[:, 0]

@@ -18,16 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
-from anglecam.vision.image.transforms import turned
-from anglecam.vision.registration.appearance import Patches, Views, compare
-from anglecam.vision.stabilise.scenery import Scenery, locate
-from anglecam.vision.stabilise.windows import SIDE_PX, carried, follow, level
+from anglecam.vision.image.transforms import rotation
+from anglecam.vision.registration.appearance import HIDDEN_MISFIT, TileAppearance, TileViews, compare_tiles
+from anglecam.vision.stabilise.scenery import Scenery, scenery_motion
+from anglecam.vision.stabilise.windows import WINDOW_SIDE_PX, displacements, follow_windows, subtract_local_mean
 
 _STEPS = 4
 """Of Gauss and Newton, at most; from a few hundredths of a pixel one is nearly enough."""
 _SETTLED_PX = 5e-3
-HIDDEN = 3.0
-"""Times its usual mean square that a tile misfits where something hides it."""
 _LEAST = 0.3
 """Of what the tiles tell in any direction, to be seen in a frame."""
 _GAIN = 0.4
@@ -36,8 +34,8 @@ _SPOILT = 4.0
 """Times its usual mean square that all tiles may misfit in a frame."""
 _COPY = 0.13
 """What a codec's copies hide of a motion, as a share of that whose change of the picture equals the tiles' misfit (see
-`anglecam.vision.registration.fit`); all tiles alike, so that they cannot tell."""
-MARGIN_PX = 2
+`anglecam.vision.registration.turn`); all tiles alike, so that they cannot tell."""
+TILE_MARGIN_PX = 2
 """About a tile, so that a rolled one is seen whole."""
 
 
@@ -61,11 +59,11 @@ class CameraMove:
 
     def to_frame(self, points_px: Floats) -> Floats:
         """Carry points (…, 2) of the reference into the frame."""
-        return np.asarray((points_px - self.origin_px) @ turned(self.roll) + self.origin_px + self.shift_px)
+        return np.asarray((points_px - self.origin_px) @ rotation(self.roll) + self.origin_px + self.shift_px)
 
     def to_reference(self, points_px: Floats) -> Floats:
         """Carry points (…, 2) of the frame into the reference."""
-        return np.asarray((points_px - self.origin_px - self.shift_px) @ turned(-self.roll) + self.origin_px)
+        return np.asarray((points_px - self.origin_px - self.shift_px) @ rotation(-self.roll) + self.origin_px)
 
     def place_covariance(self, point_px: Floats) -> Floats:
         """Give the covariance (2, 2) of where the frame shows a point (2,) of the reference, px²."""
@@ -74,7 +72,7 @@ class CameraMove:
         return np.asarray(J @ self.covariance @ J.T)
 
 
-LOST = CameraMove(np.zeros(2), np.full(2, np.nan), float("nan"), np.full((3, 3), np.nan))
+UNKNOWN_MOVE = CameraMove(np.zeros(2), np.full(2, np.nan), float("nan"), np.full((3, 3), np.nan))
 """Of a frame that shows nothing."""
 
 
@@ -86,7 +84,7 @@ class BackgroundMotion:
     """(h, w) the first frame, levelled."""
     scenery: Scenery
     """Only its best tiles."""
-    patches: Patches
+    patches: TileAppearance
     """How they look."""
     variance: Floats
     """(tiles,) mean square of what each leaves over, grey levels squared."""
@@ -112,16 +110,18 @@ class BackgroundMotion:
             Unknown, its values NaN, where too little of the scenery is to be seen.
         """
         picture, origin = brightness(image), self.scenery.origin_px
-        shift, roll = locate(self.scenery, follow(self.picture, level(picture), self.scenery.centres_px))
+        shift, roll = scenery_motion(
+            self.scenery, follow_windows(self.picture, subtract_local_mean(picture), self.scenery.centres_px)
+        )
         if not np.isfinite(roll):
             return _lost(origin)
         roll = roll if self.rolls else 0.0
-        cuts = cut([picture], self.scenery, shift[None], np.array([roll]))
+        cuts = cut_tiles([picture], self.scenery, shift[None], np.array([roll]))
         rolls, origins = np.empty(len(self.patches)), np.broadcast_to(origin, (len(self.patches), 2))
         for _ in range(_STEPS):
             rolls[:] = roll
-            views = views_of(cuts.pixels[0] - origin - shift, cuts.values[0])
-            fit = compare(self.patches, views, rolls, origins)
+            views = as_views(cuts.pixels[0] - origin - shift, cuts.values[0])
+            fit = compare_tiles(self.patches, views, rolls, origins)
             # the edge of something else may fit in shape, not in strength
             seen = cuts.whole[0] & (fit.count > 0) & (np.abs(fit.light[:, 0, 0]) < _GAIN)
             if not seen.any():
@@ -129,21 +129,21 @@ class BackgroundMotion:
             misfit = fit.squares / np.maximum(fit.count, 1) / self.variance
             # motion blur spoils all tiles alike, a passer-by only some
             usual = float(np.clip(np.median(misfit[seen]), 1.0, _SPOILT))
-            seen &= misfit < HIDDEN * usual
+            seen &= misfit < HIDDEN_MISFIT * usual
             normals, gradients = fit.weighted(self.variance * usual)
             normal = normals[seen].sum(axis=0)
             if np.linalg.eigvals(np.linalg.solve(normals.sum(axis=0)[1:, 1:], normal[1:, 1:])).min() < _LEAST:
                 return _lost(origin)
-            step, covariance = solve(normal, gradients[seen].sum(axis=0), self.rolls)
-            shift, roll = shift - step[1:] @ turned(roll), roll + float(step[0])
+            step, covariance = solve_motion(normal, gradients[seen].sum(axis=0), self.rolls)
+            shift, roll = shift - step[1:] @ rotation(roll), roll + float(step[0])
             if np.abs(step[1:]).max() < _SETTLED_PX:
                 break
         hidden = _COPY**2 * float(fit.count[seen].sum()) if predicted else 0.0
         lower = np.zeros((3, 3))
-        free = free_of(self.rolls)
+        free = free_parameters(self.rolls)
         lower[free, free] = np.linalg.cholesky(covariance[free, free])
         turn = np.eye(3)
-        turn[1:, 1:] = turned(roll)
+        turn[1:, 1:] = rotation(roll)
         covariance = turn.T @ lower @ (self.unlike + hidden * np.eye(3)) @ lower.T @ turn
         last = [1, 2, 0]
         return CameraMove(origin, shift, roll, covariance[np.ix_(last, last)])
@@ -160,7 +160,7 @@ def brightness(image: Image) -> Image:
 
 
 @dataclass(frozen=True)
-class Cuts:
+class TileCuts:
     """What frames show of the tiles, and a little around them."""
 
     pixels: Floats
@@ -171,12 +171,12 @@ class Cuts:
     """(frames, tiles) whether all of it is in the picture."""
 
 
-def free_of(rolling: bool) -> slice:
+def free_parameters(rolling: bool) -> slice:
     """Say which of roll, x and y are looked for."""
     return slice(0 if rolling else 1, 3)
 
 
-def solve(normal: Floats, gradient: Floats, rolling: bool) -> tuple[Floats, Floats]:
+def solve_motion(normal: Floats, gradient: Floats, rolling: bool) -> tuple[Floats, Floats]:
     """Solve for roll, x and y of the tiles' places, or for x and y alone.
 
     Parameters
@@ -191,14 +191,14 @@ def solve(normal: Floats, gradient: Floats, rolling: bool) -> tuple[Floats, Floa
     tuple of ndarray
         Step (3,), rad and px, and its covariance (3, 3); zero in what is not looked for.
     """
-    free = free_of(rolling)
+    free = free_parameters(rolling)
     step, covariance = np.zeros(3), np.zeros((3, 3))
     covariance[free, free] = np.linalg.inv(normal[free, free])
     step[free] = covariance[free, free] @ gradient[free]
     return step, covariance
 
 
-def cut(pictures: Sequence[Image], scenery: Scenery, shifts: Floats, rolls: Floats) -> Cuts:
+def cut_tiles(pictures: Sequence[Image], scenery: Scenery, shifts: Floats, rolls: Floats) -> TileCuts:
     """Cut squares out of the frames, each by whole pixels about where its tile is.
 
     Parameters
@@ -210,20 +210,20 @@ def cut(pictures: Sequence[Image], scenery: Scenery, shifts: Floats, rolls: Floa
     shifts, rolls : ndarray
         (frames, 2) px and (frames,) rad, as far as they are known.
     """
-    side = SIDE_PX + 2 * MARGIN_PX
+    side = WINDOW_SIDE_PX + 2 * TILE_MARGIN_PX
     y, x = np.mgrid[0:side, 0:side].reshape(2, -1)
     height, width = pictures[0].shape
     arms = scenery.centres_px - scenery.origin_px
-    middles = scenery.centres_px + carried(arms, shifts, rolls).swapaxes(0, 1)
+    middles = scenery.centres_px + displacements(arms, shifts, rolls).swapaxes(0, 1)
     corners = np.round(middles - (side - 1) / 2.0).astype(int)
     whole = np.all((corners >= 0) & (corners <= [width - side, height - side]), axis=-1)
     corners = np.clip(corners, 0, [width - side, height - side])
     pixels = corners[:, :, None] + np.stack([x, y], axis=-1)
     values = np.stack([p[at[..., 1], at[..., 0]] for p, at in zip(pictures, pixels, strict=True)])
-    return Cuts(pixels.astype(float), values.astype(np.float32), whole)
+    return TileCuts(pixels.astype(float), values.astype(np.float32), whole)
 
 
-def views_of(offsets: Floats, values: NDArray[np.float32]) -> Views:
+def as_views(offsets: Floats, values: NDArray[np.float32]) -> TileViews:
     """Put views (n, m, 2) and their values (n, m), all of equally many pixels, one after another."""
     count, each = values.shape
-    return Views(offsets.reshape(-1, 2), values.reshape(-1, 1), np.arange(count + 1) * each)
+    return TileViews(offsets.reshape(-1, 2), values.reshape(-1, 1), np.arange(count + 1) * each)

@@ -15,21 +15,28 @@ from scipy.ndimage import convolve1d
 from threadpoolctl import threadpool_limits
 
 from anglecam.data.typing import Floats, Image
-from anglecam.vision.image.transforms import turned
-from anglecam.vision.registration.appearance import STEP_PX, Patches, compare, joined, learn_patch, levelled
+from anglecam.vision.image.transforms import rotation
+from anglecam.vision.registration.appearance import (
+    HIDDEN_MISFIT,
+    KNOT_SPACING_PX,
+    TileAppearance,
+    compare_tiles,
+    equalise_brightness,
+    join_tiles,
+    learn_tile,
+)
 from anglecam.vision.stabilise.background_motion import (
-    HIDDEN,
-    MARGIN_PX,
+    TILE_MARGIN_PX,
     BackgroundMotion,
-    Cuts,
+    TileCuts,
+    as_views,
     brightness,
-    cut,
-    free_of,
-    solve,
-    views_of,
+    cut_tiles,
+    free_parameters,
+    solve_motion,
 )
 from anglecam.vision.stabilise.scenery import Scenery, find_scenery
-from anglecam.vision.stabilise.windows import SIDE_PX, level
+from anglecam.vision.stabilise.windows import WINDOW_SIDE_PX, subtract_local_mean
 
 _FEWEST = 8
 """Frames to learn from."""
@@ -47,23 +54,6 @@ _PART_PX = 64
 """Of the picture, whose tiles are heard together about how much they disagree with others."""
 _ROLLS = 9.0
 """Mean square of the rolls in the frames learnt from, in units of their variance, from which on the camera rolls."""
-
-
-def shakes(images: Sequence[Image]) -> bool:
-    """Tell from frames spread over a clip whether its camera shakes.
-
-    Parameters
-    ----------
-    images : sequence of ndarray
-        (h, w, 3) blue, green, red.
-
-    Returns
-    -------
-    bool
-        In doubt not.
-    """
-    scenery = find_scenery([brightness(image) for image in images])
-    return scenery is not None and scenery.shakes
 
 
 def learn_background(images: Sequence[Image]) -> BackgroundMotion | None:
@@ -92,7 +82,7 @@ def learn_background(images: Sequence[Image]) -> BackgroundMotion | None:
 
 @dataclass(frozen=True)
 class _Learnt:
-    patches: Patches
+    patches: TileAppearance
     variance: Floats
     shifts_px: Floats
     rolls: Floats
@@ -108,21 +98,23 @@ def _learn(scenery: Scenery, pictures: Sequence[Image], shifts: Floats, rolls: F
     )
     if len(tiles.centres_px) < _FEWEST_TILES:
         return None
-    cuts = cut(pictures, tiles, shifts, rolls)
+    cuts = cut_tiles(pictures, tiles, shifts, rolls)
     learnt = _in_turn(cuts, tiles, shifts, rolls, rounds=_BLURRED_ROUNDS, sharp=0, rolling=True)
     by_roll = 1.0 / np.linalg.inv(learnt.normal)[:, 0, 0]
     rolling = bool(np.var(learnt.rolls) * by_roll.mean() > _ROLLS * learnt.unlike[0, 0])
     tiles = _part_of(tiles, np.flatnonzero(learnt.variance < _RESTLESS * np.median(learnt.variance)))
     shifts, rolls = learnt.shifts_px, learnt.rolls if rolling else 0.0 * rolls
-    cuts = cut(pictures, tiles, shifts, rolls)
+    cuts = cut_tiles(pictures, tiles, shifts, rolls)
     rounds = _BLURRED_ROUNDS + _SHARP_ROUNDS
     learnt = _in_turn(cuts, tiles, shifts, rolls, rounds=rounds, sharp=_SHARP_ROUNDS, rolling=rolling)
-    return BackgroundMotion(level(pictures[0]), tiles, learnt.patches, learnt.variance, rolling, learnt.unlike)
+    return BackgroundMotion(
+        subtract_local_mean(pictures[0]), tiles, learnt.patches, learnt.variance, rolling, learnt.unlike
+    )
 
 
 def _most_telling(scenery: Scenery, size: tuple[int, ...], reach_px: Floats) -> NDArray[np.intp]:
     """Choose the windows, mostly whole in the picture, that together tell most, in the worst direction too."""
-    border = SIDE_PX / 2.0 + MARGIN_PX + reach_px
+    border = WINDOW_SIDE_PX / 2.0 + TILE_MARGIN_PX + reach_px
     inside = np.all((scenery.centres_px >= border) & (scenery.centres_px <= size - border), axis=1)
     tensor = np.einsum("n,n,nab->nab", inside, scenery.information, scenery.metric)
     total, chosen = 1e-3 * tensor.sum(axis=0) + 1e-9 * np.eye(2), []
@@ -145,44 +137,44 @@ def _part_of(scenery: Scenery, some: NDArray[np.intp]) -> Scenery:
 
 
 def _in_turn(
-    cuts: Cuts, scenery: Scenery, shifts: Floats, rolls: Floats, *, rounds: int, sharp: int, rolling: bool
+    cuts: TileCuts, scenery: Scenery, shifts: Floats, rolls: Floats, *, rounds: int, sharp: int, rolling: bool
 ) -> _Learnt:
     """Learn looks and motions in turn."""
-    origin, corners = scenery.origin_px, scenery.centres_px - SIDE_PX / 2.0
+    origin, corners = scenery.origin_px, scenery.centres_px - WINDOW_SIDE_PX / 2.0
     clear = cuts.whole.copy()
     # of the frames' own noise the looks have learnt this share by heart
-    spent = 1.0 / (STEP_PX**2 * len(shifts))
+    spent = 1.0 / (KNOT_SPACING_PX**2 * len(shifts))
     light: list[Floats | None] = [None] * len(corners)
-    patches: list[Patches] = []
+    patches: list[TileAppearance] = []
     for left in reversed(range(rounds)):
         offsets = cuts.pixels - (origin + shifts)[:, None, None]
         patches, fits = [], []
         for t, corner in enumerate(corners):
             own = light[t]
-            views = views_of(offsets[clear[:, t], t], cuts.values[clear[:, t], t])
-            views = views if own is None else levelled(views, own[clear[:, t]])
-            look = learn_patch(corner, SIDE_PX, views, rolls[clear[:, t]], origin)
+            views = as_views(offsets[clear[:, t], t], cuts.values[clear[:, t], t])
+            views = views if own is None else equalise_brightness(views, own[clear[:, t]])
+            look = learn_tile(corner, WINDOW_SIDE_PX, views, rolls[clear[:, t]], origin)
             # light does not fall otherwise on scenery
             look = replace(look, gains=0.0 * look.gains)
             if left >= sharp:
                 look = replace(look, coefficients=_blurred(look.coefficients))
             patches.append(look)
-            fits.append(compare(look, views_of(offsets[:, t], cuts.values[:, t]), rolls, origin[None]))
+            fits.append(compare_tiles(look, as_views(offsets[:, t], cuts.values[:, t]), rolls, origin[None]))
             light[t] = fits[-1].light
         mean_square = np.stack([f.squares / np.maximum(f.count, 1) for f in fits])
         usual = np.median(mean_square, axis=1)
-        clear = cuts.whole & (mean_square < HIDDEN * usual[:, None]).T
+        clear = cuts.whole & (mean_square < HIDDEN_MISFIT * usual[:, None]).T
         variance = np.array([m[ok].mean() for m, ok in zip(mean_square, clear.T, strict=True)]) / (1.0 - spent)
         weight = clear.T / variance[:, None]
         normals = np.stack([f.normal for f in fits]) * weight[..., None, None]
         gradients = np.stack([f.gradient for f in fits]) * weight[..., None]
         if left:
             together = zip(normals.sum(axis=0), gradients.sum(axis=0), strict=True)
-            steps = np.array([solve(*one, rolling)[0] for one in together])
-            shifts = shifts - np.array([s[1:] @ turned(roll) for s, roll in zip(steps, rolls, strict=True)])
+            steps = np.array([solve_motion(*one, rolling)[0] for one in together])
+            shifts = shifts - np.array([s[1:] @ rotation(roll) for s, roll in zip(steps, rolls, strict=True)])
             rolls = rolls + steps[:, 0]
     return _Learnt(
-        joined(patches),
+        join_tiles(patches),
         variance,
         shifts,
         rolls,
@@ -202,10 +194,10 @@ def _disagreement(normals: Floats, gradients: Floats, places: Floats, rolling: b
     """
     _, part = np.unique((places // _PART_PX).astype(int), axis=0, return_inverse=True)
     member = (part[:, None] == np.arange(part.max() + 1)).astype(float)
-    free = free_of(rolling)
+    free = free_parameters(rolling)
     ratios = []
     for normal, gradient in zip(normals.swapaxes(0, 1), gradients.swapaxes(0, 1), strict=True):
-        step, covariance = solve(normal.sum(axis=0), gradient.sum(axis=0), rolling)
+        step, covariance = solve_motion(normal.sum(axis=0), gradient.sum(axis=0), rolling)
         lower = np.linalg.cholesky(covariance[free, free])
         said = (member.T @ (gradient - normal @ step))[:, free] @ lower
         seen = np.count_nonzero(said.any(axis=1))

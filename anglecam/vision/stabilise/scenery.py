@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.stabilise.windows import (
-    GATE_PX,
-    carried,
+    TOLERANCE_PX,
+    displacements,
+    edge_metric,
     find_windows,
     fit_motion,
-    follow,
-    level,
-    metric_of,
-    squared_gates,
+    follow_windows,
+    squared_deviations,
+    subtract_local_mean,
 )
 
 _FAR = 9.0
@@ -87,7 +87,7 @@ class Scenery:
         seen = np.isfinite(self.rolls)
         shifts, rolls = self.shifts_px[seen], self.rolls[seen]
         corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-        none, x, y = carried(corners, np.zeros((1, 2)), rolls)
+        none, x, y = displacements(corners, np.zeros((1, 2)), rolls)
         lever = np.stack([x - none, y - none], axis=-1)
         lever, shifts = lever - lever.mean(axis=0), shifts - shifts.mean(axis=0)
         ridge = (_STILL_PX / _PICTURE_PX) ** 2 * len(shifts) * np.eye(2)
@@ -112,12 +112,12 @@ def find_scenery(pictures: Sequence[Image]) -> Scenery | None:
     """
     if len(pictures) < 2:
         return None
-    levelled = [level(picture) for picture in pictures]
+    levelled = [subtract_local_mean(picture) for picture in pictures]
     centres, tensor = find_windows(pictures[0], pixel_noise(levelled))
     if len(centres) < _FEWEST:
         return None
-    moved = np.stack([follow(levelled[0], one, centres) for one in levelled], axis=1)
-    metric, information = metric_of(tensor)
+    moved = np.stack([follow_windows(levelled[0], one, centres) for one in levelled], axis=1)
+    metric, information = edge_metric(tensor)
     seeds = _seeds(centres, tensor, pictures[0].shape[1] / _CELLS)
     still = _best((moved[seed] for seed in seeds), moved, metric)
     turned = _best(_motions_of_two(centres, moved, seeds), moved, metric)
@@ -129,15 +129,15 @@ def find_scenery(pictures: Sequence[Image]) -> Scenery | None:
     if group.sum() < _FEWEST or np.linalg.eigvalsh(metric[group].sum(axis=0))[0] < 1.0:
         return None
     close = off[group][off[group] < 1.0]
-    scatter = GATE_PX * float(np.sqrt(close.mean()))
+    scatter = TOLERANCE_PX * float(np.sqrt(close.mean()))
     found = Scenery(centres[group], metric[group], information[group], origin, np.empty((0, 2)), rolls, scatter)
-    each = [locate(found, moved[group, k]) for k in range(len(pictures))]
+    each = [scenery_motion(found, moved[group, k]) for k in range(len(pictures))]
     found = replace(found, shifts_px=np.array([shift for shift, _ in each]), rolls=np.array([roll for _, roll in each]))
     seen = np.isfinite(found.rolls)
     return found if seen.mean() > _SEEN and np.abs(found.rolls[seen]).max() < _MOST_ROLL else None
 
 
-def locate(scenery: Scenery, moved: Floats) -> tuple[Floats, float]:
+def scenery_motion(scenery: Scenery, moved: Floats) -> tuple[Floats, float]:
     """Find one frame's motion from its windows' displacements, most of which are right.
 
     Parameters
@@ -154,18 +154,18 @@ def locate(scenery: Scenery, moved: Floats) -> tuple[Floats, float]:
     """
     arms, moved = scenery.centres_px - scenery.origin_px, moved[:, None]
     low, high = float(np.nanmin(scenery.rolls)), float(np.nanmax(scenery.rolls))
-    step = GATE_PX / float(np.hypot(*arms.T).max())
+    step = TOLERANCE_PX / float(np.hypot(*arms.T).max())
     tried = np.repeat(np.linspace(low, high, 1 + int((high - low) / step)), len(arms))
     shifts = np.tile(moved[:, 0], (len(tried) // len(arms), 1)) - np.concatenate(
-        [carried(arms, np.zeros((1, 2)), tried[k : k + 1])[:, 0] for k in range(0, len(tried), len(arms))]
+        [displacements(arms, np.zeros((1, 2)), tried[k : k + 1])[:, 0] for k in range(0, len(tried), len(arms))]
     )
-    off = squared_gates(moved - carried(arms, shifts, tried), scenery.metric)
+    off = squared_deviations(moved - displacements(arms, shifts, tried), scenery.metric)
     best = int(np.exp(-np.minimum(off, _FAR)).sum(axis=0).argmax())
     shift, roll = shifts[best : best + 1], tried[best : best + 1]
     for _ in range(_STEPS):
-        off = squared_gates(moved - carried(arms, shift, roll), scenery.metric)
+        off = squared_deviations(moved - displacements(arms, shift, roll), scenery.metric)
         shift, roll = fit_motion(arms, moved, scenery.metric, np.exp(-np.minimum(off, _FAR)), shift, roll)
-    off = squared_gates(moved - carried(arms, shift, roll), scenery.metric)
+    off = squared_deviations(moved - displacements(arms, shift, roll), scenery.metric)
     along = (off[:, 0] < 1.0)[:, None, None] * scenery.metric
     if np.linalg.eigvals(np.linalg.solve(scenery.metric.sum(axis=0), along.sum(axis=0))).min() < _HALF:
         return np.full(2, np.nan), float("nan")
@@ -190,11 +190,11 @@ def _motions_of_two(centres: Floats, moved: Floats, seeds: NDArray[np.intp]) -> 
             continue
         rolls = np.arctan2(apart[1] * now[:, 0] - apart[0] * now[:, 1], now @ apart)
         if np.quantile(np.abs(rolls), _SEEN) < _MOST_ROLL:
-            yield carried(centres - (centres[a] + centres[b]) / 2.0, (moved[a] + moved[b]) / 2.0, rolls)
+            yield displacements(centres - (centres[a] + centres[b]) / 2.0, (moved[a] + moved[b]) / 2.0, rolls)
 
 
 def _best(motions: Iterable[Floats], moved: Floats, metric: Floats) -> Floats | None:
-    return max(motions, key=lambda motion: _along(squared_gates(moved - motion, metric)).sum(), default=None)
+    return max(motions, key=lambda motion: _along(squared_deviations(moved - motion, metric)).sum(), default=None)
 
 
 def _quietest(groups: list[tuple[Floats, Floats, Floats]]) -> tuple[Floats, Floats, Floats]:
@@ -214,7 +214,7 @@ def _along(off: Floats) -> Floats:
 def _grow(centres: Floats, moved: Floats, metric: Floats, start: Floats) -> tuple[Floats, Floats, Floats]:
     """Let all windows that go along tell the motion; return origin, rolls, and every window's squared gates."""
     start = np.broadcast_to(start, moved.shape)
-    off = squared_gates(moved - start, metric)
+    off = squared_deviations(moved - start, metric)
     weight = _along(off)
     origin = weight @ centres / weight.sum()
     arms = centres - origin
@@ -222,6 +222,6 @@ def _grow(centres: Floats, moved: Floats, metric: Floats, start: Floats) -> tupl
     for _ in range(_ROUNDS):
         each = weight[:, None] * np.exp(-np.minimum(off, _FAR))
         shifts, rolls = fit_motion(arms, moved, metric, each, shifts, rolls)
-        off = squared_gates(moved - carried(arms, shifts, rolls), metric)
+        off = squared_deviations(moved - displacements(arms, shifts, rolls), metric)
         weight = _along(off)
     return origin, rolls, off

@@ -11,7 +11,7 @@ import numpy as np
 
 from anglecam.data.typing import Floats, Image
 
-SIDE_PX = 20
+WINDOW_SIDE_PX = 20
 """Of a window."""
 _HALVINGS = 3
 """Of the picture: shifts of some twenty pixels are found."""
@@ -21,7 +21,7 @@ _LEAST_SLOPE = 1.0
 """Root mean square slope of a window's brightness over the pixels' noise, px⁻¹: its place is good to 1/20 px."""
 _EDGE = 0.05
 """Ratio of a window's lesser to its greater information below which it is a straight edge and tells only across."""
-GATE_PX = 0.3
+TOLERANCE_PX = 0.3
 """Distance from where the motion has it at which a window is half lost; Lucas and Kanade err by a tenth of that."""
 _MOST = 300
 """Windows; of more, every so many are taken."""
@@ -29,7 +29,7 @@ _WINDOW_PX, _ROLL = 0.1, 0.01
 """Standard deviations of a window's place, px, and of the roll before any is seen, rad."""
 
 
-def level(picture: Image) -> Image:
+def subtract_local_mean(picture: Image) -> Image:
     """Tell brightness (h, w) from its local mean."""
     mean = cv2.boxFilter(picture, -1, (_LOCAL_PX, _LOCAL_PX))
     return cv2.addWeighted(picture, 1.0, mean, -1.0, 128.0)
@@ -52,17 +52,19 @@ def find_windows(picture: Image, noise: float) -> tuple[Floats, Floats]:
     """
     smooth = cv2.GaussianBlur(picture, (0, 0), 0.7)
     gx, gy = (cv2.Scharr(smooth, cv2.CV_32F, *axis, scale=1 / 32) for axis in ((1, 0), (0, 1)))
-    half = SIDE_PX // 2
-    inner = np.s_[SIDE_PX : -half - 1 : SIDE_PX, SIDE_PX : -half - 1 : SIDE_PX]
-    xx, xy, yy = (cv2.boxFilter(part, -1, (SIDE_PX, SIDE_PX))[inner] for part in (gx * gx, gx * gy, gy * gy))
+    half = WINDOW_SIDE_PX // 2
+    inner = np.s_[WINDOW_SIDE_PX : -half - 1 : WINDOW_SIDE_PX, WINDOW_SIDE_PX : -half - 1 : WINDOW_SIDE_PX]
+    xx, xy, yy = (
+        cv2.boxFilter(part, -1, (WINDOW_SIDE_PX, WINDOW_SIDE_PX))[inner] for part in (gx * gx, gx * gy, gy * gy)
+    )
     tensor = np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-2).astype(float)
     row, column = np.nonzero(np.linalg.eigvalsh(tensor)[..., 1] > (_LEAST_SLOPE * max(noise, 1.0)) ** 2)
     thin = np.s_[:: 1 + len(row) // _MOST]
-    centres = np.asarray(SIDE_PX * (np.column_stack([column, row])[thin] + 1.0), dtype=float)
+    centres = np.asarray(WINDOW_SIDE_PX * (np.column_stack([column, row])[thin] + 1.0), dtype=float)
     return centres, tensor[row, column][thin]
 
 
-def metric_of(tensor: Floats) -> tuple[Floats, Floats]:
+def edge_metric(tensor: Floats) -> tuple[Floats, Floats]:
     """Scale structure tensors (n, 2, 2) to 1 across the main edge, which is returned too, (n,).
 
     Straight edges say nothing along.
@@ -74,7 +76,7 @@ def metric_of(tensor: Floats) -> tuple[Floats, Floats]:
     return np.einsum("nai,ni,nbi->nab", vectors, scale, vectors), most
 
 
-def follow(first: Image, other: Image, centres_px: Floats) -> Floats:
+def follow_windows(first: Image, other: Image, centres_px: Floats) -> Floats:
     """Find by how much windows of a levelled picture are displaced in another one.
 
     Parameters
@@ -95,7 +97,7 @@ def follow(first: Image, other: Image, centres_px: Floats) -> Floats:
         other,
         start,
         start.copy(),
-        winSize=(SIDE_PX + 1, SIDE_PX + 1),
+        winSize=(WINDOW_SIDE_PX + 1, WINDOW_SIDE_PX + 1),
         maxLevel=_HALVINGS,
         criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 15, 0.01),
         minEigThreshold=1e-6,
@@ -103,7 +105,7 @@ def follow(first: Image, other: Image, centres_px: Floats) -> Floats:
     return np.asarray((found - start)[:, 0], dtype=float)
 
 
-def carried(arms_px: Floats, shifts_px: Floats, rolls: Floats) -> Floats:
+def displacements(arms_px: Floats, shifts_px: Floats, rolls: Floats) -> Floats:
     """Displace points (n, 2), given from the origin, by shifts (m, 2) and rolls (m,): (n, m, 2) px."""
     x, y = arms_px[:, :1], arms_px[:, 1:]
     c, s = np.cos(rolls) - 1.0, np.sin(rolls)
@@ -133,7 +135,7 @@ def fit_motion(
     tuple of ndarray
         Both, improved.
     """
-    rest = moved - carried(arms_px, shifts_px, rolls)
+    rest = moved - displacements(arms_px, shifts_px, rolls)
     by_roll = np.stack([arms_px[:, 1], -arms_px[:, 0]], axis=-1)
     J = np.concatenate([np.broadcast_to(np.eye(2), (len(arms_px), 2, 2)), by_roll[..., None]], axis=-1)
     MJ = metric @ J / _WINDOW_PX**2
@@ -144,6 +146,6 @@ def fit_motion(
     return shifts_px + step[:, :2], rolls + step[:, 2]
 
 
-def squared_gates(rest: Floats, metric: Floats) -> Floats:
+def squared_deviations(rest: Floats, metric: Floats) -> Floats:
     """Square distances (n, m, 2) across edges, in gates."""
-    return np.einsum("nka,nab,nkb->nk", rest, metric, rest) / GATE_PX**2
+    return np.einsum("nka,nab,nkb->nk", rest, metric, rest) / TOLERANCE_PX**2

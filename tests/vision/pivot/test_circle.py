@@ -57,3 +57,21 @@ def test_a_mark_that_rests_in_two_places_has_their_circle_wherever_the_search_be
     found = fit_circle(path + 0.02 * rng.standard_normal(path.shape), start=start)
     assert np.hypot(*(found.centre_px - [214.5, 301.3])) < 2.0
     assert found.fits.all()
+
+
+def test_a_path_that_is_all_but_a_line_has_no_circle():
+    rng = np.random.default_rng(3)
+    along = np.linspace(0.0, 12.0, 40)
+    for bend in (0.0, 1e-9, 1e-7):
+        path = np.column_stack([along, bend * along**2])
+        assert fit_circle(path) is None
+        circle = fit_circle(path + rng.normal(0.0, 0.02, path.shape))
+        assert circle is None or np.linalg.eigvalsh(circle.centre_covariance_px2).min() > 0.0
+
+
+def test_an_arc_of_two_degrees_has_one():
+    angle = np.radians(np.linspace(0.0, 2.0, 60))
+    path = 400.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    circle = fit_circle(path)
+    assert circle is not None
+    assert abs(circle.radius_px - 400.0) < 1e-3

@@ -4,8 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from anglecam.vision.pivot.circle import fit_circle
-from anglecam.vision.pivot.marker import Marker, choose_pivot, find_marker
+from anglecam.vision.pivot.marker import find_marker
 
 DARK_DISC, BRIGHT_DISC = [(7, 20)], [(12, 240)]
 BLACK_RING, WHITE_RING = [(12, 245), (8, 20), (4, 245)], [(13, 15), (9, 240), (5, 15)]
@@ -55,28 +54,3 @@ def test_the_centre_is_good_to_a_tenth_of_a_pixel_with_a_hint_12_px_off(rings, r
 
 def test_no_marker_is_found_where_there_is_none():
     assert find_marker(_scene((80, 60), []), np.array([80.0, 60.0]), 100.0 * np.eye(2)) is None
-
-
-def _path(centre):
-    at = np.radians(np.linspace(-25, 25, 200))
-    rng = np.random.default_rng(0)
-    return np.array(centre) + 170 * np.column_stack([np.cos(at), np.sin(at)]) + 0.02 * rng.standard_normal((200, 2))
-
-
-def test_marker_and_motion_that_agree_are_joined():
-    pivot, note = choose_pivot(Marker(np.array([50.02, 60.0]), 0.05**2 * np.eye(2), 9.0), fit_circle(_path((50, 60))))
-    assert note is None
-    assert pivot.source == "marker and centre of rotation"
-    assert np.hypot(*(pivot.centre_px - [50, 60])) < 0.05
-    assert pivot.covariance_px2[0, 0] < 0.05**2
-
-
-def test_a_marker_that_is_not_the_centre_of_rotation_is_reported_and_not_believed():
-    pivot, note = choose_pivot(Marker(np.array([50.0, 66.0]), 0.05**2 * np.eye(2), 9.0), fit_circle(_path((50, 60))))
-    assert "6.0" in note
-    assert pivot.source == "centre of rotation"
-    assert np.hypot(*(pivot.centre_px - [50, 60])) < 0.5
-
-
-def test_without_marker_and_motion_there_is_no_pivot():
-    assert choose_pivot(None, None) == (None, None)

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
-from anglecam.vision.image.transforms import turned
-from anglecam.vision.registration.appearance import Fit, Patches, compare
-from anglecam.vision.registration.tiles import SIDE_PX, Glimpse, Plane, look_at
+from anglecam.vision.image.transforms import rotation
+from anglecam.vision.registration.appearance import HIDDEN_MISFIT, TileAppearance, TileFit, compare_tiles
+from anglecam.vision.registration.tiles import TILE_SIDE_PX, FrameView, MotionPlane, view_tiles
 
 _STEPS = 3
 """Of Gauss and Newton, at most."""
@@ -28,8 +28,6 @@ _SETTLED = 1e-6
 """A step below this ends them, rad."""
 _TRUST = 3.0
 """Degrees of freedom that the whole clip's scatter has against a single frame's."""
-HIDDEN = 3.0
-"""Times its usual mean square that a tile misfits in a frame where something hides it."""
 _DIMMED = 0.5
 """Departure of a view's contrast from the look's that no light makes."""
 _BETTER = 0.6
@@ -40,13 +38,13 @@ known angles, encoded by x264 at crf 18, have 0.11 to 0.17; at crf 28 up to 0.24
 
 
 @dataclass(frozen=True)
-class Look:
+class BodyAppearance:
     """The head as it was learnt."""
 
-    patches: Patches
+    patches: TileAppearance
     heights: Floats
     """(tiles,) px."""
-    plane: Plane
+    plane: MotionPlane
     pivot_px: Floats
     """(2,) centre of rotation in the reference frame, px."""
     pivot_covariance_px2: Floats
@@ -57,20 +55,20 @@ class Look:
     """(tiles,) which of them lie together."""
     birge: float
     """Scatter between groups over what the pixels' noise would make it; at least 1."""
-    yielding: float
+    absorbed_share: float
     """Share of an error of the turns, one that goes with the turn itself, that the looks would have adapted to: well
     below 1 where the head was seen in many poses between its extremes."""
     middle_px: Floats
     """(2,) of the tiles, each by its information, in the reference frame, px."""
 
-    def row_of_middle(self, glimpse: Glimpse) -> float:
+    def row_of_middle(self, glimpse: FrameView) -> float:
         """Return the row of the picture in which a frame shows the middle."""
-        arm = (self.middle_px - self.pivot_px) @ turned(glimpse.turn)
+        arm = (self.middle_px - self.pivot_px) @ rotation(glimpse.turn)
         return float(self.plane.lens.distort(glimpse.pivot_px + arm)[1])
 
 
 @dataclass(frozen=True)
-class Turn:
+class TurnEstimate:
     """One frame's turn."""
 
     turn: float
@@ -83,10 +81,10 @@ class Turn:
     """(2,) change of the turn with an error of the pivot, rad/px."""
 
 
-LOST = Turn(np.nan, np.nan, np.nan, np.full(2, np.nan))
+NO_TURN = TurnEstimate(np.nan, np.nan, np.nan, np.full(2, np.nan))
 
 
-def find_turn(look: Look, glimpse: Glimpse, before: Image | None = None) -> Turn:
+def find_turn(look: BodyAppearance, glimpse: FrameView, before: Image | None = None) -> TurnEstimate:
     """Find one frame's turn.
 
     Parameters
@@ -103,38 +101,38 @@ def find_turn(look: Look, glimpse: Glimpse, before: Image | None = None) -> Turn
     Turn
         With the uncertainty that its own noise, the scatter between tiles, and copies give it.
     """
-    views, places = look_at(look.patches.corners, look.heights, [glimpse], look.plane, look.pivot_px)
+    views, places = view_tiles(look.patches.corners, look.heights, [glimpse], look.plane, look.pivot_px)
     centres = look.pivot_px + look.heights[:, None] * look.plane.lens.parallax
     turn = glimpse.turn
     for _ in range(_STEPS):
-        fit = compare(look.patches, views, np.full(len(look.patches), turn), centres)
+        fit = compare_tiles(look.patches, views, np.full(len(look.patches), turn), centres)
         mean_square = np.where(fit.count > 0, fit.squares / np.maximum(fit.count, 1), np.inf)
         # motion blur and the like spoil all tiles alike, a hand or a hair only some
         usual = float(np.median(mean_square / look.variance))
-        clear = (mean_square < HIDDEN * max(usual, 1.0) * look.variance) & ~covered(fit)
+        clear = (mean_square < HIDDEN_MISFIT * max(usual, 1.0) * look.variance) & ~covered_views(fit)
         if not clear.any() or not np.isfinite(usual):
-            return LOST
+            return NO_TURN
         each = fit.weighted(np.where(clear, look.variance * max(usual, 1.0), np.inf))
         normal, gradient = each[0].sum(axis=0), each[1].sum(axis=0)
         by_pixels = 1.0
         if glimpse.wander_px2 is not None:
             normal, gradient, by_pixels = _wandering(normal, gradient, glimpse.wander_px2)
         if not normal[0, 0] > 0.0:  # nothing of what is clear tells a turn: it has left the picture
-            return LOST
+            return NO_TURN
         step = gradient[0] / normal[0, 0]
         turn += step
         if abs(step) < _SETTLED:
             break
-    pull = -normal[0, 1:] @ (np.eye(2) - turned(turn)) / normal[0, 0]
+    pull = -normal[0, 1:] @ (np.eye(2) - rotation(turn)) / normal[0, 0]
     noise = 1 / float(np.sqrt(normal[0, 0]))
     # a frame that a codec spoils more than others shows it in its own tiles, as far as so few can tell
-    total, freedom = scatter(each[0][:, None], each[1][:, None], look.groups)
+    total, freedom = group_scatter(each[0][:, None], each[1][:, None], look.groups)
     birge2 = (_TRUST * look.birge**2 + total) / (_TRUST + max(freedom - 1, 0))
     pose2 = by_pixels * noise**2 * max(birge2 - 1, 0.0)
     if before is not None:
         misfit = noise * np.sqrt(by_pixels * fit.count[clear].sum())
         pose2 += (_COPY * _copied(glimpse.image, before, places[clear]) * misfit) ** 2
-    return Turn(float(turn), noise, float(np.sqrt(pose2)), pull)
+    return TurnEstimate(float(turn), noise, float(np.sqrt(pose2)), pull)
 
 
 def _wandering(normal: Floats, gradient: Floats, covariance_px2: Floats) -> tuple[Floats, Floats, float]:
@@ -155,7 +153,7 @@ def _wandering(normal: Floats, gradient: Floats, covariance_px2: Floats) -> tupl
     return told, pulled, by_pixels
 
 
-def nearest_fit(look: Look, glimpse: Glimpse, reach_px: float) -> Glimpse:
+def refine_doubtful_turn(look: BodyAppearance, glimpse: FrameView, reach_px: float) -> FrameView:
     """Try turns about a doubtful one, a pixel apart at the tiles' middle, and start from the one that fits best.
 
     Parameters
@@ -176,9 +174,9 @@ def nearest_fit(look: Look, glimpse: Glimpse, reach_px: float) -> Glimpse:
     step = 1.0 / float(np.hypot(*(look.middle_px - look.pivot_px)))
     tries = [replace(glimpse, turn=glimpse.turn + k * step) for k in range(-int(reach_px), int(reach_px) + 1)]
 
-    def misfit(one: Glimpse) -> float:
-        views, _ = look_at(look.patches.corners, look.heights, [one], look.plane, look.pivot_px)
-        fit = compare(look.patches, views, np.full(len(look.patches), one.turn), centres)
+    def misfit(one: FrameView) -> float:
+        views, _ = view_tiles(look.patches.corners, look.heights, [one], look.plane, look.pivot_px)
+        fit = compare_tiles(look.patches, views, np.full(len(look.patches), one.turn), centres)
         seen = fit.count > 0
         return float(np.median(fit.squares[seen] / fit.count[seen] / look.variance[seen])) if seen.any() else np.inf
 
@@ -188,12 +186,12 @@ def nearest_fit(look: Look, glimpse: Glimpse, reach_px: float) -> Glimpse:
     return tries[best] if misfits[best] < _BETTER * misfits[len(tries) // 2] else glimpse
 
 
-def covered(fits: Fit) -> NDArray[np.bool_]:
+def covered_views(fits: TileFit) -> NDArray[np.bool_]:
     """Tell which views show something else, however flat: it fits any look that is dimmed to nothing."""
     return np.asarray((np.abs(fits.light[..., 0]) > _DIMMED).any(axis=-1))
 
 
-def scatter(normal: Floats, gradient: Floats, groups: NDArray[np.intp]) -> tuple[float, int]:
+def group_scatter(normal: Floats, gradient: Floats, groups: NDArray[np.intp]) -> tuple[float, int]:
     """Sum the squares of what groups of tiles say against the common turn, in units of their noise; and count them.
 
     Neighbours share a codec's blocks and err together: only what lies apart tells.
@@ -209,7 +207,7 @@ def scatter(normal: Floats, gradient: Floats, groups: NDArray[np.intp]) -> tuple
 
 def _copied(image: Image, before: Image, centres_px: Floats) -> float:
     """Return the share of the tiles' pixels that are what they were a frame before."""
-    half = SIDE_PX // 2
+    half = TILE_SIDE_PX // 2
     shares = []
     for x, y in centres_px.round().astype(int):
         part = np.s_[max(y - half, 0) : y + half, max(x - half, 0) : x + half]

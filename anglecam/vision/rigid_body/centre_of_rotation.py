@@ -13,9 +13,9 @@ import numpy as np
 
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats
-from anglecam.vision.image.transforms import turn_of, turned
-from anglecam.vision.rigid_body.bodies import LEAST_TURN
-from anglecam.vision.rigid_body.keyframes import GROUPS
+from anglecam.vision.image.transforms import rotation, turn_of
+from anglecam.vision.rigid_body.feature_matching import MIN_TURN
+from anglecam.vision.rigid_body.keyframes import POINT_GROUPS
 
 _FEWEST = 10
 """Frames."""
@@ -45,7 +45,7 @@ class RigidMotion:
     """(2,) centre of rotation, px."""
     pivot_covariance_px2: Floats
     """(2, 2) px²."""
-    wander_px: float
+    pivot_scatter_px: float
     """Standard deviation, in either direction, of the head's place about what a fixed centre of rotation allows."""
     centre_px: Floats
     """(2,) middle of what was followed on the head, in the median pose, px."""
@@ -54,7 +54,7 @@ class RigidMotion:
 
 
 @dataclass(frozen=True)
-class Placed:
+class FramePose:
     """Where one frame has the body."""
 
     status: str
@@ -77,14 +77,14 @@ def pose_information(pose: Floats, arm: Floats) -> Floats:
     arm : ndarray
         (n, 2) from the middle to the points, in the reference, px.
     """
-    slope = arm @ turned(turn_of(pose) + np.pi / 2)
+    slope = arm @ rotation(turn_of(pose) + np.pi / 2)
     total = slope.sum(axis=0)
     return np.block(
         [[np.array([[(slope**2).sum()]]), total[None]], [total[:, None], len(arm) * np.eye(2)]],
     )
 
 
-def turn_about_one_centre(frames: Sequence[Placed], middle: Floats, spread: float) -> RigidMotion | str:
+def fit_common_centre(frames: Sequence[FramePose], middle: Floats, spread: float) -> RigidMotion | str:
     """Fit a centre of rotation that all frames share, and find the turns again about it.
 
     Parameters
@@ -112,7 +112,7 @@ def turn_about_one_centre(frames: Sequence[Placed], middle: Floats, spread: floa
     shift = np.einsum("nij,j->ni", poses[:, :2, :2], middle) + poses[:, :2, 2] - middle
     # a frame that motion blurs scatters more than others, as far as so few groups can tell
     usual = max(1.0, float(np.median(grouped[ok])))
-    more = (_TRUST * usual + GROUPS * grouped[ok]) / (_TRUST + GROUPS)
+    more = (_TRUST * usual + POINT_GROUPS * grouped[ok]) / (_TRUST + POINT_GROUPS)
     covariance = np.linalg.inv(information[ok]) * np.maximum(more, 1.0)[:, None, None]
     place, arm, arm_covariance, wander = _fit_centre(turn[ok], shift[ok], covariance[:, 1:, 1:])
     covariance[:, 1:, 1:] += wander**2 * np.eye(2)
@@ -120,8 +120,8 @@ def turn_about_one_centre(frames: Sequence[Placed], middle: Floats, spread: floa
     free = np.column_stack([turn[ok], shift[ok]])
     about = turn[ok]
     for _ in range(3):
-        model = np.column_stack([about, place + arm @ turned(about) - arm])
-        pull = np.column_stack([np.ones(len(about)), arm @ turned(about + np.pi / 2)])
+        model = np.column_stack([about, place + arm @ rotation(about) - arm])
+        pull = np.column_stack([np.ones(len(about)), arm @ rotation(about + np.pi / 2)])
         gain = np.einsum("ni,nij->nj", pull, weight)
         about = about + np.einsum("ni,ni->n", gain, free - model) / np.einsum("ni,ni->n", gain, pull)
     median = float(np.median(about))
@@ -130,10 +130,10 @@ def turn_about_one_centre(frames: Sequence[Placed], middle: Floats, spread: floa
     blur = _BLUR_SHARE * np.abs(np.gradient(about))
     reach = float(np.sqrt(np.median(information[ok, 0, 0] / information[ok, 1, 1])))
     sigma[ok] = np.sqrt(1.0 / np.einsum("ni,ni->n", gain, pull) + spread**2 + (_SHARED_PX / reach) ** 2 + blur**2)
-    if np.ptp(turns[ok]) < LEAST_TURN:
+    if np.ptp(turns[ok]) < MIN_TURN:
         return "nothing rigid is seen to turn"
     pivot = middle + place - arm
-    centre = pivot + arm @ turned(median)
+    centre = pivot + arm @ rotation(median)
     return RigidMotion(turns, sigma, pivot, arm_covariance, wander, centre, status)
 
 
@@ -155,7 +155,7 @@ def _fit_centre(turn: Floats, shift: Floats, noise: Floats) -> tuple[Floats, Flo
     mean_turn = np.bincount(pose, turn) / count
     mean_shift = np.column_stack([np.bincount(pose, axis) / count for axis in shift.T])
     A = np.concatenate(
-        [np.broadcast_to(np.eye(2), (len(count), 2, 2)), turned(mean_turn).swapaxes(1, 2) - np.eye(2)], axis=2
+        [np.broadcast_to(np.eye(2), (len(count), 2, 2)), rotation(mean_turn).swapaxes(1, 2) - np.eye(2)], axis=2
     )
     keep = np.ones(len(count), bool)
     for _ in range(3):
@@ -167,7 +167,7 @@ def _fit_centre(turn: Floats, shift: Floats, noise: Floats) -> tuple[Floats, Flo
     variance = float(left @ left) / max(len(left) - 4, 1)
     to_centre = np.hstack([np.eye(2), -np.eye(2)])
     covariance = _ALIKE * variance * to_centre @ np.linalg.pinv(design.T @ design) @ to_centre.T
-    every = shift - (solution[:2] + solution[2:] @ (turned(turn) - np.eye(2)))
+    every = shift - (solution[:2] + solution[2:] @ (rotation(turn) - np.eye(2)))
     excess = np.median((every**2).sum(axis=1)) - np.median(np.trace(noise, axis1=1, axis2=2))
     # the median of the square of a distance in the plane is 2 ln 2 of the variance of either coordinate
     return solution[:2], solution[2:], covariance, float(np.sqrt(max(excess, 0.0) / (2 * np.log(2))))

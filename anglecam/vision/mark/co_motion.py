@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from anglecam.data.typing import Floats, Image
-from anglecam.vision.image.transforms import turned
+from anglecam.vision.image.transforms import rotation
 
 _OWN, _AROUND = 0.8, 1.8
 """Of the root of its area: within the first a patch is itself, up to the second lie its surroundings."""
@@ -14,7 +14,7 @@ _NOISE = 2.0
 """Grey levels that any two pictures differ by: where nothing is to be seen around a patch, nothing is to be told."""
 
 
-def carried_share(
+def co_motion_share(
     first: Image, second: Image, at_first: Floats, at_second: Floats, stayed: Floats, turn: float, area_px2: float
 ) -> float:
     """Compare the surroundings of a patch in two frames, once where the patch went and once where they were.
@@ -44,7 +44,7 @@ def carried_share(
     away = np.hypot(*(grid - (at_second - stayed)).transpose(2, 0, 1))
     around = (np.hypot(*grid.transpose(2, 0, 1)) > _OWN * size) & (away > _OWN * size)
     here = _sampled(first, at_first + grid)
-    gone, left = _sampled(second, at_second + grid @ turned(turn)), _sampled(second, stayed + grid)
+    gone, left = _sampled(second, at_second + grid @ rotation(turn)), _sampled(second, stayed + grid)
     inside = around & (here >= 0.0).all(axis=2) & (gone >= 0.0).all(axis=2) & (left >= 0.0).all(axis=2)
     if inside.sum() < area_px2 / 4.0:
         return 0.5

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
-from anglecam.vision.mark.blobs import Patches
-from anglecam.vision.mark.carried import carried_share
+from anglecam.vision.mark.blobs import Blobs
+from anglecam.vision.mark.co_motion import co_motion_share
 from anglecam.vision.pivot.circle import circle_through
 
 _TOLERANCE_PX = 2.0
@@ -36,7 +36,7 @@ _TRIALS = 600
 
 
 @dataclass(frozen=True)
-class Track:
+class BlobTrack:
     """What is taken for one thing in many pictures."""
 
     score: float
@@ -45,7 +45,7 @@ class Track:
     """Hue contrast at which the patches were cut out."""
     members: NDArray[np.int64]
     """Numbers of its patches."""
-    patches: Patches
+    patches: Blobs
     """All patches."""
     circle: tuple[Floats, float] | None
     """Centre and radius of its path, px; ``None`` at rest."""
@@ -59,7 +59,7 @@ class _Way:
     """How surely they do not lie on a straight line, 0 to 1."""
 
 
-def moving_track(patches: Patches, images: Sequence[Image], level: float, hint: Floats | None) -> Track | None:
+def moving_track(patches: Blobs, images: Sequence[Image], level: float, hint: Floats | None) -> BlobTrack | None:
     """Find the circle on which one patch of constant size and colour travels, by random triples of poses."""
     frames = len(images)
     poses = _poses(patches)
@@ -67,7 +67,7 @@ def moving_track(patches: Patches, images: Sequence[Image], level: float, hint: 
         return None
     longest = 1.5 * float(np.hypot(*images[0].shape[:2]))
     rng = np.random.default_rng(0)
-    best: Track | None = None
+    best: BlobTrack | None = None
     seen: set[tuple[int, ...]] = set()
     carried: dict[tuple[int, int], float] = {}
     ways: dict[bytes, _Way | None] = {}
@@ -97,13 +97,13 @@ def moving_track(patches: Patches, images: Sequence[Image], level: float, hint: 
     return best
 
 
-def _ends(track: Track) -> tuple[int, int]:
+def _ends(track: BlobTrack) -> tuple[int, int]:
     """Name the first of a track's patches, and the one farthest from it."""
     place = track.patches.place[track.members]
     return int(track.members[0]), int(track.members[np.argmax(np.hypot(*(place - place[0]).T))])
 
 
-def _carried(track: Track, ends: tuple[int, int], images: Sequence[Image]) -> float:
+def _carried(track: BlobTrack, ends: tuple[int, int], images: Sequence[Image]) -> float:
     """Tell how surely a patch is a part of what moves around it."""
     patches, rows = track.patches, list(ends)
     centre = patches.place[track.members].mean(axis=0) if track.circle is None else track.circle[0]
@@ -112,10 +112,10 @@ def _carried(track: Track, ends: tuple[int, int], images: Sequence[Image]) -> fl
     turn = float(np.arctan2(arm[0, 1], arm[0, 0]) - np.arctan2(arm[1, 1], arm[1, 0]))
     first, second = (images[patches.frame[end]] for end in ends)
     area = float(np.median(patches.area[track.members]))
-    return carried_share(first, second, here, there, here + shaken, turn, area)
+    return co_motion_share(first, second, here, there, here + shaken, turn, area)
 
 
-def _poses(patches: Patches) -> NDArray[np.int64]:
+def _poses(patches: Blobs) -> NDArray[np.int64]:
     """Pick one patch of each place and size, so that a long rest does not drown a short motion."""
     key = np.column_stack([np.round(patches.place / _MOVED_PX), np.round(np.log(patches.area) / 0.3)])
     _, first = np.unique(key, axis=0, return_index=True)
@@ -144,7 +144,7 @@ def _circle_of(p: Floats, hint: Floats | None, longest: float) -> tuple[Floats, 
 
 
 def _follow(
-    patches: Patches,
+    patches: Blobs,
     frames: int,
     level: float,
     centre: Floats,
@@ -153,7 +153,7 @@ def _follow(
     tint: float,
     least: float,
     ways: dict[bytes, _Way | None],
-) -> Track | None:
+) -> BlobTrack | None:
     """Take from each frame the patch that lies on the circle and is most like the trio; score what comes out.
 
     ``None`` where it cannot be more than the least score that is asked for. What was found of each choice of patches
@@ -176,10 +176,10 @@ def _follow(
         return None
     off_px = off[members]
     score = way.score * np.exp(-np.mean((off_px / _TOLERANCE_PX) ** 2)) * (_STRAIGHT + (1.0 - _STRAIGHT) * way.bent)
-    return Track(score, level, members, patches, (centre, radius))
+    return BlobTrack(score, level, members, patches, (centre, radius))
 
 
-def _way(patches: Patches, members: NDArray[np.int64], frames: int) -> _Way | None:
+def _way(patches: Blobs, members: NDArray[np.int64], frames: int) -> _Way | None:
     """Tell what the patches of a track have to do with each other, whatever circle they lie on; ``None`` if nothing."""
     place = patches.place[members]
     extent = float(np.hypot(*np.ptp(place, axis=0)))
@@ -195,7 +195,7 @@ def _off_a_line(place: Floats) -> float:
     return float(np.sqrt(max(np.linalg.eigvalsh(np.cov(place.T))[0], 0.0)))
 
 
-def _score(patches: Patches, members: NDArray[np.int64], frames: int, extent: float) -> float:
+def _score(patches: Blobs, members: NDArray[np.int64], frames: int, extent: float) -> float:
     """Seen in every frame, standing out in hue, constant in size, not tiny, and travelling."""
     size = patches.area[members]
     steady = np.exp(-4.0 * float(np.std(np.log(size))))
@@ -204,22 +204,22 @@ def _score(patches: Patches, members: NDArray[np.int64], frames: int, extent: fl
     return float(seen**2 * np.median(patches.contrast[members]) * steady * np.median(size) ** 0.25 * (0.1 + travel))
 
 
-def resting_track(patches: Patches, images: Sequence[Image], level: float) -> Track | None:
+def resting_track(patches: Blobs, images: Sequence[Image], level: float) -> BlobTrack | None:
     """Take the patch that stands out most in a clip in which nothing moves."""
     if not len(patches.frame):
         return None
-    best: Track | None = None
+    best: BlobTrack | None = None
     for seed in np.flatnonzero(patches.frame == patches.frame[0]):
         near = np.hypot(*(patches.place - patches.place[seed]).T) < _MOVED_PX
         alike = np.abs(np.log(patches.area / patches.area[seed])) < 0.4
         members = np.flatnonzero(near & alike)
         score = _score(patches, members, len(images), 0.0) * (0.2 + _skin_around(images[0], patches, int(seed)))
         if best is None or score > best.score:
-            best = Track(score, level, members, patches, None)
+            best = BlobTrack(score, level, members, patches, None)
     return best
 
 
-def _skin_around(image: Image, patches: Patches, seed: int) -> float:
+def _skin_around(image: Image, patches: Blobs, seed: int) -> float:
     """Return the share of the pixels around a patch that have a skin's hue; lips at rest have nothing else to show."""
     reach = round(float(np.sqrt(patches.area[seed])))
     x, y = np.round(patches.place[seed]).astype(int)

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
-from anglecam.vision.image.transforms import fit_rigid, moved, turn_of, turned
+from anglecam.vision.image.transforms import apply_motion, fit_rigid, rotation, turn_of
 
-FEWEST = 10
+MIN_POINTS = 10
 """Points; fewer are no body."""
-LEAST_TURN = np.radians(1.0)
+MIN_TURN = np.radians(1.0)
 """Of a body that turns, rad."""
 _FEATURES = 1000
 _FEATURE_CONTRAST = 0.015
@@ -47,7 +47,7 @@ class Features:
     """Of unit length."""
 
 
-def describe(grey: Image) -> Features:
+def find_features(grey: Image) -> Features:
     """Find a picture's features.
 
     Parameters
@@ -66,10 +66,10 @@ def describe(grey: Image) -> Features:
     return Features((points + 0.5) * reduction - 0.5, descriptors / np.linalg.norm(descriptors, axis=1, keepdims=True))
 
 
-def locate(body: Features, there: Features) -> Floats | None:
+def find_body_pose(body: Features, there: Features) -> Floats | None:
     """Find the motion (3, 3) that carries a body's features onto a picture's; ``None`` where too few agree on any."""
     pairs = _match(body, there)
-    found = find_body(body.points[pairs[:, 0]], there.points[pairs[:, 1]], _COARSE_PX)
+    found = fit_body_motion(body.points[pairs[:, 0]], there.points[pairs[:, 1]], _COARSE_PX)
     return None if found is None else found[0]
 
 
@@ -85,17 +85,17 @@ def find_turning_body(one: Features, other: Features) -> tuple[NDArray[np.intp],
     start, end = one.points[pairs[:, 0]], other.points[pairs[:, 1]]
     left = np.arange(len(pairs))
     for _ in range(_BODIES):
-        body = find_body(start[left], end[left], _COARSE_PX)
+        body = fit_body_motion(start[left], end[left], _COARSE_PX)
         if body is None:
             return None
         motion, among = body
-        if abs(turn_of(motion)) >= LEAST_TURN:
+        if abs(turn_of(motion)) >= MIN_TURN:
             return pairs, left[among]
         left = np.delete(left, among)
     return None
 
 
-def find_body(start: Floats, end: Floats, tolerance_px: float) -> tuple[Floats, NDArray[np.intp]] | None:
+def fit_body_motion(start: Floats, end: Floats, tolerance_px: float) -> tuple[Floats, NDArray[np.intp]] | None:
     """Find the rigid motion on which most points agree, by random sampling of two, and refine it on them.
 
     Parameters
@@ -111,7 +111,7 @@ def find_body(start: Floats, end: Floats, tolerance_px: float) -> tuple[Floats, 
         The motion (3, 3) and the numbers of the points that go along; ``None`` where fewer than `FEWEST` do.
     """
     n = len(start)
-    if n < FEWEST:
+    if n < MIN_POINTS:
         return None
     first, second = np.random.default_rng(0).integers(0, n, (2, _TRIALS))
     a, b = start[second] - start[first], end[second] - end[first]
@@ -122,7 +122,7 @@ def find_body(start: Floats, end: Floats, tolerance_px: float) -> tuple[Floats, 
     first, second, a, b = first[stiff], second[stiff], a[stiff], b[stiff]
     turn = np.arctan2(a[:, 0] * -b[:, 1] + a[:, 1] * b[:, 0], (a * b).sum(axis=1))
     half = 0.5 * (start[first] + start[second])
-    place = 0.5 * (end[first] + end[second]) - np.einsum("tj,tji->ti", half, turned(turn))
+    place = 0.5 * (end[first] + end[second]) - np.einsum("tj,tji->ti", half, rotation(turn))
     c, s = np.cos(turn)[:, None], np.sin(turn)[:, None]
     off_x = c * start[:, 0] + s * start[:, 1] + place[:, :1] - end[:, 0]
     off_y = c * start[:, 1] - s * start[:, 0] + place[:, 1:] - end[:, 1]
@@ -130,13 +130,13 @@ def find_body(start: Floats, end: Floats, tolerance_px: float) -> tuple[Floats, 
     among = np.flatnonzero(agree[agree.sum(axis=1).argmax()])
     motion = np.eye(3)
     for _ in range(3):
-        if len(among) < FEWEST:
+        if len(among) < MIN_POINTS:
             return None
         motion = fit_rigid(start[among], end[among])
-        off = np.hypot(*(end - moved(motion, start)).T)
+        off = np.hypot(*(end - apply_motion(motion, start)).T)
         usual = float(np.median(off[among]))
         among = np.flatnonzero(off < min(tolerance_px, _OUTLYING * max(usual, 0.02)))
-    return (motion, among) if len(among) >= FEWEST else None
+    return (motion, among) if len(among) >= MIN_POINTS else None
 
 
 def _match(one: Features, other: Features) -> NDArray[np.intp]:

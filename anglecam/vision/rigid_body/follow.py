@@ -1,6 +1,6 @@
 """The turn of a rigid head with no mark on it: what moves as one body, and turns, is the head.
 
-A few frames, spread over the clip, teach what turns (`anglecam.vision.rigid_body.bodies`). Those at different turns are kept as
+A few frames, spread over the clip, teach what turns (`anglecam.vision.rigid_body.feature_matching`). Those at different turns are kept as
 keys. Every frame of the clip is turned back onto the nearest key and what is left is followed
 (`anglecam.vision.rigid_body.keyframes`). Each frame is held against a key and not against the frame before it, so errors do not add up
 however long the clip.
@@ -17,12 +17,18 @@ import numpy as np
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.video.film import Frame
-from anglecam.vision.image.transforms import inverse, moved, turn_of
-from anglecam.vision.rigid_body.bodies import FEWEST, LEAST_TURN, Features, describe, find_turning_body, locate
-from anglecam.vision.rigid_body.keyframes import Key, choose_keys, hold_against
-from anglecam.vision.rigid_body.one_centre import Placed, RigidMotion, pose_information, turn_about_one_centre
-
-LOST, HIDDEN, UNDECODABLE = "no_mouth", "occluded", "undecodable"
+from anglecam.vision.image.transforms import apply_motion, inverse_motion, turn_of
+from anglecam.vision.rigid_body.centre_of_rotation import FramePose, RigidMotion, fit_common_centre, pose_information
+from anglecam.vision.rigid_body.feature_matching import (
+    MIN_POINTS,
+    MIN_TURN,
+    Features,
+    find_body_pose,
+    find_features,
+    find_turning_body,
+)
+from anglecam.vision.rigid_body.keyframes import Keyframe, choose_keyframes, match_keyframe
+from anglecam.vision.status import NO_MARK, OCCLUDED, UNDECODABLE
 
 _LEARNT = 16
 """Samples from which the head is learnt, at most: they are compared in pairs."""
@@ -51,51 +57,51 @@ def follow_rigid_body(frames: Iterator[Frame], samples: Sequence[Image], noise: 
     if isinstance(learnt, str):
         return learnt
     head, keys, spread = learnt
-    placed: list[Placed] = []
+    placed: list[FramePose] = []
     before: list[tuple[float, Floats]] = []
-    middle = np.concatenate([moved(inverse(k.pose), k.points) for k in keys]).mean(axis=0)
+    middle = np.concatenate([apply_motion(inverse_motion(k.pose), k.points) for k in keys]).mean(axis=0)
     for frame in frames:
         seen, key, partly = None, keys[0], False
         if frame.image is not None:
             grey = cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY)
             for guess in _guesses(before, frame.time, head, grey):
-                key = min(keys, key=lambda k: abs(turn_of(guess @ inverse(k.pose))))
-                seen = hold_against(key, grey, guess @ inverse(key.pose))
+                key = min(keys, key=lambda k: abs(turn_of(guess @ inverse_motion(k.pose))))
+                seen = match_keyframe(key, grey, guess @ inverse_motion(key.pose))
                 if seen is not None and seen.inlier.sum() >= _AGREE_SHARE * len(key.points):
                     break
                 partly = partly or seen is not None
                 seen = None
         if seen is None:
             before = []
-            placed.append(Placed(UNDECODABLE if frame.image is None else HIDDEN if partly else LOST))
+            placed.append(FramePose(UNDECODABLE if frame.image is None else OCCLUDED if partly else NO_MARK))
             continue
         pose = seen.motion @ key.pose
         before = [*before[-1:], (frame.time, pose)]
-        rigid = moved(inverse(key.pose), key.points[seen.inlier])
-        placed.append(Placed(OK, pose, pose_information(pose, rigid - middle) / seen.variance, seen.grouped))
-    return turn_about_one_centre(placed, middle, spread)
+        rigid = apply_motion(inverse_motion(key.pose), key.points[seen.inlier])
+        placed.append(FramePose(OK, pose, pose_information(pose, rigid - middle) / seen.variance, seen.grouped))
+    return fit_common_centre(placed, middle, spread)
 
 
 def _guesses(before: list[tuple[float, Floats]], time: float, head: Features, grey: Image) -> Iterator[Floats]:
     """Yield poses to start from: the motion goes on, it pauses, the head is found anew."""
     if len(before) == 2:
         (t0, first), (t1, last) = before
-        step = last @ inverse(first)
+        step = last @ inverse_motion(first)
         yield np.linalg.matrix_power(step, max(1, round((time - t1) / (t1 - t0)))) @ last
     if before:
         yield before[-1][1]
-    found = locate(head, describe(grey))
+    found = find_body_pose(head, find_features(grey))
     if found is not None:
         yield found
 
 
-def _learn(samples: Sequence[Image], noise: float) -> tuple[Features, list[Key], float] | str:
+def _learn(samples: Sequence[Image], noise: float) -> tuple[Features, list[Keyframe], float] | str:
     """Find what turns, and frames to hold the others against."""
     images = _unlike(samples, noise)
     images = [images[i] for i in np.unique(np.linspace(0, len(images) - 1, _LEARNT).round().astype(int))]
     if len(images) < 2:
         return "nothing moves"
-    features = [describe(image) for image in images]
+    features = [find_features(image) for image in images]
     turning = [np.zeros(len(f.points)) for f in features]
     matched = [np.zeros(len(f.points)) for f in features]
     for i, j in combinations(range(len(images)), 2):
@@ -108,17 +114,17 @@ def _learn(samples: Sequence[Image], noise: float) -> tuple[Features, list[Key],
             turning[j][pairs[inlier, 1]] += 1
     reference = int(np.argmax([t.sum() for t in turning]))
     of_head = turning[reference] > 0.5 * matched[reference]
-    if of_head.sum() < FEWEST:
+    if of_head.sum() < MIN_POINTS:
         return "nothing rigid is seen to turn"
     head = Features(features[reference].points[of_head], features[reference].descriptors[of_head])
     poses: dict[int, Floats] = {}
     for i, there in enumerate(features):
-        pose = locate(head, there)
+        pose = find_body_pose(head, there)
         if pose is not None:
             poses[i] = pose
-    if np.ptp([turn_of(pose) for pose in poses.values()]) < LEAST_TURN:
+    if np.ptp([turn_of(pose) for pose in poses.values()]) < MIN_TURN:
         return "nothing rigid is seen to turn"
-    keys, spread = choose_keys(images, poses, head.points)
+    keys, spread = choose_keyframes(images, poses, head.points)
     return (head, keys, spread) if keys else "too little of what turns can be followed"
 
 

@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from anglecam.video.film import Frame, open_film
-from anglecam.vision.rigid_body.rigid import follow_rigid_body
+from anglecam.vision.rigid_body.follow import follow_rigid_body
 from support.drawn import Look, draw_frames
 from support.real import REAL
 from synth.session import render
