@@ -7,10 +7,12 @@ from pathlib import Path
 
 from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError
-from anglecam.identification.identify import Estimator, Identified, declared_start, identify_records
+from anglecam.identification.identified import Identified
+from anglecam.identification.identify_records import declared_start, identify_records
 from anglecam.io.rig import Rig
 from anglecam.io.session import Session, command_beside, read_session, rig_beside
 from anglecam.loop.close import Verdict, close_records
+from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.workflow.recordings import Measured, measure_recording, measure_session, shown_to_loop
 
 
@@ -40,15 +42,17 @@ def measure(clip: str | Path, rig: Rig | None = None) -> AngleSeries:
     return measure_recording(path, rig or rig_beside(path), command_beside(path)).series
 
 
-def identify(session: str | Path, estimator: Estimator = "oe2") -> Identified:
+def identify(session: str | Path, estimator: str = "oe2", neck: LargeAngleNeck | None = None) -> Identified:
     """Fit a model to a session's recordings, those that its rig file holds out apart.
 
     Parameters
     ----------
     session : path
         A folder of clips or angle series, with commands or without.
-    estimator : {'ekf', 'oe2', 'oe3'}
-        See `anglecam.identification.identify.identify_records`.
+    estimator : {'ekf', 'oe2', 'oe3', 'neck'}
+        See `anglecam.identification.identify_records.identify_records`.
+    neck : LargeAngleNeck, optional
+        What is known of the neck, for ``neck``; the paper's neck otherwise.
 
     Returns
     -------
@@ -64,7 +68,7 @@ def identify(session: str | Path, estimator: Estimator = "oe2") -> Identified:
     records = measured.records
     held_out = [r for r in records if r.name in opened.rig.held_out]
     fitted = [r for r in records if r.name not in opened.rig.held_out]
-    return identify_records(fitted, opened.rig, estimator, held_out=held_out)
+    return identify_records(fitted, opened.rig, estimator, held_out=held_out, neck=neck)
 
 
 def close_loop(session: str | Path, hold_out: Sequence[str] = ()) -> Verdict:

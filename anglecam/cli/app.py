@@ -19,6 +19,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressC
 
 from anglecam import __version__
 from anglecam.cli.batch import batch
+from anglecam.cli.estimator_option import EstimatorCommand
 from anglecam.cli.neck import app as neck
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.io.netcdf_parquet import Also, write_also
@@ -35,7 +36,6 @@ from anglecam.io.session import (
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
-    from anglecam.identification.identify import Estimator
     from anglecam.measurement.clip import Measurement
     from anglecam.measurement.tracks import MeasuredTracks
     from anglecam.workflow.recordings import Measured
@@ -180,33 +180,34 @@ def calibrate(
         errors.print(printable(note))
 
 
-@app.command()
+@app.command(cls=EstimatorCommand)
 def identify(
     session: SessionFolder,
     out: Out,
-    estimator: Annotated[str, typer.Option("--estimator", help="One of ekf, oe2, oe3, neck.")] = "oe2",
+    estimator: Annotated[str, typer.Option("--estimator")] = "oe2",
     neck: Annotated[
         Path | None, typer.Option("--neck", help="What is known of the neck, for --estimator neck; else the paper's.")
     ] = None,
 ) -> None:
     """Fit a model to a session: model.json, and model.mat for MATLAB."""
-    from anglecam.identification.identify import ESTIMATORS
+    from anglecam.identification.estimators import ESTIMATORS
     from anglecam.io.neck_file import read_neck
     from anglecam.report.summary import model_table
     from anglecam.workflow.session import identify_session
 
     if estimator not in ESTIMATORS:  # before any clip is measured
         raise RigError(f"--estimator {estimator}: choose one of {', '.join(ESTIMATORS)}")
-    chosen: Estimator = estimator  # type: ignore[assignment]
-    if neck is not None and estimator != "neck":
-        raise RigError(f"--neck {neck}: only --estimator neck looks at it")
-    declared = read_neck(neck).large_angle if estimator == "neck" else None
+    takes_neck = ESTIMATORS[estimator].takes_neck
+    if neck is not None and not takes_neck:
+        users = " or ".join(f"--estimator {entry.id}" for entry in ESTIMATORS.values() if entry.takes_neck)
+        raise RigError(f"--neck {neck}: used by {users} only")
+    declared = read_neck(neck).large_angle if takes_neck else None
     opened, measured = _open(session, out)
-    model = identify_session(opened, measured, out, chosen, declared)
+    model = identify_session(opened, measured, out, estimator, declared)
     screen.print(model_table([model]))
     for doubt in model.doubts:
         screen.print(doubt, soft_wrap=True, highlight=False, markup=False)
-    if estimator == "neck" and neck is None:
+    if takes_neck and neck is None:
         screen.print("the neck is the paper's: one spring, constant γ; declare yours with --neck", soft_wrap=True)
     _end(measured.problems)
 

@@ -71,7 +71,7 @@ def shown_to_loop(session: Session, measured: Measured) -> Shown:
 def _record(series: AngleSeries, command: Command | None, clock_sigma: float, rig: Rig) -> Record:
     declared = rig.model.gravity_deg
     upright = None if declared is None else math.radians(declared)
-    record = record_from_series(series, command, zero_known=rig.neutral != "auto", upright=upright)
+    record = record_from_series(series, command, zero_known=rig.neutral != "auto", mass_from_upright=upright)
     return replace(record, clock_sigma=clock_sigma)
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 from anglecam.errors import RigError
 from anglecam.identification.export import fitted_model, transfer_as_dict, write_mat
-from anglecam.identification.identify import Estimator, Identified, declared_start, identify_records
+from anglecam.identification.identified import Identified
+from anglecam.identification.identify_records import declared_start, identify_records
 from anglecam.io.files import write_json
 from anglecam.io.series_csv import write_series
 from anglecam.io.session import CORRECTED, SERIES_ENDING, Session
@@ -35,7 +36,7 @@ class Closed:
 
 
 def identify_session(
-    opened: Session, measured: Measured, out: Path, estimator: Estimator = "oe2", neck: LargeAngleNeck | None = None
+    opened: Session, measured: Measured, out: Path, estimator: str = "oe2", neck: LargeAngleNeck | None = None
 ) -> Identified:
     """Fit a model to what is not held out of a session and write it as ``model.json`` and ``model.mat``.
 
@@ -48,7 +49,7 @@ def identify_session(
     out : Path
         Folder for the files.
     estimator : {'ekf', 'oe2', 'oe3', 'neck'}
-        See `anglecam.identification.identify.identify_records`.
+        See `anglecam.identification.identify_records.identify_records`.
     neck : LargeAngleNeck, optional
         What is known of the neck, for ``neck``.
 
