@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from anglecam.data.series import AngleSeries
-from anglecam.identification.identify import Estimator, Identified
+from anglecam.identification.identified import Identified
 from anglecam.io.rig import Rig
 from anglecam.io.session import read_session
 from anglecam.loop.close import Verdict
@@ -53,7 +53,7 @@ def measure(clip: str | Path, rig: Rig | None = None) -> AngleSeries:
 
 def identify(
     session: str | Path,
-    estimator: Estimator = "oe2",
+    estimator: str = "oe2",
     *,
     hold_out: Sequence[str] = (),
     neck: LargeAngleNeck | None = None,
@@ -65,7 +65,7 @@ def identify(
     session : path
         A folder of clips or angle series, with or without commands.
     estimator : {'ekf', 'oe2', 'oe3', 'neck'}
-        See `anglecam.identification.identify.identify_records`.
+        See `anglecam.identification.identify_records.identify_records`.
     hold_out : sequence of str
         Recordings to predict only, besides those that the rig file names.
     neck : LargeAngleNeck, optional

@@ -28,7 +28,7 @@ import anglecam
 from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.identification.ekf import PAPER, EkfSettings, fit_ekf, settings_for
-from anglecam.identification.identify import identify_records
+from anglecam.identification.identify_records import identify_records
 from anglecam.identification.kalman import SHARED
 from anglecam.identification.output_error import fit_output_error
 from anglecam.identification.smoothing import smooth

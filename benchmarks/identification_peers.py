@@ -40,7 +40,7 @@ import anglecam
 from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.identification.ekf import fit_ekf, settings_for
-from anglecam.identification.identify import identify_records
+from anglecam.identification.identify_records import identify_records
 from anglecam.io.rig import Rig
 from support.transfer import SYS2_DENOMINATOR, SYS2_NUMERATOR, respond
 

@@ -15,6 +15,7 @@ import typer
 
 from anglecam import __version__
 from anglecam.cli.batch import batch
+from anglecam.cli.estimator_option import EstimatorCommand
 from anglecam.cli.clips import budget, calibrate, measure
 from anglecam.cli.neck import app as neck
 from anglecam.cli.sessions import close, identify
@@ -47,7 +48,8 @@ def _anglecam(
 
 
 app.add_typer(neck, name="neck")
-for _command in (measure, budget, calibrate, identify, close, batch):
+app.command(cls=EstimatorCommand)(identify)
+for _command in (measure, budget, calibrate, close, batch):
     app.command()(_command)
 
 

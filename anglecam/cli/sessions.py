@@ -17,36 +17,36 @@ from anglecam.io.session import Session, read_session
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
-    from anglecam.identification.identify import Estimator
     from anglecam.workflow.session import MeasuredSession
 
 
 def identify(
     session: SessionFolder,
     out: Out,
-    estimator: Annotated[str, typer.Option("--estimator", help="One of ekf, oe2, oe3, neck.")] = "oe2",
+    estimator: Annotated[str, typer.Option("--estimator")] = "oe2",
     neck: Annotated[
         Path | None, typer.Option("--neck", help="What is known of the neck, for --estimator neck; else the paper's.")
     ] = None,
 ) -> None:
     """Fit a model to a session: model.json, and model.mat for MATLAB."""
-    from anglecam.identification.identify import ESTIMATORS
+    from anglecam.identification.estimators import ESTIMATORS
     from anglecam.io.neck_file import read_neck
     from anglecam.report.summary import model_table
     from anglecam.workflow.session_results import write_identified
 
     if estimator not in ESTIMATORS:  # before any clip is measured
         raise RigError(f"--estimator {estimator}: choose one of {', '.join(ESTIMATORS)}")
-    chosen: Estimator = estimator  # type: ignore[assignment]
-    if neck is not None and estimator != "neck":
-        raise RigError(f"--neck {neck}: only --estimator neck uses it")
-    declared = read_neck(neck).large_angle if estimator == "neck" else None
+    takes_neck = ESTIMATORS[estimator].takes_neck
+    if neck is not None and not takes_neck:
+        users = " or ".join(f"--estimator {entry.id}" for entry in ESTIMATORS.values() if entry.takes_neck)
+        raise RigError(f"--neck {neck}: used by {users} only")
+    declared = read_neck(neck).large_angle if takes_neck else None
     measured = _measure(read_session(session), out)
-    model = write_identified(measured, out, chosen, declared)
+    model = write_identified(measured, out, estimator, declared)
     screen.print(model_table([model]))
     for doubt in model.doubts:
         screen.print(doubt, soft_wrap=True, highlight=False, markup=False)
-    if estimator == "neck" and neck is None:
+    if takes_neck and neck is None:
         screen.print("the neck is the paper's: one spring, constant γ; declare yours with --neck", soft_wrap=True)
     end(measured.problems)
 

@@ -45,9 +45,9 @@ class View:
     """Whether all that the picture shows otherwise than the mechanism moves comes from where the mark is, if known."""
 
 
-UNSEEN = View()
+UNKNOWN_VIEW = View()
 """Of a series from elsewhere: the face looks ahead at its zero, and more is not known."""
 
 
-UNSEEN = View()
+UNKNOWN_VIEW = View()
 """For a series without a film: the line to the mark is horizontal at zero angle, and nothing more is known."""

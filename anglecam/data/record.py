@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.data.camera_evidence import UNSEEN, View
+from anglecam.data.camera_evidence import UNKNOWN_VIEW, View
 from anglecam.data.command import Command
 from anglecam.data.series import AngleSeries
 from anglecam.data.typing import Floats
 from anglecam.errors import InputError
 
-STILL = 0.02
+RELEASE_SHARE = 0.02
 """Share of the whole swing within which the angle counts as not yet released."""
-REST = 10.0
+REST_RANGE_STEPS = 10.0
 """A range below this many median steps from frame to frame is noise about a rest: of white noise it is 5 to 8."""
-SLOWEST = 1.0
+LONGEST_INTERVAL = 1.0
 """s from frame to frame; what moves so slowly is no mechanism that is looked at here, and milliseconds are likelier."""
-LEAST_FRAMES = 20
+MIN_FRAMES = 20
 """Fewer measured frames than this tell nothing about a model of three parameters and three unknowns of its own."""
 
 
@@ -38,14 +38,14 @@ class Record:
     """Whether the zero of the angle is declared; otherwise it is one of the recording's own unknowns."""
     sigma: Floats
     """Stated standard uncertainty, rad; NaN where none is stated."""
-    cross: Floats | None = None
+    lever_scatter: Floats | None = None
     """Scatter of the mouth's distance from the pivot, divided by that distance, rad: what the camera adds in the
     direction in which nothing can move; ``None`` for a series without marks."""
-    view: View = UNSEEN
+    view: View = UNKNOWN_VIEW
     """How the camera sees the mechanism."""
     clock_sigma: float = 0.0
     """Standard uncertainty of the command's clock against the clip's, s."""
-    upright: float | None = None
+    mass_from_upright: float | None = None
     """The centre of mass from upright at neutral, rad, where it is declared."""
 
     @property
@@ -59,12 +59,18 @@ class Record:
 
     def only(self, frames: NDArray[np.bool_]) -> Record:
         """Return the recording with some of its (n,) frames; the command keeps its whole history."""
-        cross = None if self.cross is None else self.cross[frames]
-        return replace(self, time=self.time[frames], angle=self.angle[frames], sigma=self.sigma[frames], cross=cross)
+        lever_scatter = None if self.lever_scatter is None else self.lever_scatter[frames]
+        return replace(
+            self,
+            time=self.time[frames],
+            angle=self.angle[frames],
+            sigma=self.sigma[frames],
+            lever_scatter=lever_scatter,
+        )
 
 
 def record_from_series(
-    series: AngleSeries, command: Command | None, *, zero_known: bool, upright: float | None = None
+    series: AngleSeries, command: Command | None, *, zero_known: bool, mass_from_upright: float | None = None
 ) -> Record:
     """Keep what an estimator can use of a series.
 
@@ -76,7 +82,7 @@ def record_from_series(
         On the same clock.
     zero_known : bool
         Whether the rig declares ``neutral`` as a number.
-    upright : float, optional
+    mass_from_upright : float, optional
         The centre of mass from upright at neutral, rad, where the rig declares it.
 
     Returns
@@ -87,14 +93,14 @@ def record_from_series(
     Raises
     ------
     InputError
-        Where fewer than `LEAST_FRAMES` frames are measured, or they follow each other more slowly than `SLOWEST`, or
+        Where fewer than `MIN_FRAMES` frames are measured, or they follow each other more slowly than `LONGEST_INTERVAL`, or
         all of them lie before the command's first change.
     """
     ok = series.ok
-    if ok.sum() < LEAST_FRAMES:
-        raise InputError(f"{series.name}: {ok.sum()} measured frames are too few to fit a model (need {LEAST_FRAMES})")
+    if ok.sum() < MIN_FRAMES:
+        raise InputError(f"{series.name}: {ok.sum()} measured frames are too few to fit a model (need {MIN_FRAMES})")
     interval = float(np.median(np.diff(series.time[ok])))
-    if interval > SLOWEST:
+    if interval > LONGEST_INTERVAL:
         raise InputError(f"{series.name}: its frames are {interval:.3g} s apart; are times in seconds?")
     change = None if command is None else command.first_change()
     last = float(series.time[ok][-1])
@@ -103,10 +109,10 @@ def record_from_series(
             f"{series.name}: its command first changes at {change:.4g} s, after the last measured frame at {last:.4g} s"
             "; are its times seconds on the clip's clock?"
         )
-    cross = None
+    lever_scatter = None
     if series.mark_px is not None and series.pivot_px is not None:
         lever = np.hypot(*(series.mark_px - series.pivot_px)[ok].T)
-        cross = lever / np.mean(lever) - 1.0 if np.all(np.isfinite(lever)) else None
+        lever_scatter = lever / np.mean(lever) - 1.0 if np.all(np.isfinite(lever)) else None
     acts = command is not None and (change is not None or (zero_known and command.angle[0] != 0.0))
     record = Record(
         series.name,
@@ -115,19 +121,19 @@ def record_from_series(
         command if acts else None,
         zero_known,
         series.sigma[ok],
-        cross,
+        lever_scatter,
         _view(series, ok),
-        upright=upright,
+        mass_from_upright=mass_from_upright,
     )
     return record if acts else _from_release(record)
 
 
 def _view(series: AngleSeries, ok: NDArray[np.bool_]) -> View:
     if series.line is None or series.mark_px is None or series.pivot_px is None:
-        return UNSEEN
+        return UNKNOWN_VIEW
     arm = (series.mark_px - series.pivot_px)[ok]
     if not np.any(np.isfinite(arm)):
-        return UNSEEN
+        return UNKNOWN_VIEW
     neutral, lever = float(np.nanmedian((series.line - series.angle)[ok])), float(np.nanmedian(np.hypot(*arm.T)))
     mirrored = bool(np.median(arm[:, 0] * np.cos(series.line[ok])) < 0.0)
     evidence = series.evidence
@@ -141,11 +147,11 @@ def _view(series: AngleSeries, ok: NDArray[np.bool_]) -> View:
 def _from_release(record: Record) -> Record:
     """Leave out the frames in which something still holds what will swing freely; the model knows no hand."""
     jitter = float(np.median(np.abs(np.diff(record.angle))))
-    if np.ptp(record.angle) < REST * jitter:
+    if np.ptp(record.angle) < REST_RANGE_STEPS * jitter:
         raise InputError(f"{record.name}: no command, and nothing moves; there is no swing to fit")
     start = np.median(record.angle[:5])
-    moved = np.abs(record.angle - start) > STILL * np.ptp(record.angle)
+    moved = np.abs(record.angle - start) > RELEASE_SHARE * np.ptp(record.angle)
     first = int(np.argmax(moved))
-    if len(record.time) - first < LEAST_FRAMES:
+    if len(record.time) - first < MIN_FRAMES:
         raise InputError(f"{record.name}: no command, and the angle moves in too few frames to fit a free swing")
     return record.between(record.time[first], np.inf)

@@ -14,7 +14,7 @@ from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter
 
 
-def _seen(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
+def _observe(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
     return angle + parameters[0] * (time - time[0])
 
 
@@ -28,5 +28,5 @@ EFFECT = Effect(
     aliases=("constant_torque",),
     separating_experiment="a minute of rest, with something in the picture that is fixed to the ground",
     source="JCGM 100:2008, F.2.4",
-    seen=_seen,
+    observation=_observe,
 )

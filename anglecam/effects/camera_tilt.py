@@ -18,7 +18,7 @@ from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter
 
 
-def _seen(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
+def _observe(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
     tilt, axis, height = parameters
 
     def off(line: Floats) -> Floats:
@@ -48,6 +48,6 @@ EFFECT = Effect(
     aliases=("pivot_offset", "lens_distortion", "linkage_geometry"),
     separating_experiment="a chessboard held in the plane of motion: anglecam calibrate, then camera: {calibration: …}",
     source="Hartley, Zisserman, Multiple View Geometry, 2nd ed., 2004, sec. 6.3",
-    seen=_seen,
+    observation=_observe,
     needs=_needs,
 )

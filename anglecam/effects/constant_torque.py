@@ -29,7 +29,14 @@ EFFECT = Effect(
     relaxes="Eqs. (23), (24): the spring balances gravity exactly at neutral",
     parameters=(
         Parameter(
-            "torque_deg_per_s2", "T", 0.0, -500.0, 500.0, (1.0, -1.0, 20.0, -20.0), math.degrees(1.0), like_zero=True
+            "torque_deg_per_s2",
+            "T",
+            0.0,
+            -500.0,
+            500.0,
+            (1.0, -1.0, 20.0, -20.0),
+            math.degrees(1.0),
+            mimics_zero_offset=True,
         ),
     ),
     aliases=("coulomb_friction",),

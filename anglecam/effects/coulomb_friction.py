@@ -20,7 +20,7 @@ SI_TO_FILE = math.degrees(1.0)
 
 
 @njit
-def _dry(parameters: Values) -> tuple[float, float, float, float]:
+def _friction(parameters: Values) -> tuple[float, float, float, float]:
     mean, difference, more = parameters[0], parameters[1], parameters[2]
     breakaway = mean + more if more > 0.0 else 0.0
     return max(mean + difference, 0.0), max(mean - difference, 0.0), breakaway, parameters[3]
@@ -37,7 +37,9 @@ EFFECT = Effect(
     relaxes="Eq. (22): damping is viscous only",
     parameters=(
         Parameter("friction_deg_per_s2", "F", 0.0, 0.0, 500.0, (0.3, 3.0, 15.0), SI_TO_FILE),
-        Parameter("asymmetry_deg_per_s2", "D", 0.0, -250.0, 250.0, (0.0,), SI_TO_FILE, staged=True, like_zero=True),
+        Parameter(
+            "asymmetry_deg_per_s2", "D", 0.0, -250.0, 250.0, (0.0,), SI_TO_FILE, staged=True, mimics_zero_offset=True
+        ),
         Parameter(
             "breakaway_excess_deg_per_s2",
             "B",
@@ -63,5 +65,5 @@ EFFECT = Effect(
     aliases=("quadratic_drag", "backlash", "dead_zone"),
     separating_experiment="a slow triangle of small amplitude, on which dry friction shows as a constant lag in angle",
     source="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994",
-    dry=_dry,
+    friction=_friction,
 )

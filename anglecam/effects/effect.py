@@ -28,7 +28,7 @@ from anglecam.data.typing import Floats
 Values = tuple[float, ...]
 """Parameters as compiled functions take them: arrays would cost them more than what they work out."""
 
-PORTS = ("command", "lag", "servo", "load", "dry", "when", "seen")
+PORTS = ("command", "lag", "servo", "load", "friction", "timing", "observation")
 
 
 @dataclass(frozen=True)
@@ -65,12 +65,12 @@ class Parameter:
     """Whether it is a direction, which files state between −180° and 180°."""
     staged: bool = False
     """Whether it is left out, which must be the same as 0, until the data ask for it; such parameters come last."""
-    like_zero: bool = False
+    mimics_zero_offset: bool = False
     """Whether it moves the head as a wrong zero of the angle does, so that it can be told only where zero is known."""
     is_speed: bool = False
     """Whether it is a speed of the head, which recordings that are much slower cannot tell."""
 
-    def told(self, value: float, sigma: float = 0.0) -> tuple[float, float]:
+    def in_file_unit(self, value: float, sigma: float = 0.0) -> tuple[float, float]:
         """Return value and standard uncertainty in the unit in ``name``; infinite for a limit that is absent."""
         if self.circular:
             value = math.remainder(value, math.tau)
@@ -113,17 +113,17 @@ class Effect:
     effect has made of it."""
     load: Any = field(default=None, repr=False)
     """Compiled (θ, ω, parameters) → angular acceleration added, rad/s²."""
-    dry: Any = field(default=None, repr=False)
+    friction: Any = field(default=None, repr=False)
     """Compiled (parameters) → (sliding up, sliding down, breaking away if more, Stribeck's speed): rad/s² and rad/s;
     opposes motion."""
-    when: Callable[[Floats, Floats, Floats, View], Floats] | None = field(default=None, repr=False)
+    timing: Callable[[Floats, Floats, Floats, View], Floats] | None = field(default=None, repr=False)
     """(stamps s, angle rad, parameters, view) → when what the frames show happened, s."""
-    seen: Callable[[Floats, Floats, Floats, View], Floats] | None = field(default=None, repr=False)
+    observation: Callable[[Floats, Floats, Floats, View], Floats] | None = field(default=None, repr=False)
     """(stamps s, angle rad, parameters, view) → the angle that is measured, rad."""
     needs: Callable[[View], bool] = field(default=lambda view: True, repr=False)
     """Whether a view tells what the effect is reckoned from."""
 
-    def fixing(self, values: Mapping[str, float]) -> Effect:
+    def with_fixed(self, values: Mapping[str, float]) -> Effect:
         """Return the effect with some parameters fixed: ``values`` by name, SI; itself where none is its own."""
         own = tuple((i, values[p.name]) for i, p in enumerate(self.parameters) if p.name in values)
         if not own:

@@ -22,7 +22,7 @@ LEAST = 0.3
 """A lens does not draw a picture in by more."""
 
 
-def _seen(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
+def _observe(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
     lever, pivot = view.lever_px or 1.0, view.pivot_px or (0.0, 0.0)
     # ahead and up from the middle of the picture, in lever arms
     side = -1.0 if view.mirrored else 1.0
@@ -66,6 +66,6 @@ EFFECT = Effect(
     aliases=("camera_tilt", "pivot_offset", "linkage_geometry"),
     separating_experiment="a chessboard clip: anglecam calibrate, then camera: {calibration: …}",
     source="Brown, Photogrammetric Engineering 37(8), 1971",
-    seen=_seen,
+    observation=_observe,
     needs=_needs,
 )

@@ -15,7 +15,7 @@ from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter
 
 
-def _seen(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
+def _observe(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
     ahead, up = parameters
 
     def off(line: Floats) -> Floats:
@@ -46,6 +46,6 @@ EFFECT = Effect(
     aliases=("camera_tilt", "lens_distortion", "linkage_geometry"),
     separating_experiment="slow motion over the whole range, marker: none: the path of the mouth has its own centre",
     source="the paper, Fig. 7",
-    seen=_seen,
+    observation=_observe,
     needs=_needs,
 )

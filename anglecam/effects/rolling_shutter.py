@@ -14,7 +14,7 @@ from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter
 
 
-def _when(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
+def _exposure_time(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
     lever, pivot = view.lever_px or 0.0, view.pivot_px or (0.0, 0.0)
     return time + parameters[0] * (pivot[1] - lever * np.sin(view.neutral + angle))
 
@@ -33,6 +33,6 @@ EFFECT = Effect(
     aliases=("dead_time", "quadratic_drag"),
     separating_experiment="the same motion filmed with the camera upside down",
     source="Meingast, Geyer, Sastry, OMNIVIS 2005",
-    when=_when,
+    timing=_exposure_time,
     needs=_needs,
 )

@@ -19,7 +19,7 @@ from scipy import io
 
 from anglecam.data.typing import Floats
 from anglecam.errors import InputError
-from anglecam.identification.identify import Identified
+from anglecam.identification.identified import Identified
 from anglecam.io.files import read_json
 from anglecam.models.large_angle import QUANTITIES, LargeAngle
 from anglecam.neck.large_angle import linearise
@@ -67,7 +67,7 @@ class FittedModel:
 
 
 def fitted_model(model: Identified) -> FittedModel:
-    """Take the model that `anglecam.identification.identify.identify_records` found.
+    """Take the model that `anglecam.identification.identify_records.identify_records` found.
 
     Parameters
     ----------

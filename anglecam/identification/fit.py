@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
+from anglecam.identification.noise import autoregression
 from anglecam.models.model import Model
 
-CLUSTER = 15
+CLUSTER_FRAMES = 15
 """Frames; errors further apart than this count as independent."""
-PRESSED = 100.0
+FARTHEST_BEYOND_BOUND = 100.0
 """Standard deviations; a parameter that would lie further beyond its bound is as good as known to be on it."""
 
 
@@ -52,12 +53,17 @@ class Fit:
         """Sum of squared whitened residuals, rad²."""
         return float(self.white @ self.white)
 
+    @property
+    def residual_phi(self) -> float:
+        """AR(1) coefficient, frame to frame, of the residuals."""
+        return autoregression(self.residuals, "residual").phi
+
     @cached_property
     def sigma(self) -> Floats:
         """(p,) standard uncertainties of ``parameters``, SI; NaN for one that a bound holds or that moves nothing.
 
         The larger of what noise that the whitening made white would give, and of what is left over itself gives if it
-        may hang together within `CLUSTER` frames: a measurement's errors follow the motion, and so does what a model's
+        may hang together within `CLUSTER_FRAMES` frames: a measurement's errors follow the motion, and so does what a model's
         equations round off (Liang and Zeger, Biometrika 73, 1986). What a bound holds is not known to be there: the
         others are as unsure as it may be off the bound.
         """
@@ -69,7 +75,7 @@ class Fit:
         """(p, p) covariance of ``parameters``, SI, likewise; NaN for a parameter that cannot be told."""
         return self._covariance(lambda jacobian: jacobian)
 
-    def coloured_covariance(self, records: Sequence[Record], phi: float) -> Floats:
+    def autoregressive_covariance(self, records: Sequence[Record], phi: float) -> Floats:
         """Return `covariance` for a fit without whitening whose noise is nevertheless AR(1) with φ = ``phi``.
 
         The covariance is the sandwich (JᵀJ)⁻¹ JᵀRJ (JᵀJ)⁻¹, R the correlation of the noise.
@@ -86,13 +92,15 @@ class Fit:
         """Multiply (N, k) values by the errors' covariance as clusters of the residuals tell it, in variances."""
         edges = np.cumsum([0, *(len(e) for e in self.residuals)])
         parts = [
-            slice(i, min(i + CLUSTER, stop)) for start, stop in pairwise(edges) for i in range(start, stop, CLUSTER)
+            slice(i, min(i + CLUSTER_FRAMES, stop))
+            for start, stop in pairwise(edges)
+            for i in range(start, stop, CLUSTER_FRAMES)
         ]
         variance = self.cost / max(1, len(self.white) - jacobian.shape[1])
         product = [np.outer(self.white[part], self.white[part] @ jacobian[part]) for part in parts]
         return np.concatenate(product) / variance * len(parts) / max(1, len(parts) - 1)
 
-    def pulled_by(self, records: Sequence[Record], errors: Sequence[Floats]) -> Floats:
+    def parameter_shift(self, records: Sequence[Record], errors: Sequence[Floats]) -> Floats:
         """Return (p,) by how much each parameter changes, SI, with errors of the angles (rad, one array a recording).
 
         Nothing for what zeros and initial states that are fitted take up; NaN for a parameter that cannot be told.
@@ -153,7 +161,7 @@ def _confined(step: Floats, covariance: Floats, within: Sequence[tuple[int, floa
         sd = np.sqrt(covariance[at, at])
         if not sd > 0.0:
             continue
-        mean = np.clip(step[at], lower - PRESSED * sd, upper + PRESSED * sd)
+        mean = np.clip(step[at], lower - FARTHEST_BEYOND_BOUND * sd, upper + FARTHEST_BEYOND_BOUND * sd)
         mean_within, variance_within = truncnorm.stats((lower - mean) / sd, (upper - mean) / sd, mean, sd)
         slope = covariance[at] / sd**2
         step = step + slope * (mean_within - step[at])

@@ -25,7 +25,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.data.record import LEAST_FRAMES, Record
+from anglecam.data.record import MIN_FRAMES, Record
 from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit
 
@@ -64,7 +64,7 @@ def drifts(plant_parameters: Floats, records: Sequence[Record]) -> bool:
     return growth > (1.0 if np.any(poles.imag != 0.0) else -1.0)
 
 
-def goes_astray(fit: Fit, records: Sequence[Record]) -> bool:
+def loses_step(fit: Fit, records: Sequence[Record]) -> bool:
     """Tell whether a fitted model's free run is out of step with what was measured."""
     swing = np.concatenate([r.angle - r.angle.mean() for r in records])
     return fit.rmse > ASTRAY * float(np.sqrt(np.mean(swing**2)))
@@ -105,9 +105,9 @@ def _poles(plant_parameters: Floats) -> NDArray[np.complex128]:
 def _cut(record: Record, length: float, fewest: int) -> list[Record]:
     """Cut one recording into windows of equal length (s), about as long as asked for."""
     span = float(record.time[-1] - record.time[0]) + record.interval
-    most = max(1, len(record.time) // LEAST_FRAMES)
+    most = max(1, len(record.time) // MIN_FRAMES)
     count = min(most, max(fewest, round(span / length)))
     edges = record.time[0] + span * np.arange(count + 1) / count
     parts = [record.between(start, stop) for start, stop in pairwise(edges)]
     # where frames are missing a window may be left with too few for a state of its own
-    return [part for part in parts if len(part.time) >= LEAST_FRAMES // 2]
+    return [part for part in parts if len(part.time) >= MIN_FRAMES // 2]

@@ -55,7 +55,7 @@ def noise_floor(records: Sequence[Record]) -> Noise | None:
         Where a film's angles are the whole head's, they are better than the mouth's distance from the pivot tells, and
         their own statement counts; ``None`` where nothing tells.
     """
-    witness, stated = witness_noise(records), stated_noise(records)
+    witness, stated = motion_free_noise(records), stated_noise(records)
     if witness is None or stated is None:
         return witness or stated
     if witness.filmed and stated.sigma < witness.sigma:
@@ -63,7 +63,7 @@ def noise_floor(records: Sequence[Record]) -> Noise | None:
     return witness
 
 
-def witness_noise(records: Sequence[Record]) -> Noise | None:
+def motion_free_noise(records: Sequence[Record]) -> Noise | None:
     """Estimate the noise from what cannot be motion.
 
     Parameters
@@ -76,7 +76,7 @@ def witness_noise(records: Sequence[Record]) -> Noise | None:
     Noise or None
         From the distance to the pivot where there are marks, else from the rest; ``None`` where there is neither.
     """
-    crosses = [r.cross for r in records if r.cross is not None]
+    crosses = [r.lever_scatter for r in records if r.lever_scatter is not None]
     if crosses:
         return autoregression(crosses, DISTANCE)
     rests = []

@@ -43,7 +43,7 @@ def systematic_covariance(fit: Fit, records: Sequence[Record], noise: Noise) -> 
     (p, p) ndarray
         SI; NaN for a parameter that its bound holds.
     """
-    pulls = [fit.pulled_by(records, _later(fit, records))] if any(r.clock_sigma for r in records) else []
+    pulls = [fit.parameter_shift(records, _later(fit, records))] if any(r.clock_sigma for r in records) else []
     if all(np.isfinite(r.sigma).all() for r in records):
         pulls += _pulls_of_places(fit, records, noise)
     count = len(fit.parameters)
@@ -61,12 +61,12 @@ def _pulls_of_places(fit: Fit, records: Sequence[Record], noise: Noise) -> list[
     stated = np.concatenate([r.sigma for r in records])
     own = min(noise.sigma, fit.rmse)  # what is each frame's own scatters about the model
     shared = np.sqrt(max(0.0, float(np.mean(stated**2)) - own**2))
-    pulls = [shared * fit.pulled_by(records, [np.ones(len(r.time)) for r in records])]
+    pulls = [shared * fit.parameter_shift(records, [np.ones(len(r.time)) for r in records])]
     for name in dict.fromkeys(r.name for r in records):
         wrong = _wrong_pivot([r for r in records if r.name == name])
         for course in (np.sin, lambda angle: 1.0 - np.cos(angle)):
             errors = [wrong * course(r.angle) if r.name == name else np.zeros(len(r.time)) for r in records]
-            pulls.append(fit.pulled_by(records, errors))
+            pulls.append(fit.parameter_shift(records, errors))
     return pulls
 
 

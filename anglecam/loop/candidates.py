@@ -135,7 +135,7 @@ def fit_with(
     first[0] = effect.parameters[0].starts[0]
     near = [effect.null + share * (forecast.start - effect.null) for share in (0.5, 2.0)]
     # several parameters may have several valleys, and dry friction has them whenever a head is held or sets off
-    several = len(early) > 1 or effect.dry is not None
+    several = len(early) > 1 or effect.friction is not None
     further = [(near, HOPEFUL)] if several else [([forecast.tried, first], FULFILLED), (near, HOPEFUL)]
     best = fit_from(forecast.start, forecast.tried, first) if several else fit_from(forecast.start)
     # what a limit does is not in proportion: scaled down it may do nothing, where nothing tells which way to go

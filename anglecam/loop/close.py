@@ -18,7 +18,7 @@ from anglecam.data.record import Record
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.initial_guess import start_parameters
-from anglecam.identification.multiple_shooting import drifts, goes_astray, windows
+from anglecam.identification.multiple_shooting import drifts, loses_step, windows
 from anglecam.identification.noise import Noise, autoregression, noise_floor
 from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.loop.candidates import Candidate, fit_to_more, log_likelihood_gain, promising, rivals
@@ -132,7 +132,7 @@ def _begin(
     own_starts = [s[: plant.base_count] for s in starts]
     base = fit_output_error(plant, fitted, [*start_parameters(fitted), *own_starts])
     floor = noise_floor(fitted)
-    if drifts(base.parameters, fitted) or goes_astray(base, fitted):
+    if drifts(base.parameters, fitted) or loses_step(base, fitted):
         fitted, predicted = windows(fitted, base.parameters), windows(predicted, base.parameters)
         base = fit_output_error(plant, fitted, [base.parameters, *own_starts])
     ledger = applicable([*fitted, *predicted])

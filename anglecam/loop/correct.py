@@ -36,23 +36,23 @@ def corrected(series: AngleSeries, fit: Fit, view: View) -> AngleSeries | None:
     """
     if not isinstance(fit.model, Plant):
         raise TypeError("only a Plant has effects")
-    camera = [(e, own) for e, own in fit.model.own_parameters(fit.parameters) if e.station == "camera"]
+    camera = [(e, own) for e, own in fit.model.parameters_by_effect(fit.parameters) if e.station == "camera"]
     if not camera:
         return None
     angle, time = series.angle, series.time
     for effect, own in reversed(camera):
-        if effect.seen is not None:
+        if effect.observation is not None:
             shown, angle = angle, angle.copy()
             for _ in range(ROUNDS):
-                angle = angle + shown - effect.seen(series.time, angle, own, view)
+                angle = angle + shown - effect.observation(series.time, angle, own, view)
         if effect.command is not None:  # the clip's clock against the command's
             ticks = np.linspace(min(2.0 * time[0], 0.0), 2.0 * time[-1], len(time))
             nothing = np.zeros(len(ticks))
             time = np.interp(time, effect.command(Knots(ticks, nothing, nothing), own).time, ticks)
     known = np.isfinite(angle)
     for effect, own in reversed(camera):
-        if effect.when is not None and known.any():
+        if effect.timing is not None and known.any():
             # a frame without an angle lies between those that have one
             filled = np.interp(time, time[known], angle[known])
-            time = effect.when(time, filled, own, view)
+            time = effect.timing(time, filled, own, view)
     return replace(series, angle=angle, time=time)

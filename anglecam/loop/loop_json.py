@@ -69,7 +69,9 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
         "effects": [
             {
                 "id": accepted.effect.id,
-                "parameters": {p.name: model[p.name] | {"null": p.told(p.null)[0]} for p in accepted.effect.parameters},
+                "parameters": {
+                    p.name: model[p.name] | {"null": p.in_file_unit(p.null)[0]} for p in accepted.effect.parameters
+                },
                 "relaxes": accepted.effect.relaxes,
                 "alias_set": list(accepted.alias_set),
                 "separating_experiment": _what_to_film(accepted.effect, experiment if accepted.rivals else None),
@@ -90,7 +92,7 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
         "p_value_after": verdict.last_test.p_value,
         "model": {name: model[name] for name in MODEL_NAMES if name in model},
         "detectable": [
-            {"id": name, "smallest": size_of(name).told(smallest)[0], "unit": split_unit(size_of(name).name)[1]}
+            {"id": name, "smallest": size_of(name).in_file_unit(smallest)[0], "unit": split_unit(size_of(name).name)[1]}
             for name, smallest in verdict.last_test.detectable.items()
             if name not in named
         ],
@@ -207,5 +209,5 @@ def _values(verdict: Verdict) -> list[dict[str, float]]:
     pairs = list(zip(fit.parameters.tolist(), sigma.tolist(), strict=True))
     # with less than this the recordings do not tell it, as with an asymmetry of friction that hardly acts
     certain = [(value, s if s < p.upper - p.lower else np.nan) for p, (value, s) in zip(own, pairs[base:], strict=True)]
-    told = pairs[:base] + [p.told(*pair) for p, pair in zip(own, certain, strict=True)]
+    told = pairs[:base] + [p.in_file_unit(*pair) for p, pair in zip(own, certain, strict=True)]
     return [{"value": value, "sigma": sigma} for value, sigma in told]

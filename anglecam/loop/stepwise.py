@@ -225,13 +225,13 @@ def applicable(records: Sequence[Record]) -> list[Effect]:
     """
     driven = any(r.command is not None for r in records)
     known = all(r.zero_known for r in records)
-    fixed = {} if known else {p.name: p.null for e in LEDGER for p in e.parameters if p.like_zero}
-    upright = next((r.upright for r in records if r.upright is not None), None)
+    fixed = {} if known else {p.name: p.null for e in LEDGER for p in e.parameters if p.mimics_zero_offset}
+    upright = next((r.mass_from_upright for r in records if r.mass_from_upright is not None), None)
     if upright is not None:
         fixed["gravity_deg"] = upright
     return [
         e
-        for e in (entry.fixing(fixed) for entry in LEDGER)
+        for e in (entry.with_fixed(fixed) for entry in LEDGER)
         if e.parameters
         and (driven or e.port not in ("command", "lag", "servo"))
         and all(e.needs(r.view) for r in records)

@@ -25,7 +25,7 @@ _SERVOS = sorted((e for e in LEDGER if e.servo is not None), key=lambda e: e.ran
 SERVO_IDS = tuple(e.id for e in _SERVOS)
 """In the order in which they act on the torque."""
 LOAD_IDS = tuple(e.id for e in LEDGER if e.load is not None)
-DRY_IDS = tuple(e.id for e in LEDGER if e.dry is not None)
+DRY_IDS = tuple(e.id for e in LEDGER if e.friction is not None)
 TERMS = 16
 """Of a series whose steps are no longer than the plant's time constants: 1/18! is less than rounding."""
 _SHARES = np.array([1.0 / ((k + 1) * (k + 2)) for k in range(TERMS)])
@@ -82,7 +82,7 @@ _row = _tuple_of(WIDTH, njit(lambda value: value))
 _rows_of_servos, _rows_of_loads, _rows_of_dries = (_tuple_of(len(ids), _row) for ids in (SERVO_IDS, LOAD_IDS, DRY_IDS))
 _servo = _chain_of_servos([e.servo for e in _SERVOS])
 _load = _sum_of_loads([e.load for e in LEDGER if e.load is not None])
-_friction = _sum_of_dries([e.dry for e in LEDGER if e.dry is not None])
+_friction = _sum_of_dries([e.friction for e in LEDGER if e.friction is not None])
 
 
 @njit

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from anglecam.data.camera_evidence import UNSEEN, View
+from anglecam.data.camera_evidence import UNKNOWN_VIEW, View
 from anglecam.data.command import Command
 from anglecam.data.typing import Floats
 from anglecam.neck.large_angle import LargeAngleNeck, linearise, restoring_tangent, restoring_torque
@@ -243,7 +243,7 @@ class LargeAngle:
         )
 
     def predict(
-        self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNSEEN
+        self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNKNOWN_VIEW
     ) -> Floats:
         """Return the (n,) angle, rad, of `run`."""
         return self.run(parameters, time, command, state)[:, 0]

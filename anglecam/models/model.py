@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from anglecam.data.camera_evidence import UNSEEN, View
+from anglecam.data.camera_evidence import UNKNOWN_VIEW, View
 from anglecam.data.command import Command
 from anglecam.data.typing import Floats
 
@@ -25,5 +25,5 @@ class Model(Protocol):
     @property
     def to_file(self) -> Floats: ...  # noqa: D102
     def predict(  # noqa: D102
-        self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNSEEN
+        self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNKNOWN_VIEW
     ) -> Floats: ...

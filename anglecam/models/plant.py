@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from anglecam.data.camera_evidence import UNSEEN, View
+from anglecam.data.camera_evidence import UNKNOWN_VIEW, View
 from anglecam.data.command import Command
 from anglecam.data.typing import Floats
 from anglecam.effects import Effect, Knots
@@ -17,7 +17,7 @@ MAX_STEP = 0.006
 """s; at the paper's natural frequency of 23 rad/s a step response errs by less than 5e-5 degrees."""
 KINKED_STEP = 0.002
 """The same where the servo's torque has kinks, across which a step is good to second order only."""
-SEEN_ANEW = 3
+SHUTTER_ITERATIONS = 3
 """Times that a frame's instant is sought from the angle shown at it; each leaves a few hundredths of the error."""
 EXACT = 0.0
 """Where nothing is nonlinear between the command's knots."""
@@ -71,30 +71,30 @@ class Plant:
     @property
     def kinked(self) -> bool:
         """Whether torque jumps or bends: something holds the head, limits what pulls at it or leaves it unanswered."""
-        return any(e.port in ("servo", "dry") for e in self.effects)
+        return any(e.port in ("servo", "friction") for e in self.effects)
 
     def with_effect(self, effect: Effect) -> Plant:
         """Return the plant with one more effect."""
         return Plant((*self.effects, effect), self.driven)
 
     def predict(
-        self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNSEEN
+        self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNKNOWN_VIEW
     ) -> Floats:
         """Return the (n,) angle, rad, that the camera would see of what `run` gives."""
-        own = self.own_parameters(parameters)
+        own = self.parameters_by_effect(parameters)
         angle, rate = self.run(parameters, time, command, state).T
-        late = [(e, p) for e, p in own if e.when is not None]
+        late = [(e, p) for e, p in own if e.timing is not None]
         if late:
             happened = time
-            for _ in range(SEEN_ANEW):
+            for _ in range(SHUTTER_ITERATIONS):
                 shown = angle + rate * (happened - time)
                 happened = time
                 for effect, values in late:
-                    happened = effect.when(happened, shown, values, view)  # type: ignore[misc]
+                    happened = effect.timing(happened, shown, values, view)  # type: ignore[misc]
             angle = self._at(parameters, time, happened, command, state)
         for effect, values in own:
-            if effect.seen is not None:
-                angle = effect.seen(time, angle, values, view)
+            if effect.observation is not None:
+                angle = effect.observation(time, angle, values, view)
         return angle
 
     def run(self, parameters: Floats, time: Floats, command: Command | None, state: Floats) -> Floats:
@@ -122,15 +122,17 @@ class Plant:
         knots, lag, step = _NO_COMMAND, 0.0, EXACT
         if command is not None:
             knots = Knots(command.time, command.angle, np.zeros(len(command.time)))
-        for effect, own in self.own_parameters(parameters):
+        for effect, own in self.parameters_by_effect(parameters):
             if effect.command is not None:
                 knots = effect.command(knots, own)
             if effect.lag is not None:
                 lag += effect.lag(own)
-            for ids, table, port in zip((SERVO_IDS, LOAD_IDS, DRY_IDS), tables, ("servo", "load", "dry"), strict=True):
+            for ids, table, port in zip(
+                (SERVO_IDS, LOAD_IDS, DRY_IDS), tables, ("servo", "load", "friction"), strict=True
+            ):
                 if effect.port == port:
                     table[ids.index(effect.id), : len(own)] = own
-            if effect.port in ("servo", "load", "dry"):
+            if effect.port in ("servo", "load", "friction"):
                 step = KINKED_STEP if effect.port == "servo" or step == KINKED_STEP else MAX_STEP
         rows = np.stack([knots.time, knots.level, knots.slope])
         servos, loads, dries = tables
@@ -148,7 +150,7 @@ class Plant:
         angle[order[early]] = state[0] + state[1] * (happened[order][early] - time[0])
         return angle
 
-    def own_parameters(self, parameters: Floats) -> list[tuple[Effect, Floats]]:
+    def parameters_by_effect(self, parameters: Floats) -> list[tuple[Effect, Floats]]:
         """Pair each effect, in the order in which the signal passes them, with its parameters, the fixed among them."""
         edges = self.base_count + np.cumsum([0, *(len(e.parameters) for e in self.effects)])
         pairs = [(e, e.complete(parameters[i:j])) for e, i, j in zip(self.effects, edges, edges[1:], strict=False)]

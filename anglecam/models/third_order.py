@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from anglecam.data.camera_evidence import UNSEEN, View
+from anglecam.data.camera_evidence import UNKNOWN_VIEW, View
 from anglecam.data.command import Command
 from anglecam.data.typing import Floats
 
@@ -90,7 +90,7 @@ class ThirdOrder:
         return 6 if self.driven else 3
 
     def predict(
-        self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNSEEN
+        self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNKNOWN_VIEW
     ) -> Floats:
         """Run the plant freely from an initial state; see `anglecam.models.plant.Plant.run`."""
         switches = np.zeros(1) if command is None else command.time

@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from anglecam import __version__
 from anglecam.data.series import AngleSeries
 from anglecam.effects import effect
-from anglecam.identification.identify import Identified
+from anglecam.identification.identified import Identified
 from anglecam.io.files import write_atomically
 from anglecam.io.session import CORRECTED
 from anglecam.loop.close import Verdict

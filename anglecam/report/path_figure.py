@@ -101,13 +101,13 @@ def curve_of(effect: Effect, fit: Fit, records: Sequence[Record]) -> Curve:
     if effect.port in ("command", "lag"):
         return _command_curve(effect, own, records)
     angles = [r.angle - e for r, e in zip(records, fit.residuals, strict=True)]
-    if effect.port in ("when", "seen"):
+    if effect.port in ("timing", "observation"):
         return _camera_curve(effect, own, records, angles)
     angle = np.concatenate(angles)
     rates = [np.gradient(a, r.time) for a, r in zip(angles, records, strict=True)]
     velocity = np.concatenate(rates)
-    if effect.port == "dry":
-        up, down, breakaway, speed = effect.dry(own)
+    if effect.port == "friction":
+        up, down, breakaway, speed = effect.friction(own)
         omega = np.linspace(velocity.min(), velocity.max(), 400)
         level = np.where(omega > 0.0, up, down)
         if speed > 0.0:
@@ -171,18 +171,18 @@ def _arriving(effect: Effect, own: Floats, command: Command, time: Floats) -> Fl
 
 
 def _camera_curve(effect: Effect, own: Floats, records: Sequence[Record], angles: Sequence[Floats]) -> Curve:
-    act, factor, name = effect.seen, 180.0 / np.pi, "angle shown − true, °"
+    act, factor, name = effect.observation, 180.0 / np.pi, "angle shown − true, °"
     if act is None:
-        act, factor, name = effect.when, 1e3, "time shown − true, ms"
+        act, factor, name = effect.timing, 1e3, "time shown − true, ms"
 
     def change(record: Record, angle: Floats) -> Floats:
         assert act is not None  # one of the two ports is filled
-        return factor * (act(record.time, angle, own, record.view) - (angle if effect.seen else record.time))
+        return factor * (act(record.time, angle, own, record.view) - (angle if effect.observation else record.time))
 
     creeps = any(np.ptp(change(r, np.zeros(len(r.time)))) > 0.0 for r in records)
     x = [r.time - r.time[0] if creeps else np.degrees(a) for r, a in zip(records, angles, strict=True)]
     y = [change(r, a) for r, a in zip(records, angles, strict=True)]
-    sign = 1.0 if effect.seen else -1.0
+    sign = 1.0 if effect.observation else -1.0
     return _ordered(np.concatenate(x), sign * np.concatenate(y), "time, s" if creeps else "angle, °", name)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from rich.table import Table
 
 from anglecam.errors import printable
-from anglecam.identification.identify import Identified
+from anglecam.identification.identified import Identified
 from anglecam.loop.close import Verdict
 from anglecam.loop.loop_json import NEXT_COMMAND, describe, sentence
 from anglecam.loop.next_experiment.design import Experiment

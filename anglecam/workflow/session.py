@@ -25,7 +25,7 @@ from anglecam.measurement.uncorrected import uncorrected
 from anglecam.workflow.clip import measure_source, open_recording
 
 if TYPE_CHECKING:
-    from anglecam.identification.identify import Estimator, Identified
+    from anglecam.identification.identified import Identified
     from anglecam.loop.close import Verdict
     from anglecam.neck.large_angle import LargeAngleNeck
 
@@ -195,7 +195,7 @@ def loop_input(measured: MeasuredSession) -> LoopInput:
 
 def identify_session(
     measured: MeasuredSession,
-    estimator: Estimator = "oe2",
+    estimator: str = "oe2",
     *,
     hold_out: Sequence[str] = (),
     neck: LargeAngleNeck | None = None,
@@ -207,7 +207,7 @@ def identify_session(
     measured : MeasuredSession
         From `measure_session`.
     estimator : str
-        One of `anglecam.identification.identify.ESTIMATORS`.
+        One of `anglecam.identification.estimators.ESTIMATORS`.
     hold_out : sequence of str
         Recordings to predict only, besides those that the rig file names.
     neck : LargeAngleNeck, optional
@@ -223,7 +223,7 @@ def identify_session(
     AnglecamError
         As `MeasuredSession.split`, and where the model cannot be fitted.
     """
-    from anglecam.identification.identify import identify_records
+    from anglecam.identification.identify_records import identify_records
 
     fitted, held_out = measured.split(hold_out)
     return identify_records(fitted, measured.session.rig, estimator, held_out=held_out, neck=neck)
@@ -259,7 +259,7 @@ def close_session(
     AnglecamError
         As `MeasuredSession.split`, and where no model can be fitted.
     """
-    from anglecam.identification.identify import declared_start
+    from anglecam.identification.identify_records import declared_start
     from anglecam.loop.close import close_records
 
     rig = measured.session.rig
@@ -272,5 +272,5 @@ def close_session(
 def _record(series: AngleSeries, command: Command | None, clock_sigma: float, rig: Rig) -> Record:
     declared = rig.model.gravity_deg
     upright = None if declared is None else math.radians(declared)
-    record = record_from_series(series, command, zero_known=rig.neutral != "auto", upright=upright)
+    record = record_from_series(series, command, zero_known=rig.neutral != "auto", mass_from_upright=upright)
     return replace(record, clock_sigma=clock_sigma)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from anglecam.identification.export import fitted_model, transfer_as_dict, write_mat
-from anglecam.identification.identify import Estimator, Identified, identify_records
+from anglecam.identification.identified import Identified
+from anglecam.identification.identify_records import identify_records
 from anglecam.io.files import write_json
 from anglecam.io.series_csv import write_series
 from anglecam.io.session import CORRECTED, SERIES_ENDING
@@ -34,7 +35,7 @@ class Closed:
 
 
 def write_identified(
-    measured: MeasuredSession, out: Path, estimator: Estimator = "oe2", neck: LargeAngleNeck | None = None
+    measured: MeasuredSession, out: Path, estimator: str = "oe2", neck: LargeAngleNeck | None = None
 ) -> Identified:
     """Fit a model to a session and write it as ``model.json`` and ``model.mat``.
 

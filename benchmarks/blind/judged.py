@@ -72,7 +72,7 @@ def judge(verdict: Verdict, true: Collection[str], values: Mapping[str, float], 
         estimates[name] = {
             "name": first.name,
             "true": values[name],
-            "value": first.told(value)[0],
+            "value": first.in_file_unit(value)[0],
             "off_sigmas": (value - truth) / sigma if sigma > 0.0 else None,
         }
     return {

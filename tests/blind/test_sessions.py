@@ -59,7 +59,7 @@ def test_the_number_told_is_the_one_that_leaves_nothing_when_the_effect_is_fitte
     start[3] = first.to_file / value if first.inverse else value / first.to_file
     fit = fit_output_error(Plant((entry,)), records, [np.array(start)])
     assert np.degrees(fit.rmse) < 5e-4
-    assert first.told(fit.parameters[3])[0] == pytest.approx(value, rel=0.01)
+    assert first.in_file_unit(fit.parameters[3])[0] == pytest.approx(value, rel=0.01)
 
 
 @pytest.mark.parametrize("name", ["constant_torque", "slack_spring"])

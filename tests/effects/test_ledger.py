@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from anglecam.data.camera_evidence import UNSEEN, View
+from anglecam.data.camera_evidence import UNKNOWN_VIEW, View
 from anglecam.data.command import Command
 from anglecam.effects import LEDGER, effect
 from anglecam.models.plant import Plant
@@ -59,8 +59,8 @@ def test_motion_with_an_effect_is_the_laboratorys(tmp_path, effect_id, kind):
     assert np.degrees(np.abs(predicted - true)).max() < 2e-4
 
 
-def _seen(effect_id: str, *parameters: float) -> np.ndarray:
-    return effect(effect_id).seen(TIME, NOD, np.array(parameters), VIEW)
+def _observe(effect_id: str, *parameters: float) -> np.ndarray:
+    return effect(effect_id).observation(TIME, NOD, np.array(parameters), VIEW)
 
 
 def _line(place: np.ndarray, pivot: np.ndarray) -> np.ndarray:
@@ -81,7 +81,7 @@ def test_a_pivot_beside_the_axis_turns_the_line():
     wrong = np.array([0.25, -0.15])
     at_rest = np.array([np.cos(VIEW.neutral), np.sin(VIEW.neutral)])
     view = replace(VIEW, neutral=float(_line(at_rest, wrong)))  # all that is known of neutral was seen from there
-    found = effect("pivot_offset").seen(TIME, NOD, wrong, view)
+    found = effect("pivot_offset").observation(TIME, NOD, wrong, view)
     assert _zeroed(found) == pytest.approx(_zeroed(_line(_mouth(), wrong)), abs=2e-6)
 
 
@@ -94,7 +94,7 @@ def test_a_tilted_camera_shortens_what_lies_across_its_axis():
     shown = (mouth @ along)[:, None] * along + math.cos(tilt) * (mouth @ across)[:, None] * across
     shown -= height * math.sin(tilt) * across  # the line goes from a mark that stands before the plane
     expected = _zeroed(_line(shown, np.zeros(2)))
-    assert _zeroed(_seen("camera_tilt", tilt, axis, height)) == pytest.approx(expected, abs=2e-6)
+    assert _zeroed(_observe("camera_tilt", tilt, axis, height)) == pytest.approx(expected, abs=2e-6)
 
 
 def test_a_lens_draws_mouth_and_pivot_about_the_middle_of_the_picture():
@@ -108,7 +108,7 @@ def test_a_lens_draws_mouth_and_pivot_about_the_middle_of_the_picture():
     lever = VIEW.lever_px * float(np.hypot(*arm))
     x, y = VIEW.lever_px * pivot
     view = View(float(np.arctan2(arm[1], arm[0])), lever, (float(x), float(-y)))  # all that the picture shows
-    found = effect("lens_distortion").seen(TIME, NOD, np.array([kappa]), view)
+    found = effect("lens_distortion").observation(TIME, NOD, np.array([kappa]), view)
     assert _zeroed(found) == pytest.approx(_zeroed(_line(drawn(centre + _mouth()), pivot)), abs=2e-6)
 
 
@@ -130,7 +130,7 @@ def test_clock_and_drift_do_what_they_say():
     later = Command(command.time * 1.01, command.angle)
     scaled = Plant((effect("clock_scale"),)).predict(np.append(ABC, 0.01), TIME, command, np.zeros(2))
     assert scaled == pytest.approx(Plant().predict(ABC, TIME, later, np.zeros(2)), abs=1e-12)
-    assert _seen("angle_drift", 0.01) == pytest.approx(NOD + 0.01 * TIME, abs=1e-15)
+    assert _observe("angle_drift", 0.01) == pytest.approx(NOD + 0.01 * TIME, abs=1e-15)
 
 
 def test_the_ledger_is_the_contracts():
@@ -142,7 +142,7 @@ def test_the_ledger_is_the_contracts():
     for e in LEDGER:
         assert set(e.aliases) < {other.id for other in LEDGER} - {e.id}
         assert e.needs(VIEW)
-    assert not effect("rolling_shutter").needs(UNSEEN)
+    assert not effect("rolling_shutter").needs(UNKNOWN_VIEW)
 
 
 @pytest.mark.parametrize("lag", [1e-6, 1e-4, 1e-3, 1e-2])

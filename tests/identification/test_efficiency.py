@@ -14,7 +14,7 @@ import pytest
 from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.identification.ekf import fit_ekf, settings_for
-from anglecam.identification.identify import identify_records
+from anglecam.identification.identify_records import identify_records
 from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.output_error import fit_output_error
 from anglecam.io.rig import Rig

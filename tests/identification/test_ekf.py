@@ -10,7 +10,7 @@ import pytest
 from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.identification.ekf import PAPER, fit_ekf, settings_for
-from anglecam.identification.identify import identify_records
+from anglecam.identification.identify_records import identify_records
 from anglecam.identification.output_error import fit_output_error
 from anglecam.identification.smoothing import smooth
 from anglecam.io.rig import Rig

@@ -24,7 +24,7 @@ from anglecam.identification.export import (
     unit_of,
     write_mat,
 )
-from anglecam.identification.identify import identify_records
+from anglecam.identification.identify_records import identify_records
 from anglecam.io.files import write_json
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import write_series

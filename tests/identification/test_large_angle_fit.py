@@ -9,7 +9,7 @@ import pytest
 
 from anglecam.errors import RigError
 from anglecam.identification.fit import Fit
-from anglecam.identification.identify import identify_records
+from anglecam.identification.identify_records import identify_records
 from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.io.rig import Rig
@@ -114,4 +114,4 @@ def test_a_model_that_lacks_something_is_doubted_and_a_bound_is_named(angles):
     assert "lacks something" in linear.doubts[0]
     assert not identify_records(fitted, Rig(), "neck", neck=LABORATORY).doubts
     held = replace(linear, covariance=np.diag([1.0, np.nan, 1.0]))
-    assert held.doubts[0].startswith("b_per_s2: held by a bound")
+    assert held.doubts[0].startswith("b_per_s2: at a bound")

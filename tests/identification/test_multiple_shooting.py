@@ -8,7 +8,7 @@ import pytest
 from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.effects import effect
-from anglecam.identification.multiple_shooting import drifts, goes_astray, windows
+from anglecam.identification.multiple_shooting import drifts, loses_step, windows
 from anglecam.identification.output_error import fit_output_error
 from anglecam.models.plant import Plant
 
@@ -51,9 +51,9 @@ def test_windows_of_a_drifting_plant_hold_every_frame_once_and_last_two_time_con
 def test_a_wide_swing_that_a_linear_model_lost_count_of_is_found_through_windows():
     whole = record(SWING, HANGING, [-1.6, 0.0])
     linear = fit_output_error(Plant(driven=False), [whole], [np.array([0.1, 52.0])])
-    assert goes_astray(linear, [whole])
+    assert loses_step(linear, [whole])
     start = np.append(linear.parameters, [0.3, np.pi])
     near = fit_output_error(SWING, windows([whole], linear.parameters), [start])
     found = fit_output_error(SWING, [whole], [near.parameters])
     np.testing.assert_allclose(found.parameters, HANGING, atol=1e-3)
-    assert not goes_astray(found, [whole])
+    assert not loses_step(found, [whole])

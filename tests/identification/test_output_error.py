@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from anglecam.data.record import Record
-from anglecam.identification.identify import identify_records
+from anglecam.identification.identify_records import identify_records
 from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.io.rig import Rig
@@ -91,10 +91,10 @@ def test_errors_of_the_angles_change_parameters_as_foretold_and_not_at_all_where
         off = fit_output_error(
             Plant(), [replace(r, angle=r.angle + e) for r, e in zip(known, errors, strict=True)], [TRUE]
         )
-        assert off.parameters - fit.parameters == pytest.approx(fit.pulled_by(known, errors), rel=0.01, abs=1e-6)
+        assert off.parameters - fit.parameters == pytest.approx(fit.parameter_shift(known, errors), rel=0.01, abs=1e-6)
     free = noisy(0)
     ones = [np.ones_like(r.angle) for r in free]
-    assert np.all(np.abs(fit_output_error(Plant(), free, [TRUE]).pulled_by(free, ones)) < 1e-6 * TRUE)
+    assert np.all(np.abs(fit_output_error(Plant(), free, [TRUE]).parameter_shift(free, ones)) < 1e-6 * TRUE)
 
 
 class TwoAlike:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anglecam.effects import effect
-from anglecam.identification.identify import identify_records
+from anglecam.identification.identify_records import identify_records
 from anglecam.identification.noise import Noise
 from anglecam.identification.output_error import fit_output_error
 from anglecam.identification.systematic import full_sigma

@@ -163,7 +163,7 @@ def test_a_declared_centre_of_mass_comes_with_every_recording(tmp_path):
     for declared, upright in (("{}", None), ("model: {gravity_deg: -30}", np.radians(-30.0))):
         (tmp_path / "rig.yaml").write_text(declared)
         (record,) = measure_session(read_session(tmp_path)).records
-        assert record.upright == upright
+        assert record.mass_from_upright == upright
 
 
 def test_what_looks_like_a_swing_or_a_command_is_said_to_be_taken_for_what_it_is(tmp_path):

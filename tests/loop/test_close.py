@@ -83,7 +83,7 @@ def test_a_declared_centre_of_mass_is_not_fitted_and_the_weight_is_told_so_much_
     records = drawn_session(gravity, seed=4, sigma_deg=0.01)
     found = []
     for upright in (None, np.radians(20.0)):
-        verdict = close_records([replace(r, upright=upright) for r in records], held_out=HELD_OUT)
+        verdict = close_records([replace(r, mass_from_upright=upright) for r in records], held_out=HELD_OUT)
         assert [a.effect.id for a in verdict.accepted] == ["gravity_geometry"]
         assert abs(verdict.after.parameters[3] - 60.0) < 3.0 * verdict.after.sigma[3]
         found.append(verdict.after)

@@ -41,8 +41,8 @@ def series(time, angle):
 def test_the_angle_is_what_it_was_before_the_camera(found):
     fit = fitted(*found)
     shown = NOD
-    for one, own in fit.model.own_parameters(fit.parameters):
-        shown = one.seen(TIME, shown, own, VIEW)
+    for one, own in fit.model.parameters_by_effect(fit.parameters):
+        shown = one.observation(TIME, shown, own, VIEW)
     assert np.degrees(np.abs(shown - NOD)).max() > 0.05
     assert corrected(series(TIME, shown), fit, VIEW).angle == pytest.approx(NOD, abs=1e-9)
 

@@ -47,7 +47,7 @@ def test_effects_at_their_null_change_nothing():
     )
     assert full == pytest.approx(stepped, abs=1e-14)
     assert np.degrees(np.abs(base - full)).max() < 1e-4
-    outside = tuple(e for e in LEDGER if e.port not in ("servo", "load", "dry"))
+    outside = tuple(e for e in LEDGER if e.port not in ("servo", "load", "friction"))
     nulls = np.concatenate([e.null for e in outside])
     part = Plant(outside).predict(np.array([26.0, 524.0, 508.0, *nulls]), TIME, command, np.array([0.1, 0.5]))
     assert part == pytest.approx(base, abs=1e-14)

@@ -12,7 +12,7 @@ import pytest
 from anglecam.data.command import Command
 from anglecam.data.series import AngleSeries
 from anglecam.effects import effect
-from anglecam.identification.identify import identify_records
+from anglecam.identification.identify_records import identify_records
 from anglecam.identification.output_error import fit_output_error
 from anglecam.io.command_csv import read_command
 from anglecam.io.rig import Rig

@@ -1,0 +1,87 @@
+"""An identified model: parameters, uncertainties, errors in free run, and what ``model.json`` holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from anglecam.data.record import Record
+from anglecam.data.step_figures import StepFigures
+from anglecam.data.typing import Floats
+from anglecam.identification.fit import Fit
+
+DOUBTFUL_RESIDUAL = 3.0
+"""Multiple of the angle's stated uncertainty; a model with a larger RMS residual lacks something, so that the stated
+uncertainties of its parameters do not hold."""
+
+
+@dataclass(frozen=True)
+class Identified:
+    """A model with its uncertainty and its errors."""
+
+    estimator: str
+    """Id of the estimator."""
+    names: tuple[str, ...]
+    """Names of the parameters; each ends in its unit."""
+    values: Floats
+    """(p,) in the units of ``names``."""
+    covariance: Floats
+    """(p, p), in the products of those units."""
+    fit: Fit
+    """Free run on the recordings that were fitted."""
+    held_out: Fit | None
+    """Free run on the recordings that were held out; ``None`` where none is declared."""
+    step: StepFigures
+    """Response to a unit step of the command."""
+    fitted: tuple[Record, ...]
+    """The recordings that were fitted."""
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Reasons why the parameters or their uncertainties are unreliable, one line each; empty if there are none."""
+        at_bound = [name for name, sigma in zip(self.names, self.sigmas, strict=True) if not np.isfinite(sigma)]
+        doubts = []
+        if at_bound:
+            doubts.append(f"{', '.join(at_bound)}: at a bound of the possible values, so without an uncertainty")
+        stated = np.concatenate([r.sigma for r in self.fitted])
+        noise = float(np.sqrt(np.mean(stated**2))) if np.all(np.isfinite(stated)) else np.nan
+        if self.fit.rmse > DOUBTFUL_RESIDUAL * noise:
+            doubts.append(
+                f"the model leaves a residual of {np.degrees(self.fit.rmse):.2g}°, {self.fit.rmse / noise:.0f} times"
+                f" the angle's uncertainty: it lacks something, and its ± do not hold; anglecam close searches for it"
+            )
+        return tuple(doubts)
+
+    @property
+    def sigmas(self) -> Floats:
+        """Standard uncertainties, in the units of ``names``."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the content of ``model.json``."""
+        parameters = {
+            name: {"value": value, "sigma": sigma}
+            for name, value, sigma in zip(self.names, self.values, self.sigmas, strict=True)
+        }
+        if "a_per_s" in parameters and "c_per_s2" not in parameters:
+            parameters["c_per_s2"] = {"value": np.nan, "sigma": np.nan}  # a free swing does not determine c
+        return {
+            "estimator": self.estimator,
+            "parameters": parameters,
+            "covariance": {"names": list(self.names), "matrix": self.covariance},
+            "rmse_deg": {
+                "fit": np.degrees(self.fit.rmse),
+                "held_out": np.degrees(self.held_out.rmse) if self.held_out else None,
+            },
+            "step": {
+                "command_deg": 1.0,
+                "rise_time_s": self.step.rise_time,
+                "overshoot": self.step.overshoot,
+                "overshoot_percent": 100.0 * self.step.overshoot,
+                "settling_time_s": self.step.settling_time,
+                "steady_state_deg": self.step.steady_state,
+            },
+            "residual_correlation": self.fit.residual_phi,
+        }
