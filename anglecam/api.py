@@ -10,7 +10,8 @@ from anglecam.errors import InputError
 from anglecam.identification.identify import Estimator, Identified, declared_start, identify_records
 from anglecam.io.rig import Rig
 from anglecam.io.session import Session, command_beside, read_session, rig_beside
-from anglecam.loop.close import Verdict, close_records
+from anglecam.loop.close import close_records
+from anglecam.loop.verdict import Verdict
 from anglecam.workflow.recordings import Measured, measure_recording, measure_session, shown_to_loop
 
 
