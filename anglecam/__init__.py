@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from anglecam.effects import Effect
     from anglecam.io.rig import Rig
     from anglecam.io.session import Session
-    from anglecam.loop.close import Verdict
+    from anglecam.loop.verdict import Verdict
 
 _HOME = {
     "measure": "anglecam.api",
@@ -24,7 +24,7 @@ _HOME = {
     "Effect": "anglecam.effects",
     "Rig": "anglecam.io.rig",
     "Session": "anglecam.io.session",
-    "Verdict": "anglecam.loop.close",
+    "Verdict": "anglecam.loop.verdict",
 }
 """Modules of the public names; each is loaded when one of its names is first used, to keep the start-up short."""
 

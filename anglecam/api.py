@@ -9,7 +9,7 @@ from anglecam.data.series import AngleSeries
 from anglecam.identification.identified import Identified
 from anglecam.io.rig import Rig
 from anglecam.io.session import read_session
-from anglecam.loop.close import Verdict
+from anglecam.loop.verdict import Verdict
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.workflow.clip import measure_source, open_source
 from anglecam.workflow.session import close_session, identify_session, measure_session

@@ -15,8 +15,8 @@ import typer
 
 from anglecam import __version__
 from anglecam.cli.batch import batch
-from anglecam.cli.estimator_option import EstimatorCommand
 from anglecam.cli.clips import budget, calibrate, measure
+from anglecam.cli.estimator_option import EstimatorCommand
 from anglecam.cli.neck import app as neck
 from anglecam.cli.sessions import close, identify
 from anglecam.errors import InputError, RigError, blame

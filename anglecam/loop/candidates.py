@@ -17,7 +17,7 @@ from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.output_error import first_state, fit_best_start, fit_output_error, output_error
 from anglecam.loop.cross_validation import Prediction, predict_held_out
-from anglecam.loop.refit import effects_of, plant_of, without
+from anglecam.loop.refit import effects_of, plant_of, refit_without
 from anglecam.loop.screen import Forecast
 from anglecam.threads import native_threads
 
@@ -49,9 +49,9 @@ class Candidate:
     fit: Fit
     log_likelihood_gain: float
     """Over the plant without it, on the fitted recordings."""
-    told: Prediction | None
+    held_out: Prediction | None
     """Of what is held out by declaration, or of all block by block where nothing is."""
-    unseen: Prediction | None
+    cross_validated: Prediction | None
     """Of every frame by a model that was not fitted to it."""
     predictive_gain: float
     """Log-likelihood gain on ``unseen``."""
@@ -74,7 +74,7 @@ def promising(all_forecasts: Sequence[Forecast]) -> list[Forecast]:
 
 def fit_candidates(
     base: Fit,
-    unseen: Prediction,
+    cross_validated: Prediction,
     fitted: Sequence[Record],
     held_out: Sequence[Record],
     tried: Sequence[Forecast],
@@ -86,7 +86,7 @@ def fit_candidates(
     ----------
     base : Fit
         Of the plant so far, on ``fitted``.
-    unseen : Prediction
+    cross_validated : Prediction
         The plant's so far, of every frame by a fit without it.
     fitted, held_out : sequence of Record
         Recordings to fit and to predict only.
@@ -100,7 +100,7 @@ def fit_candidates(
     list of Candidate
         Strongest evidence first, then those that were not tried, best fit first.
     """
-    fits = side_by_side(lambda one: fit_with(base, fitted, one, camera=camera), tried)
+    fits = map_in_threads(lambda one: fit_with(base, fitted, one, camera=camera), tried)
     gains = [log_likelihood_gain(base.cost, fit.cost, len(base.white)) for fit in fits]
     serious = sorted(gains, reverse=True)[: LEAST_PROMISING - 1]
 
@@ -108,10 +108,10 @@ def fit_candidates(
         if gains[i] < HOPEFUL * max(gains) and gains[i] not in serious:
             return Candidate(tried[i], fits[i], gains[i], None, None, -math.inf)
         told, whole = predict_held_out(fits[i], fitted, held_out)
-        predictive = log_likelihood_gain(unseen.cost, whole.cost, sum(len(r.time) for r in whole.records))
+        predictive = log_likelihood_gain(cross_validated.cost, whole.cost, sum(len(r.time) for r in whole.records))
         return Candidate(tried[i], fits[i], gains[i], told, whole, predictive)
 
-    candidates = side_by_side(predict, range(len(tried)))
+    candidates = map_in_threads(predict, range(len(tried)))
     return sorted(candidates, key=lambda c: (-c.evidence, -c.log_likelihood_gain))
 
 
@@ -150,7 +150,7 @@ def fit_with(
     return with_staged(base, effect, best, records, camera) if staged else best
 
 
-def fit_beneath(base: Fit, candidates: Sequence[Candidate], records: Sequence[Record]) -> Fit:
+def fit_from_candidates(base: Fit, candidates: Sequence[Candidate], records: Sequence[Record]) -> Fit:
     """Fit a plant again from where it stands in the candidates, if one of them is better there even without its effect.
 
     Beside another effect, whatever its size, a fit with kinks may have come out of the valley that it was in.
@@ -184,7 +184,7 @@ def fit_to_more(
         whole = next(e for e in ledger if e.id == effect.id)
         if any(p.staged for p in whole.parameters):
             early = tuple(p for p in whole.parameters if not p.staged)
-            base = without(best, effect, records)
+            base = refit_without(best, effect, records)
             size = [best.parameters[best.model.names.index(p.name)] for p in early]
             plant = plant_of(base).with_effect(replace(whole, parameters=early))
             start = np.append(base.parameters, size)
@@ -211,7 +211,7 @@ def with_staged(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record], 
         values.sort(key=lambda one: output_error(richer, one, records, fit.nuisance, fit.phi))
         fit, spent = fit_best_start(richer, records, values[:NEAREST], fit.nuisance, fit.phi), spent + 1
         gain = log_likelihood_gain(best.cost, fit.cost, len(fit.white))
-        if 2.0 * gain > special.chdtri(spent, ASKED_FOR) and apart(fit, best) > camera:
+        if 2.0 * gain > special.chdtri(spent, ASKED_FOR) and rms_difference(fit, best) > camera:
             best, spent = fit, 0
     return best
 
@@ -224,7 +224,7 @@ def _within(effect: Effect, fit: Fit, records: Sequence[Record]) -> Effect:
     return replace(effect, parameters=tuple(slow))
 
 
-def rivals(
+def find_rivals(
     best: Fit, base: Fit, records: Sequence[Record], effect: Effect, others: Sequence[Forecast], camera: float = 0.0
 ) -> dict[str, Fit]:
     """Keep every effect that could have made the data in which ``effect`` explains this much more than it.
@@ -254,22 +254,22 @@ def rivals(
     dict
         Id of each that stays → the same plant with it in place of ``effect``.
     """
-    fits = side_by_side(lambda other: fit_with(base, records, other, camera=camera), others)
+    fits = map_in_threads(lambda other: fit_with(base, records, other, camera=camera), others)
     widest = 0.5 * special.ndtri(ALIAS_LEVEL) ** 2
     gaps = [log_likelihood_gain(fit.cost, best.cost, len(best.white)) for fit in fits]
     return {
         other.effect.id: fit
         for other, fit, gap in zip(others, fits, gaps, strict=True)
-        if (gap <= widest or apart(fit, best) <= camera) and other.effect.id != effect.id
+        if (gap <= widest or rms_difference(fit, best) <= camera) and other.effect.id != effect.id
     }
 
 
-def apart(one: Fit, other: Fit) -> float:
+def rms_difference(one: Fit, other: Fit) -> float:
     """Return by how much the predictions of two fits to the same recordings differ, rad RMS."""
     return float(np.sqrt(np.mean((np.concatenate(one.residuals) - np.concatenate(other.residuals)) ** 2)))
 
 
-def side_by_side(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
+def map_in_threads(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
     """Do the same with every item side by side: the integrator, which takes most of the time, lets go of Python."""
     with ThreadPoolExecutor(native_threads()) as pool:
         return list(pool.map(work, items))

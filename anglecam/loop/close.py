@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -19,14 +19,24 @@ from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.multiple_shooting import drifts, loses_step, windows
-from anglecam.identification.noise import Noise, autoregression, noise_floor
+from anglecam.identification.noise import autoregression, noise_floor
 from anglecam.identification.output_error import fit_output_error, predict_output_error
-from anglecam.loop.candidates import Candidate, fit_to_more, log_likelihood_gain, promising, rivals
-from anglecam.loop.cross_validation import Gain, Prediction, compare, predict_held_out, split_records, typical
-from anglecam.loop.refit import effects_of, left_of, recoloured, with_last, without
-from anglecam.loop.residual_test import LEVEL, ResidualTest
+from anglecam.loop.candidates import Candidate, find_rivals, fit_to_more, log_likelihood_gain, promising
+from anglecam.loop.cross_validation import Prediction, compare, predict_held_out, robust_sigma, split_records
+from anglecam.loop.refit import effects_left, effects_of, refit_with_last, refit_with_phi, refit_without
+from anglecam.loop.residual_test import LEVEL
 from anglecam.loop.screen import changes, directions, forecasts
-from anglecam.loop.stepwise import SURE, Round, Task, applicable, candidates_of, look, smallest, trace
+from anglecam.loop.stepwise import (
+    SURE,
+    Assessment,
+    Task,
+    add_effects,
+    applicable,
+    assess,
+    rank_candidates,
+    smallest_traced,
+)
+from anglecam.loop.verdict import Accepted, Verdict
 from anglecam.models.plant import Plant
 
 CONTRADICTED = 3.0
@@ -36,44 +46,6 @@ REMAINDER, REMAINDER_UNDRIVEN = 0.1, 0.75
 """After an effect has proven itself, what remains must also be this share of what the base model left, or it does not
 take the verdict back. Where nothing is commanded, or nothing tells the noise, most of it may be what no model of a
 mechanism holds, such as the hand that let go."""
-
-
-@dataclass(frozen=True)
-class Accepted:
-    """An effect that was added."""
-
-    effect: Effect
-    rivals: dict[str, Fit]
-    """What it cannot be told from: the model with each of these in its place, on the fitted recordings."""
-
-    @property
-    def alias_set(self) -> tuple[str, ...]:
-        """Ids, its own first."""
-        return (self.effect.id, *self.rivals)
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """What the loop found."""
-
-    verdict: str
-    """``attributed``, ``nothing_missing`` or ``unexplained``."""
-    accepted: tuple[Accepted, ...]
-    before: Fit
-    """The base model on the fitted recordings."""
-    after: Fit
-    """The final model on the same."""
-    before_held_out: Prediction
-    after_held_out: Prediction
-    gain: Gain
-    first_test: ResidualTest
-    last_test: ResidualTest
-    candidates: tuple[Candidate, ...]
-    """Those of the first round, strongest evidence first; none where the gate found nothing missing."""
-    noise: Noise
-    fitted: tuple[Record, ...]
-    held_out: tuple[Record, ...]
-    """By declaration; may be none."""
 
 
 def close_records(
@@ -108,12 +80,12 @@ def close_records(
     with threadpool_limits(1, "blas"):
         task, base = _begin(records, held_out, starts, np.random.default_rng(seed), progress)
         progress("residual")
-        first = look(task, base)
+        first = assess(task, base)
         candidates: list[Candidate] = []
-        if not first.gate.passed:
+        if not first.residual_test.passed:
             progress("candidates")
-            candidates = candidates_of(task, first)
-        last = trace(task, first, candidates)
+            candidates = rank_candidates(task, first)
+        last = add_effects(task, first, candidates)
         progress("verdict")
         return _conclude(task, first, last, candidates)
 
@@ -139,14 +111,14 @@ def _begin(
     return Task(tuple(fitted), tuple(predicted), tuple(ledger), floor, rng, progress), base
 
 
-def _conclude(task: Task, first: Round, last: Round, candidates: Sequence[Candidate]) -> Verdict:
+def _conclude(task: Task, first: Assessment, last: Assessment, candidates: Sequence[Candidate]) -> Verdict:
     # both ends are compared under the colour of the noise that the better model leaves
-    before = recoloured(first.fit, task.fitted, last.fit.phi)
+    before = refit_with_phi(first.fit, task.fitted, last.fit.phi)
     before_told, _ = predict_held_out(before, task.fitted, task.predicted)
     noise = task.floor or replace(autoregression(last.fit.residuals, "residual"), sigma=last.fit.rmse)
     remains = _remains(task, first, last, before)
     # where something remains nothing is named, so nothing is added
-    after, after_told = (before, before_told) if remains else (last.fit, last.told)
+    after, after_told = (before, before_told) if remains else (last.fit, last.held_out)
     named = effects_of(after)
     return Verdict(
         "unexplained" if remains else "attributed" if named else "nothing_missing",
@@ -156,8 +128,8 @@ def _conclude(task: Task, first: Round, last: Round, candidates: Sequence[Candid
         before_told,
         after_told,
         compare(before_told, after_told, task.rng),
-        first.gate,
-        last.gate,
+        first.residual_test,
+        last.residual_test,
         tuple(candidates),
         noise,
         task.fitted,
@@ -165,12 +137,12 @@ def _conclude(task: Task, first: Round, last: Round, candidates: Sequence[Candid
     )
 
 
-def _remains(task: Task, first: Round, last: Round, before: Fit) -> bool:
+def _remains(task: Task, first: Assessment, last: Assessment, before: Fit) -> bool:
     """Say whether the best model leaves structure that no candidate explains."""
-    named, least = bool(effects_of(last.fit)), smallest(task, first)
+    named, least = bool(effects_of(last.fit)), smallest_traced(task, first)
     if _contradicted(task, last, least):
         return True
-    if last.gate.p_value >= (SURE if named else LEVEL) or last.fit.rmse**2 <= task.camera**2 + least**2:
+    if last.residual_test.p_value >= (SURE if named else LEVEL) or last.fit.rmse**2 <= task.camera**2 + least**2:
         return False
     driven = any(r.command is not None for r in task.fitted)
     share = REMAINDER if driven and task.floor is not None else REMAINDER_UNDRIVEN
@@ -179,23 +151,23 @@ def _remains(task: Task, first: Round, last: Round, before: Fit) -> bool:
     floor = task.floor.sigma if task.floor else 0.0
     return (
         not named
-        or _beyond(last.unseen, floor) > share * _beyond(first.unseen, floor)
+        or _beyond(last.cross_validated, floor) > share * _beyond(first.cross_validated, floor)
         or _could_still_gain(last, before) > share**2
     )
 
 
-def _contradicted(task: Task, last: Round, least: float) -> bool:
+def _contradicted(task: Task, last: Assessment, least: float) -> bool:
     """Say whether what was held out is as no parameters of the model would have it that fit the rest too.
 
     Typically: whether dry friction lets go at an instant is all or nothing, and one wrong guess is no contradiction.
     """
     most = CONTRADICTED * max(last.fit.rmse, least)
-    if last.told.typical <= most or not task.predicted:
-        return last.told.typical > most
+    if last.held_out.robust_sigma <= most or not task.predicted:
+        return last.held_out.robust_sigma > most
     told = predict_output_error(last.fit, task.predicted)
     own, both = [*last.fit.nuisance, *told.nuisance], [*task.fitted, *task.predicted]
     fit = fit_to_more(last.fit, both, own, task.ledger)
-    return typical(fit.residuals[len(task.fitted) :]) > most
+    return robust_sigma(fit.residuals[len(task.fitted) :]) > most
 
 
 def _beyond(prediction: Prediction, noise: float) -> float:
@@ -203,13 +175,13 @@ def _beyond(prediction: Prediction, noise: float) -> float:
     return math.sqrt(max(prediction.rmse**2 - noise**2, 0.0))
 
 
-def _could_still_gain(now: Round, before: Fit) -> float:
+def _could_still_gain(now: Assessment, before: Fit) -> float:
     """Return what one more effect, or a torque of any curve, is forecast to explain.
 
     As a share of that and all that was explained since before. What only follows the measured angle about, such as a
     codec that is late where the head moves, is no cause.
     """
-    more = max(now.gate.torque_gain, *(forecast.gain for forecast in now.forecasts[:1]), 0.0)
+    more = max(now.residual_test.torque_gain, *(forecast.gain for forecast in now.forecasts[:1]), 0.0)
     if more <= 0.0:
         return 0.0
     return more / (more + max(log_likelihood_gain(before.cost, now.fit.cost, len(before.white)), 0.0))
@@ -217,7 +189,7 @@ def _could_still_gain(now: Round, before: Fit) -> float:
 
 def _rivals(fit: Fit, effect: Effect, task: Task) -> dict[str, Fit]:
     """Say of an effect, the others in place, what it cannot be told from."""
-    base, best = without(fit, effect, task.fitted), with_last(fit, effect, task.fitted)
-    moved = changes(base, task.fitted, left_of(task.ledger, base))
+    base, best = refit_without(fit, effect, task.fitted), refit_with_last(fit, effect, task.fitted)
+    moved = changes(base, task.fitted, effects_left(task.ledger, base))
     others = [f for f in promising(forecasts(base, directions(base, task.fitted, moved))) if f.effect.id != effect.id]
-    return rivals(best, base, task.fitted, effect, others, task.camera)
+    return find_rivals(best, base, task.fitted, effect, others, task.camera)

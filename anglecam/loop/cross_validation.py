@@ -55,9 +55,9 @@ class Prediction:
         return float(np.sqrt(np.mean(np.concatenate(self.residuals) ** 2)))
 
     @property
-    def typical(self) -> float:
-        """`typical` of ``residuals``."""
-        return typical(self.residuals)
+    def robust_sigma(self) -> float:
+        """`robust_sigma` of ``residuals``."""
+        return robust_sigma(self.residuals)
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Gain:
     interval_95: tuple[float, float]
 
 
-def typical(residuals: Sequence[Floats]) -> float:
+def robust_sigma(residuals: Sequence[Floats]) -> float:
     """Return the standard deviation that the median absolute residual speaks of: a few frames far off do not count."""
     return float(MAD * np.median(np.abs(np.concatenate(residuals))))
 

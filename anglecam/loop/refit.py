@@ -17,18 +17,18 @@ def effects_of(fit: Fit) -> tuple[Effect, ...]:
     return plant_of(fit).effects
 
 
-def left_of(ledger: Sequence[Effect], fit: Fit) -> list[Effect]:
+def effects_left(ledger: Sequence[Effect], fit: Fit) -> list[Effect]:
     """Return the effects that a fitted plant does not have."""
     ids = [e.id for e in effects_of(fit)]
     return [e for e in ledger if e.id not in ids]
 
 
-def recoloured(fit: Fit, records: Sequence[Record], phi: float) -> Fit:
+def refit_with_phi(fit: Fit, records: Sequence[Record], phi: float) -> Fit:
     """Fit again with the noise's autocorrelation ``phi`` from frame to frame."""
     return fit_output_error(fit.model, records, [fit.parameters], nuisance=fit.nuisance, phi=phi)
 
 
-def without(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
+def refit_without(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
     """Fit again without one of the plant's effects."""
     own = [p.name for p in effect.parameters]
     keep = [i for i, name in enumerate(fit.model.names) if name not in own]
@@ -36,7 +36,7 @@ def without(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
     return fit_output_error(smaller, records, [fit.parameters[keep]], nuisance=fit.nuisance, phi=fit.phi)
 
 
-def with_last(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
+def refit_with_last(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
     """Return the same fit with one of its effects after all others, where a candidate's parameters are."""
     own = [p.name for p in effect.parameters]
     order = sorted(range(len(fit.model.names)), key=lambda i: fit.model.names[i] in own)

@@ -23,7 +23,7 @@ from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit, whiten
 from anglecam.loop.screen import Direction, absorbed_space
-from anglecam.loop.state_torques import torque_responses
+from anglecam.loop.torque_basis import torque_responses
 
 DRAWS = 999
 LAGS = 15
@@ -31,7 +31,7 @@ LEVEL = 0.05
 
 
 @dataclass(frozen=True)
-class Test:
+class StructureTest:
     """One test of the gate."""
 
     name: str
@@ -44,7 +44,7 @@ class ResidualTest:
 
     p_value: float
     """That noise alone leaves a residual at least as striking in any of the tests."""
-    tests: tuple[Test, ...]
+    tests: tuple[StructureTest, ...]
     torque_gain: float
     """Log-likelihood that a torque over angle or speed of any curve would gain, less what noise would give it."""
     detectable: dict[str, float]
@@ -56,7 +56,7 @@ class ResidualTest:
         return self.p_value >= LEVEL
 
 
-def test_residual(
+def run_residual_test(
     fit: Fit, records: Sequence[Record], ways: Sequence[Direction], rng: np.random.Generator, finest: float
 ) -> ResidualTest:
     """Test the residual of a fitted plant.
@@ -102,7 +102,7 @@ def test_residual(
     critical = float(np.quantile(smallest[1:], LEVEL))
     needed = float(-(special.ndtri(critical) + special.ndtri(0.05)) * np.sqrt(fit.cost / free))
     needed = max(needed, finest * math.sqrt(n))
-    tests = tuple(Test(name, float(p[0])) for name, p in p_each.items())
+    tests = tuple(StructureTest(name, float(p[0])) for name, p in p_each.items())
     return ResidualTest(float(p_value), tests, torque_gain, _detectable(ways, needed))
 
 

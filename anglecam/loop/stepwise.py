@@ -21,17 +21,17 @@ from anglecam.identification.fit import Fit
 from anglecam.identification.noise import Noise, autoregression
 from anglecam.loop.candidates import (
     Candidate,
-    apart,
-    fit_beneath,
     fit_candidates,
+    fit_from_candidates,
     fit_with,
     log_likelihood_gain,
+    map_in_threads,
     promising,
-    side_by_side,
+    rms_difference,
 )
 from anglecam.loop.cross_validation import Prediction, compare, predict_held_out
-from anglecam.loop.refit import effects_of, left_of, recoloured, without
-from anglecam.loop.residual_test import ResidualTest, test_residual
+from anglecam.loop.refit import effects_left, effects_of, refit_with_phi, refit_without
+from anglecam.loop.residual_test import ResidualTest, run_residual_test
 from anglecam.loop.screen import Change, Forecast, changes, directions, forecasts
 
 MOST_EFFECTS = 3
@@ -73,35 +73,35 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Round:
+class Assessment:
     """A model and what its residual says."""
 
     fit: Fit
-    told: Prediction
+    held_out: Prediction
     """Of what is held out by declaration, or of all block by block where nothing is."""
-    unseen: Prediction
+    cross_validated: Prediction
     """Of every frame by a model that was not fitted to it."""
-    gate: ResidualTest
+    residual_test: ResidualTest
     forecasts: tuple[Forecast, ...]
     """What is worth a fit, most promising first."""
 
 
-def look(task: Task, fit: Fit) -> Round:
+def assess(task: Task, fit: Fit) -> Assessment:
     """Test what a fitted plant leaves over, whitened with the noise's colour as far as that can be told by now."""
-    moved = changes(fit, task.fitted, left_of(task.ledger, fit))
-    fit = recoloured(fit, task.fitted, _colour(task, fit, moved))
+    moved = changes(fit, task.fitted, effects_left(task.ledger, fit))
+    fit = refit_with_phi(fit, task.fitted, _colour(task, fit, moved))
     ways = directions(fit, task.fitted, moved)
     told, unseen = predict_held_out(fit, task.fitted, task.predicted)
-    gate = test_residual(fit, task.fitted, ways, task.rng, NEGLIGIBLE * task.camera)
-    return Round(fit, told, unseen, gate, tuple(promising(forecasts(fit, ways))))
+    gate = run_residual_test(fit, task.fitted, ways, task.rng, NEGLIGIBLE * task.camera)
+    return Assessment(fit, told, unseen, gate, tuple(promising(forecasts(fit, ways))))
 
 
-def smallest(task: Task, first: Round) -> float:
+def smallest_traced(task: Task, first: Assessment) -> float:
     """Return the smallest structure that is traced, rad RMS."""
-    return max(FINEST, NEGLIGIBLE * task.camera, FAITHFUL * first.unseen.rmse)
+    return max(FINEST, NEGLIGIBLE * task.camera, FAITHFUL * first.cross_validated.rmse)
 
 
-def faintest(task: Task, first: Round, best: Fit) -> float:
+def smallest_first_effect(task: Task, first: Assessment, best: Fit) -> float:
     """Return the smallest doing of a first effect, rad RMS.
 
     In a film it must be as large as the angle's stated uncertainty, and `NEGLIGIBLE` times that part of it which does
@@ -109,45 +109,47 @@ def faintest(task: Task, first: Round, best: Fit) -> float:
     """
     scatter = math.sqrt(1.0 - best.phi**2) * min(best.rmse, task.camera)
     common = math.sqrt(task.camera**2 - scatter**2)
-    return max(FINEST, task.camera, NEGLIGIBLE * common, FAITHFUL * first.unseen.rmse)
+    return max(FINEST, task.camera, NEGLIGIBLE * common, FAITHFUL * first.cross_validated.rmse)
 
 
-def candidates_of(task: Task, now: Round) -> list[Candidate]:
+def rank_candidates(task: Task, now: Assessment) -> list[Candidate]:
     """Fit what is promising beside what the model has, strongest evidence first.
 
     Of those whose predictions differ from the best's by less than a film's angle is uncertain, and whose evidence is
     nearly as strong, the one with fewest parameters comes first.
     """
-    found = fit_candidates(now.fit, now.unseen, task.fitted, task.predicted, now.forecasts, task.camera)
+    found = fit_candidates(now.fit, now.cross_validated, task.fitted, task.predicted, now.forecasts, task.camera)
     if not found or task.camera == 0.0:
         return found
     near = [one for one in found if found[0].evidence - one.evidence <= DECISIVE]
-    alike = [one for one in near if apart(one.fit, found[0].fit) <= task.camera]
+    alike = [one for one in near if rms_difference(one.fit, found[0].fit) <= task.camera]
     first = min(alike, key=lambda one: len(one.effect.parameters))
     return [first, *(one for one in found if one is not first)]
 
 
-def trace(task: Task, first: Round, candidates: Sequence[Candidate]) -> Round:
+def add_effects(task: Task, first: Assessment, candidates: Sequence[Candidate]) -> Assessment:
     """Add effects for as long as one proves itself.
 
     Parameters
     ----------
     task : Task
         What there is to explain.
-    first : Round
+    first : Assessment
         The base model's.
     candidates : sequence of Candidate
         Its candidates; none where nothing is missing.
 
     Returns
     -------
-    Round
+    Assessment
         The best model's.
     """
-    now, negligible, been = first, smallest(task, first), [_names(first)]
+    now, negligible, been = first, smallest_traced(task, first), [_names(first)]
     while candidates:
         best = candidates[0]
-        if not _convincing(task, now, best, negligible if effects_of(now.fit) else faintest(task, first, best.fit)):
+        if not _convincing(
+            task, now, best, negligible if effects_of(now.fit) else smallest_first_effect(task, first, best.fit)
+        ):
             # one effect may mask another: neither helps alone, and both do together
             if len(effects_of(now.fit)) + 2 > MOST_EFFECTS:
                 break
@@ -163,15 +165,15 @@ def trace(task: Task, first: Round, candidates: Sequence[Candidate]) -> Round:
     return now
 
 
-def _names(one: Round) -> set[str]:
+def _names(one: Assessment) -> set[str]:
     return {effect.id for effect in effects_of(one.fit)}
 
 
-def _convincing(task: Task, now: Round, best: Candidate, negligible: float) -> bool:
+def _convincing(task: Task, now: Assessment, best: Candidate, negligible: float) -> bool:
     if 2.0 * best.log_likelihood_gain <= special.chdtri(len(best.effect.parameters), SURE):
         return False  # noise would fit as well; and of two intervals one is easily above zero
     # a second left out may hold all that tells of a limit, which what was declared then does
-    pairs = ((now.told, best.told), (now.unseen, best.unseen))
+    pairs = ((now.held_out, best.held_out), (now.cross_validated, best.cross_validated))
     return any(
         after is not None
         and before.rmse**2 - after.rmse**2 > negligible**2
@@ -180,28 +182,28 @@ def _convincing(task: Task, now: Round, best: Candidate, negligible: float) -> b
     )
 
 
-def _added(task: Task, best: Candidate) -> Round:
+def _added(task: Task, best: Candidate) -> Assessment:
     """Take the candidate's model, less each earlier effect without which the unseen is predicted as well."""
     task.progress(f"adding {best.effect.id}")
-    fit, unseen = best.fit, best.unseen
+    fit, unseen = best.fit, best.cross_validated
     for effect in effects_of(fit)[:-1]:
         if unseen is None:
             break
-        reduced = without(fit, effect, task.fitted)
+        reduced = refit_without(fit, effect, task.fitted)
         _, less = predict_held_out(reduced, task.fitted, task.predicted)
         if compare(less, unseen, task.rng).interval_95[0] <= 0.0:
             fit, unseen = reduced, less
-    return look(task, fit)
+    return assess(task, fit)
 
 
-def _next(task: Task, now: Round, negligible: float, *, again: bool = True) -> tuple[Round, list[Candidate]]:
+def _next(task: Task, now: Assessment, negligible: float, *, again: bool = True) -> tuple[Assessment, list[Candidate]]:
     """Look for what to add next, and on the way, once, for a better fit of what there is."""
-    if now.gate.p_value >= SURE or now.fit.rmse <= negligible or len(effects_of(now.fit)) == MOST_EFFECTS:
+    if now.residual_test.p_value >= SURE or now.fit.rmse <= negligible or len(effects_of(now.fit)) == MOST_EFFECTS:
         return now, []
-    candidates = candidates_of(task, now)
-    deeper = fit_beneath(now.fit, candidates, task.fitted)
+    candidates = rank_candidates(task, now)
+    deeper = fit_from_candidates(now.fit, candidates, task.fitted)
     if again and log_likelihood_gain(now.fit.cost, deeper.cost, len(deeper.white)) > WORTH_A_LOOK:
-        return _next(task, look(task, deeper), negligible, again=False)
+        return _next(task, assess(task, deeper), negligible, again=False)
     return now, candidates
 
 
@@ -212,7 +214,7 @@ def _colour(task: Task, fit: Fit, moved: Sequence[Change]) -> float:
     the distance from the pivot, which no model enters, says where colour ends and structure begins.
     """
     likely = forecasts(fit, directions(fit, task.fitted, moved))[:LIKELIEST]
-    fits = [fit, *side_by_side(lambda one: fit_with(fit, task.fitted, one, staged=False), likely)]
+    fits = [fit, *map_in_threads(lambda one: fit_with(fit, task.fitted, one, staged=False), likely)]
     best = min(fits, key=lambda one: one.cost)
     phi = autoregression(best.residuals, "residual").phi
     return phi if task.floor is None else min(phi, max(0.0, task.floor.phi + 1.645 * task.floor.phi_error))

@@ -17,13 +17,13 @@ from anglecam.data.typing import Floats
 from anglecam.errors import printable
 from anglecam.identification.fit import Fit
 from anglecam.loop.candidates import Candidate
-from anglecam.loop.close import Verdict
 from anglecam.loop.cross_validation import Prediction
-from anglecam.loop.loop_json import plain
 from anglecam.loop.next_experiment.design import SETTLE, Experiment
-from anglecam.loop.remainder import Remainder
+from anglecam.loop.residual_torque import ResidualTorque
+from anglecam.loop.verdict import Verdict
 from anglecam.models.plant import Plant
 from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, STYLE, _svg
+from anglecam.report.wording import plain
 
 WIDTH = 9.6
 MOST = 8
@@ -84,7 +84,7 @@ def candidate_figure(candidates: Sequence[Candidate], found: Sequence[str]) -> s
         ax.barh(rows + 0.19, fitted, 0.36, color=COMMAND, label="on the recordings that it was fitted to")
         ax.barh(rows - 0.19, unseen, 0.36, color=AFTER, label="on recordings that it had not seen")
         for row, candidate in zip(rows, ordered, strict=True):
-            if candidate.unseen is None:
+            if candidate.cross_validated is None:
                 ax.annotate("not tried", (0.0, row - 0.19), (4, 0), textcoords="offset points", va="center", fontsize=7)
         ax.set_yticks(rows, [plain(c.effect.id) for c in ordered])
         for tick, candidate in zip(ax.get_yticklabels(), ordered, strict=True):
@@ -159,7 +159,7 @@ def error_figure(before: Prediction, after: Prediction | None, floor: float) -> 
         return _svg(figure)
 
 
-def remainder_figure(remainders: Sequence[Remainder]) -> str:
+def remainder_figure(remainders: Sequence[ResidualTorque]) -> str:
     """Draw the torque that is left over against angle, velocity, command and time; points, and their means."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(2, 2, figsize=(WIDTH, 5.4), sharey=True, layout="constrained")

@@ -15,16 +15,17 @@ from anglecam.effects import effect
 from anglecam.identification.identified import Identified
 from anglecam.io.files import write_atomically
 from anglecam.io.session import CORRECTED
-from anglecam.loop.close import Verdict
 from anglecam.loop.cross_validation import LEFT_OUT, TURNS
-from anglecam.loop.loop_json import NEXT_COMMAND, plain, sentence, size_of, split_unit, with_uncertainty
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.refit import plant_of
-from anglecam.loop.remainder import leftover_torque
-from anglecam.loop.residual_test import Test
+from anglecam.loop.residual_test import StructureTest
+from anglecam.loop.residual_torque import estimate_residual_torque
 from anglecam.loop.stepwise import applicable
+from anglecam.loop.verdict import Verdict
+from anglecam.loop.verdict_json import NEXT_COMMAND, size_of, split_unit
 from anglecam.report import loop_figures as figures
 from anglecam.report.path_figure import path_figure
+from anglecam.report.wording import plain, sentence, with_uncertainty
 
 COLOURS = {"attributed": "#1f6f8b", "nothing_missing": "#3d7a4a", "unexplained": "#b5651d"}
 ESTIMATORS = {"ekf": "extended Kalman filter", "oe2": "output error"}
@@ -69,9 +70,9 @@ def write_report(
     verdict : Verdict
         From `anglecam.loop.close.close_records`.
     result : dict
-        The same as ``loop.json`` holds it, from `anglecam.loop.loop_json.verdict_as_dict`.
+        The same as ``loop.json`` holds it, from `anglecam.loop.verdict_json.verdict_as_dict`.
     experiment : Experiment or None
-        What to record next, from `anglecam.loop.loop_json.next_experiment`.
+        What to record next, from `anglecam.loop.verdict_json.next_experiment`.
     series : sequence of AngleSeries
         What was measured.
     models : sequence of Identified
@@ -158,7 +159,9 @@ def _figures(verdict: Verdict, experiment: Experiment | None, series: Sequence[A
     if verdict.candidates:
         drawn["candidates"] = figures.candidate_figure(verdict.candidates, [a.effect.id for a in verdict.accepted])
     if verdict.verdict == "unexplained":
-        drawn["remainder"] = figures.remainder_figure(leftover_torque(verdict.after, verdict.fitted, verdict.noise))
+        drawn["remainder"] = figures.remainder_figure(
+            estimate_residual_torque(verdict.after, verdict.fitted, verdict.noise)
+        )
     if experiment is not None and experiment.command is not None and experiment.separated:
         drawn["experiment"] = figures.experiment_figure(experiment, verdict)
     return drawn
@@ -195,7 +198,7 @@ def _model_row(model: Identified) -> dict[str, Any]:
     }
 
 
-def _test_rows(tests: Sequence[Test]) -> dict[str, list[dict[str, Any]]]:
+def _test_rows(tests: Sequence[StructureTest]) -> dict[str, list[dict[str, Any]]]:
     """Part the tests that look for anything from those that look for one effect, most striking first."""
     rows: dict[str, list[dict[str, Any]]] = {"any": [], "effect": []}
     for test in sorted(tests, key=lambda t: t.p_value):
@@ -213,7 +216,7 @@ def _candidate_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, 
             "found": c.effect.id in found,
             "station": c.effect.station,
             "gain": c.log_likelihood_gain,
-            "predictive_gain": None if c.unseen is None else c.predictive_gain,
+            "predictive_gain": None if c.cross_validated is None else c.predictive_gain,
             "held_out": told["held_out_rmse_deg"],
             "relaxes": c.effect.relaxes,
         }

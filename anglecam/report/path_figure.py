@@ -20,10 +20,10 @@ from anglecam.data.typing import Floats
 from anglecam.effects import Effect, Knots
 from anglecam.effects import effect as entry
 from anglecam.identification.fit import Fit
-from anglecam.loop.close import Verdict
-from anglecam.loop.loop_json import plain
 from anglecam.loop.stepwise import applicable
+from anglecam.loop.verdict import Verdict
 from anglecam.report.figures import AFTER, COMMAND, MEASURED, STYLE, _svg
+from anglecam.report.wording import plain
 
 STATIONS = {
     "command": "what is asked",
@@ -42,7 +42,7 @@ LEAST_MOVE = 0.05
 
 
 @dataclass(frozen=True)
-class Curve:
+class EffectCurve:
     """An effect's own function."""
 
     x: Floats
@@ -78,7 +78,7 @@ def path_figure(verdict: Verdict) -> str:
         return _svg(figure)
 
 
-def curve_of(effect: Effect, fit: Fit, records: Sequence[Record]) -> Curve:
+def curve_of(effect: Effect, fit: Fit, records: Sequence[Record]) -> EffectCurve:
     """Evaluate what a fitted effect does over what recordings went through.
 
     Parameters
@@ -92,7 +92,7 @@ def curve_of(effect: Effect, fit: Fit, records: Sequence[Record]) -> Curve:
 
     Returns
     -------
-    Curve
+    EffectCurve
         In degrees, seconds and milliseconds.
     """
     own = entry(effect.id).null  # late parameters that the data did not ask for stay at it
@@ -112,7 +112,7 @@ def curve_of(effect: Effect, fit: Fit, records: Sequence[Record]) -> Curve:
         level = np.where(omega > 0.0, up, down)
         if speed > 0.0:
             level = level + np.maximum(breakaway - level, 0.0) * np.exp(-((omega / speed) ** 2))
-        return Curve(
+        return EffectCurve(
             np.degrees(omega), -np.degrees(np.sign(omega) * level), "velocity, °/s", "torque of friction, °/s²"
         )
     if effect.port == "load":
@@ -128,12 +128,12 @@ def curve_of(effect: Effect, fit: Fit, records: Sequence[Record]) -> Curve:
     return _ordered(np.degrees(asked), np.degrees(given), "torque asked for, °/s²", "torque given, °/s²", True)
 
 
-def _command_curve(effect: Effect, own: Floats, records: Sequence[Record]) -> Curve:
+def _command_curve(effect: Effect, own: Floats, records: Sequence[Record]) -> EffectCurve:
     """Pick the stretch of command of whose movement the effect takes the largest share."""
     runs = [(r, r.command, np.arange(r.time[0], r.time[-1], TICK)) for r in records if r.command is not None]
     pairs = [(r.name, t, c.at(t), _arriving(effect, own, c, t)) for r, c, t in runs]
     least = LEAST_MOVE * max(float(np.ptp(asked)) for _, _, asked, _ in pairs)
-    best: Curve | None = None
+    best: EffectCurve | None = None
     most = 0.0
     for stretch in STRETCHES:
         size = round(stretch / TICK)
@@ -146,7 +146,7 @@ def _command_curve(effect: Effect, own: Floats, records: Sequence[Record]) -> Cu
                 if move >= least and share > most:
                     most = share
                     told = np.degrees(arriving[part]), f"time in {name}, s", "command, °", np.degrees(asked[part])
-                    best = Curve(time[part], *told)
+                    best = EffectCurve(time[part], *told)
         if most >= SHOWS:
             break
     if best is None:
@@ -170,7 +170,7 @@ def _arriving(effect: Effect, own: Floats, command: Command, time: Floats) -> Fl
     return knots.level[at] + knots.slope[at] * since
 
 
-def _camera_curve(effect: Effect, own: Floats, records: Sequence[Record], angles: Sequence[Floats]) -> Curve:
+def _camera_curve(effect: Effect, own: Floats, records: Sequence[Record], angles: Sequence[Floats]) -> EffectCurve:
     act, factor, name = effect.observation, 180.0 / np.pi, "angle shown − true, °"
     if act is None:
         act, factor, name = effect.timing, 1e3, "time shown − true, ms"
@@ -186,9 +186,9 @@ def _camera_curve(effect: Effect, own: Floats, records: Sequence[Record], angles
     return _ordered(np.concatenate(x), sign * np.concatenate(y), "time, s" if creeps else "angle, °", name)
 
 
-def _ordered(x: Floats, y: Floats, xlabel: str, ylabel: str, beside_itself: bool = False) -> Curve:
+def _ordered(x: Floats, y: Floats, xlabel: str, ylabel: str, beside_itself: bool = False) -> EffectCurve:
     order = np.argsort(x)
-    return Curve(x[order], y[order], xlabel, ylabel, x[order] if beside_itself else None)
+    return EffectCurve(x[order], y[order], xlabel, ylabel, x[order] if beside_itself else None)
 
 
 def _draw_station(axes: Axes, i: int, station: str, what: str, found: bool) -> None:

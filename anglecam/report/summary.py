@@ -9,12 +9,13 @@ from rich.table import Table
 
 from anglecam.errors import printable
 from anglecam.identification.identified import Identified
-from anglecam.loop.close import Verdict
-from anglecam.loop.loop_json import NEXT_COMMAND, describe, sentence
 from anglecam.loop.next_experiment.design import Experiment
+from anglecam.loop.verdict import Verdict
+from anglecam.loop.verdict_json import NEXT_COMMAND
 from anglecam.measurement.clip import Measurement
 from anglecam.measurement.step_response import Figure, Response
 from anglecam.measurement.tracks import MeasuredTracks
+from anglecam.report.wording import describe, sentence
 
 
 def series_table(measurements: Sequence[Measurement | MeasuredTracks]) -> Table:

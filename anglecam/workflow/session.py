@@ -26,7 +26,7 @@ from anglecam.workflow.clip import measure_source, open_recording
 
 if TYPE_CHECKING:
     from anglecam.identification.identified import Identified
-    from anglecam.loop.close import Verdict
+    from anglecam.loop.verdict import Verdict
     from anglecam.neck.large_angle import LargeAngleNeck
 
 

@@ -12,11 +12,11 @@ from anglecam.identification.identify_records import identify_records
 from anglecam.io.files import write_json
 from anglecam.io.series_csv import write_series
 from anglecam.io.session import CORRECTED, SERIES_ENDING
-from anglecam.loop.close import Verdict
-from anglecam.loop.correct import corrected
+from anglecam.loop.camera_correction import correct_camera_effects
 from anglecam.loop.cross_validation import split_records
-from anglecam.loop.loop_json import next_experiment, verdict_as_dict, write_next_command
 from anglecam.loop.next_experiment.design import Experiment
+from anglecam.loop.verdict import Verdict
+from anglecam.loop.verdict_json import next_experiment, verdict_as_dict, write_next_command
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.report.page import write_report
 from anglecam.terminal import make_folder
@@ -110,7 +110,7 @@ def _write_model(model: Identified, out: Path, name: str) -> None:
 def _write_corrected(shown: LoopInput, verdict: Verdict, folder: Path) -> None:
     """Write the series without the camera's effects that the loop found, where it found any."""
     for series, record in zip(shown.series, shown.records, strict=True):
-        right = corrected(series, verdict.after, record.view)
+        right = correct_camera_effects(series, verdict.after, record.view)
         if right is not None:
             make_folder(folder)
             write_series(right, folder / f"{series.name}{SERIES_ENDING}")

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from anglecam.identification.systematic import full_sigma
-from anglecam.loop.close import Verdict
+from anglecam.loop.verdict import Verdict
 from benchmarks.blind.drawn import LEDGER, Keys
 from benchmarks.blind.sessions import look
 from synth.spec import Spec

@@ -8,10 +8,18 @@ import pytest
 from anglecam.effects import effect
 from anglecam.identification.noise import DISTANCE, Noise
 from anglecam.identification.output_error import fit_output_error
-from anglecam.loop.candidates import SLOW, Candidate, apart, fit_beneath, fit_with, log_likelihood_gain, rivals
+from anglecam.loop.candidates import (
+    SLOW,
+    Candidate,
+    find_rivals,
+    fit_from_candidates,
+    fit_with,
+    log_likelihood_gain,
+    rms_difference,
+)
 from anglecam.loop.cross_validation import split_records
 from anglecam.loop.screen import changes, directions, forecasts
-from anglecam.loop.stepwise import Task, candidates_of, look
+from anglecam.loop.stepwise import Task, assess, rank_candidates
 from anglecam.models.plant import Plant
 from benchmarks.blind.drawn import draw
 from benchmarks.blind.sessions import HELD_OUT, session
@@ -40,11 +48,11 @@ def test_a_dead_zone_beside_nothing_else_is_fitted_as_well_as_from_the_truth():
         found.append(Candidate(forecast, fit_with(now, fitted, forecast), 0.0, None, None, 0.0))
         now = found[-1].fit
     zone, beside = found
-    deeper = fit_beneath(zone.fit, [beside], fitted)
+    deeper = fit_from_candidates(zone.fit, [beside], fitted)
     from_truth = fit_output_error(zone.fit.model, fitted, [np.append(base.parameters, np.radians(width))])
     assert deeper.model is zone.fit.model
     assert deeper.cost < (1.0 + 1e-6) * from_truth.cost
-    assert fit_beneath(deeper, [], fitted) is deeper
+    assert fit_from_candidates(deeper, [], fitted) is deeper
 
 
 def test_a_curve_of_friction_is_confined_to_slow_motion():
@@ -64,7 +72,7 @@ def test_in_a_film_what_is_finer_than_the_angle_asks_for_no_late_parameter():
     (forecast,) = forecasts(base, directions(base, fitted, changes(base, fitted, [effect("coulomb_friction")])))
     sure = fit_with(base, fitted, forecast)
     size_alone = fit_with(base, fitted, forecast, staged=False)
-    distance = apart(sure, size_alone)
+    distance = rms_difference(sure, size_alone)
     assert len(sure.parameters) > len(size_alone.parameters)
     assert len(fit_with(base, fitted, forecast, camera=0.9 * distance).parameters) == len(sure.parameters)
     assert len(fit_with(base, fitted, forecast, camera=1.1 * distance).parameters) == len(size_alone.parameters)
@@ -80,12 +88,12 @@ def test_what_differs_by_less_than_the_cameras_uncertainty_is_chosen_by_strong_e
         forecasts(base, directions(base, fitted, changes(base, fitted, ledger))), key=lambda f: f.effect.id
     )
     best = fit_with(base, fitted, tilt)
-    distance = apart(best, fit_with(base, fitted, lens))
+    distance = rms_difference(best, fit_with(base, fitted, lens))
     assert len(tilt.effect.parameters) > len(lens.effect.parameters)
-    assert list(rivals(best, base, fitted, tilt.effect, [lens], 1.02 * distance)) == ["lens_distortion"]
+    assert list(find_rivals(best, base, fitted, tilt.effect, [lens], 1.02 * distance)) == ["lens_distortion"]
     floor = Noise(1.02 * distance, 0.0, 0.1, DISTANCE)
     task = Task(tuple(fitted), tuple(predicted), tuple(ledger), floor, np.random.default_rng(0), lambda stage: None)
-    assert candidates_of(task, look(task, base))[0].effect.id == alike
+    assert rank_candidates(task, assess(task, base))[0].effect.id == alike
 
 
 def test_a_fit_ends_only_where_nothing_more_is_gained():

@@ -11,9 +11,10 @@ from anglecam.errors import RigError
 from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.close import close_records
 from anglecam.loop.cross_validation import Prediction, predict_held_out, split_records
-from anglecam.loop.loop_json import sentence, verdict_as_dict
 from anglecam.loop.stepwise import applicable
+from anglecam.loop.verdict_json import verdict_as_dict
 from anglecam.models.plant import Plant
+from anglecam.report.wording import sentence
 from benchmarks.blind.sessions import session as drawn_session
 from support.motion import Plant as TruePlant
 from support.series import session
@@ -167,8 +168,8 @@ def test_one_wrong_guess_does_not_change_the_typical_error_and_a_wrong_model_doe
     noise = np.random.default_rng(0).normal(0.0, 0.001, len(record.time))
     stuck, wrong = noise.copy(), noise + 0.005
     stuck[40:50] += 0.05
-    assert Prediction((record,), (stuck,), 0.0).typical == pytest.approx(0.001, rel=0.15)
-    assert Prediction((record,), (wrong,), 0.0).typical > 0.005
+    assert Prediction((record,), (stuck,), 0.0).robust_sigma == pytest.approx(0.001, rel=0.15)
+    assert Prediction((record,), (wrong,), 0.0).robust_sigma > 0.005
 
 
 def test_a_limit_is_said_to_be_seen_only_where_it_acts(clean):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from anglecam.loop.close import close_records
-from anglecam.loop.loop_json import verdict_as_dict
+from anglecam.loop.verdict_json import verdict_as_dict
 from support.motion import Plant, Recording, move
 from support.series import record
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from anglecam.loop.stepwise import faintest
+from anglecam.loop.stepwise import smallest_first_effect
 
 CAMERA = 2e-4
 
@@ -23,7 +23,7 @@ CAMERA = 2e-4
 )
 def test_a_first_effect_must_do_twice_what_may_follow_the_motion_and_the_whole_uncertainty(left, phi, times):
     task = SimpleNamespace(camera=CAMERA)
-    first = SimpleNamespace(unseen=SimpleNamespace(rmse=0.0))
-    assert faintest(task, first, SimpleNamespace(rmse=left, phi=phi)) == pytest.approx(times * CAMERA)
-    coarse = SimpleNamespace(unseen=SimpleNamespace(rmse=1e4 * CAMERA))
-    assert faintest(task, coarse, SimpleNamespace(rmse=left, phi=phi)) == pytest.approx(50.0 * CAMERA)
+    first = SimpleNamespace(cross_validated=SimpleNamespace(rmse=0.0))
+    assert smallest_first_effect(task, first, SimpleNamespace(rmse=left, phi=phi)) == pytest.approx(times * CAMERA)
+    coarse = SimpleNamespace(cross_validated=SimpleNamespace(rmse=1e4 * CAMERA))
+    assert smallest_first_effect(task, coarse, SimpleNamespace(rmse=left, phi=phi)) == pytest.approx(50.0 * CAMERA)

@@ -16,10 +16,12 @@ from anglecam.identification.identify_records import identify_records
 from anglecam.identification.output_error import fit_output_error
 from anglecam.io.command_csv import read_command
 from anglecam.io.rig import Rig
-from anglecam.loop.close import Accepted, close_records
-from anglecam.loop.loop_json import next_experiment, sentence, split_unit, verdict_as_dict, write_next_command
+from anglecam.loop.close import close_records
 from anglecam.loop.next_experiment.design import Experiment
+from anglecam.loop.verdict import Accepted
+from anglecam.loop.verdict_json import next_experiment, split_unit, verdict_as_dict, write_next_command
 from anglecam.report.page import p_in_words, unseen_in_words, write_report
+from anglecam.report.wording import sentence
 from support.motion import Plant
 from support.series import session
 
@@ -86,7 +88,7 @@ def test_every_candidate_has_its_error_on_what_it_had_not_seen(dragged):
     result = verdict_as_dict(dragged)
     assert len(result["candidates"]) == len(dragged.candidates)
     assert all(np.isfinite(c["held_out_rmse_deg"]) for c in result["candidates"])
-    untried = [c for c, one in zip(result["candidates"], dragged.candidates, strict=True) if one.told is None]
+    untried = [c for c, one in zip(result["candidates"], dragged.candidates, strict=True) if one.held_out is None]
     assert all(c["held_out_rmse_deg"] > result["rmse_deg"]["after"]["held_out"] for c in untried)
 
 

@@ -43,7 +43,7 @@ PERIODS = (2.0, 4.0, 8.0)
 
 
 @dataclass(frozen=True)
-class Limits:
+class CommandLimits:
     """What commands a rig has been given, rad."""
 
     home: float
@@ -61,7 +61,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Candidate:
+class CandidateExperiment:
     """What could be recorded, `LONGEST` seconds of it."""
 
     description: str
@@ -71,16 +71,16 @@ class Candidate:
     """Angle that a free swing is let go from, rad."""
 
 
-def limits_of(records: Sequence[Record]) -> Limits:
+def limits_of(records: Sequence[Record]) -> CommandLimits:
     """Read the limits off the commands of recordings; at least one must have a command."""
     commands = [(r.command, float(r.time[-1])) for r in records if r.command is not None]
     levels = np.concatenate([c.angle[c.time <= end] if np.any(c.time <= end) else c.angle[:1] for c, end in commands])
     ways = np.max([_ways(c, end) for c, end in commands], axis=0)
     home = float(np.median([c.angle[0] for c, _ in commands]))
-    return Limits(home, float(levels.min()), float(levels.max()), ways)
+    return CommandLimits(home, float(levels.min()), float(levels.max()), ways)
 
 
-def candidate_commands(records: Sequence[Record], natural_hz: float) -> list[Candidate]:
+def candidate_commands(records: Sequence[Record], natural_hz: float) -> list[CandidateExperiment]:
     """List what could be played next.
 
     Parameters
@@ -92,9 +92,9 @@ def candidate_commands(records: Sequence[Record], natural_hz: float) -> list[Can
 
     Returns
     -------
-    list of Candidate
+    list of CandidateExperiment
         Shapes about where recordings begin and about the middle of the range, and what was played already, as far as
-        the rig's `Limits` and the camera's frame rate allow. Never empty.
+        the rig's `CommandLimits` and the camera's frame rate allow. Never empty.
     """
     limits = limits_of(records)
     interval = float(np.median([r.interval for r in records]))
@@ -107,15 +107,17 @@ def candidate_commands(records: Sequence[Record], natural_hz: float) -> list[Can
         centres.append(middle)
     shaped = chain.from_iterable(_about(centre, limits, tops) for centre in centres)
     again = [
-        Candidate(f"the command of {r.name} again", _again(r.command, float(r.time[0]))) for r in records if r.command
+        CandidateExperiment(f"the command of {r.name} again", _again(r.command, float(r.time[0])))
+        for r in records
+        if r.command
     ]
     return [*again, *(c for c in shaped if c.command and limits.allow(c.command))]
 
 
-def candidate_releases(angles: Floats) -> list[Candidate]:
+def candidate_releases(angles: Floats) -> list[CandidateExperiment]:
     """List free swings from shares of the furthest ``angles`` (rad from equilibrium) that were seen, both ways."""
     return [
-        Candidate(f"release from {np.degrees(share * extreme):.3g}°", None, float(share * extreme))
+        CandidateExperiment(f"release from {np.degrees(share * extreme):.3g}°", None, float(share * extreme))
         for extreme in (angles.max(), angles.min())
         for share in SHARES
     ]
@@ -127,14 +129,14 @@ def beginning(command: Command, duration: float) -> Command:
     return Command(command.time[kept], command.angle[kept])
 
 
-def _about(centre: float, limits: Limits, tops: Sequence[float]) -> Iterator[Candidate]:
+def _about(centre: float, limits: CommandLimits, tops: Sequence[float]) -> Iterator[CandidateExperiment]:
     """Make all shapes about one level."""
     room = min(limits.highest - centre, centre - limits.lowest)
     if room <= 0.0:
         return
 
-    def made(description: str, rows: tuple[Floats, Floats]) -> Candidate:
-        return Candidate(description + where, _after_rest(*rows, limits.home))
+    def made(description: str, rows: tuple[Floats, Floats]) -> CandidateExperiment:
+        return CandidateExperiment(description + where, _after_rest(*rows, limits.home))
 
     where = "" if abs(centre) < 1e-9 else f" about {np.degrees(centre):.3g}°"
     there = np.array([1.0, 0.0, -1.0, 0.0])

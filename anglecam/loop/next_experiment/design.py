@@ -34,7 +34,7 @@ from anglecam.identification.noise import Noise
 from anglecam.io.files import write_atomically
 from anglecam.loop.next_experiment.commands import (
     LONGEST,
-    Candidate,
+    CandidateExperiment,
     beginning,
     candidate_commands,
     candidate_releases,
@@ -209,7 +209,7 @@ def _names(fits: Sequence[Fit]) -> list[str]:
     return [" + ".join(i for i in ids if i not in shared) or "no further effect" for ids in effects]
 
 
-def _candidates(fits: Sequence[Fit], records: Sequence[Record]) -> list[Candidate]:
+def _candidates(fits: Sequence[Fit], records: Sequence[Record]) -> list[CandidateExperiment]:
     seen = _angles(fits[0], records)
     if all(r.command is None for r in records):
         return candidate_releases(seen)
@@ -223,7 +223,7 @@ def _angles(fit: Fit, records: Sequence[Record]) -> Floats:
     return np.concatenate([r.angle - own[states:].sum() for r, own in zip(records, fit.nuisance, strict=True)])
 
 
-def _foresee_all(candidate: Candidate, fits: Sequence[Fit], records: Sequence[Record]) -> list[_Foreseen]:
+def _foresee_all(candidate: CandidateExperiment, fits: Sequence[Fit], records: Sequence[Record]) -> list[_Foreseen]:
     """Predict one candidate with each model; nothing if it would take the head where it has never been."""
     foreseen = [_foresee(candidate, fit, records) for fit in fits]
     if not all(np.all(np.isfinite(f.record.angle)) and np.all(np.isfinite(f.slopes)) for f in foreseen):
@@ -237,7 +237,7 @@ def _foresee_all(candidate: Candidate, fits: Sequence[Fit], records: Sequence[Re
     return foreseen if inside else []
 
 
-def _foresee(candidate: Candidate, fit: Fit, records: Sequence[Record]) -> _Foreseen:
+def _foresee(candidate: CandidateExperiment, fit: Fit, records: Sequence[Record]) -> _Foreseen:
     plant = plant_of(fit)
     time = np.arange(0.0, LONGEST, np.median([r.interval for r in records]))
     if candidate.command is None:

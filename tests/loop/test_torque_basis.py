@@ -9,9 +9,9 @@ from anglecam.effects import effect
 from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.candidates import fit_with
 from anglecam.loop.cross_validation import split_records
-from anglecam.loop.residual_test import test_residual as _test_residual  # pytest would take it for a test of its own
+from anglecam.loop.residual_test import run_residual_test
 from anglecam.loop.screen import changes, directions, forecasts
-from anglecam.loop.state_torques import torque_responses
+from anglecam.loop.torque_basis import torque_responses
 from anglecam.models.plant import Plant
 from benchmarks.blind.sessions import HELD_OUT, session
 
@@ -61,6 +61,6 @@ def test_the_gate_sees_a_slack_spring_behind_the_gravity_that_comes_nearest_to_i
     near = np.array([26.1, 622.9, 435.6, math.radians(4625.0), math.radians(40.6)])
     fit = fit_output_error(Plant((effect("gravity_geometry"),)), fitted, [near])
     assert np.degrees(fit.rmse) < 1.05 * 0.05
-    gate = _test_residual(fit, fitted, [], np.random.default_rng(0), 0.0)
+    gate = run_residual_test(fit, fitted, [], np.random.default_rng(0), 0.0)
     assert gate.p_value < 0.01
     assert min(gate.tests, key=lambda test: test.p_value).name == "torque against angle"

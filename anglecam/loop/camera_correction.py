@@ -16,7 +16,7 @@ ROUNDS = 20
 """Of a fixed point whose map differs from the identity by a few per cent: each gains more than a decimal."""
 
 
-def corrected(series: AngleSeries, fit: Fit, view: View) -> AngleSeries | None:
+def correct_camera_effects(series: AngleSeries, fit: Fit, view: View) -> AngleSeries | None:
     """Undo the camera-side effects of a fitted plant in a recording.
 
     Parameters

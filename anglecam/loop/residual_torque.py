@@ -29,7 +29,7 @@ PARTS = 8
 
 
 @dataclass(frozen=True)
-class Remainder:
+class ResidualTorque:
     """The torque that one recording leaves over, and what it may depend on; arrays of length n."""
 
     name: str
@@ -47,7 +47,7 @@ class Remainder:
     """rad; ``None`` for a free swing."""
 
 
-def leftover_torque(fit: Fit, records: Sequence[Record], noise: Noise) -> list[Remainder]:
+def estimate_residual_torque(fit: Fit, records: Sequence[Record], noise: Noise) -> list[ResidualTorque]:
     """Turn a fitted plant's residual into the torque that would have made it.
 
     Parameters
@@ -61,7 +61,7 @@ def leftover_torque(fit: Fit, records: Sequence[Record], noise: Noise) -> list[R
 
     Returns
     -------
-    list of Remainder
+    list of ResidualTorque
         One a recording, without the frames at its ends that have no full stretch about them.
     """
     operator = np.array([fit.parameters[1], fit.parameters[0], 1.0])
@@ -98,9 +98,9 @@ def _agree(longer: Sequence[tuple[Floats, Floats]], shorter: Sequence[tuple[Floa
     return bool(np.sum(off**2) <= np.sum(sigma**2))
 
 
-def _against(record: Record, error: Floats, torque: Floats, sigma: Floats, kept: slice) -> Remainder:
+def _against(record: Record, error: Floats, torque: Floats, sigma: Floats, kept: slice) -> ResidualTorque:
     path = record.angle - error
-    return Remainder(
+    return ResidualTorque(
         record.name,
         record.time[kept],
         torque[kept],

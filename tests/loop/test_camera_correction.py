@@ -9,7 +9,7 @@ from anglecam.data.camera_evidence import View
 from anglecam.data.series import AngleSeries
 from anglecam.effects import effect
 from anglecam.identification.fit import Fit
-from anglecam.loop.correct import corrected
+from anglecam.loop.camera_correction import correct_camera_effects
 from anglecam.models.plant import Plant
 
 TIME = np.linspace(0.0, 5.0, 151)
@@ -44,16 +44,16 @@ def test_the_angle_is_what_it_was_before_the_camera(found):
     for one, own in fit.model.parameters_by_effect(fit.parameters):
         shown = one.observation(TIME, shown, own, VIEW)
     assert np.degrees(np.abs(shown - NOD)).max() > 0.05
-    assert corrected(series(TIME, shown), fit, VIEW).angle == pytest.approx(NOD, abs=1e-9)
+    assert correct_camera_effects(series(TIME, shown), fit, VIEW).angle == pytest.approx(NOD, abs=1e-9)
 
 
 def test_a_clock_that_runs_fast_is_set_right_and_frames_without_an_angle_stay_without():
     lost = np.where(np.arange(len(NOD)) == 7, np.nan, NOD)
-    told = corrected(series(TIME, lost), fitted(("clock_scale", (0.01,))), VIEW)
+    told = correct_camera_effects(series(TIME, lost), fitted(("clock_scale", (0.01,))), VIEW)
     assert told.time == pytest.approx(TIME / 1.01)
     assert np.isnan(told.angle[7])
     assert told.angle[8:] == pytest.approx(NOD[8:])
 
 
 def test_a_mechanism_without_effects_of_the_camera_is_left_alone():
-    assert corrected(series(TIME, NOD), fitted(("dead_time", (0.02,))), VIEW) is None
+    assert correct_camera_effects(series(TIME, NOD), fitted(("dead_time", (0.02,))), VIEW) is None

@@ -11,9 +11,9 @@ from anglecam.effects import Effect, Parameter, effect
 from anglecam.identification.output_error import predict_output_error
 from anglecam.identification.systematic import full_sigma
 from anglecam.loop.candidates import Candidate
-from anglecam.loop.close import Verdict
 from anglecam.loop.cross_validation import predict_held_out
 from anglecam.loop.next_experiment.design import Experiment, separating_experiment, write_command
+from anglecam.loop.verdict import Verdict
 
 MODEL_NAMES = ("a_per_s", "b_per_s2", "c_per_s2")
 NEXT_COMMAND = "next.command.csv"
@@ -62,7 +62,7 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
     dict
         Every candidate has its error on what is held out, those among them that the loop did not try there.
     """
-    model = dict(zip(verdict.after.model.names, _values(verdict), strict=True))
+    model = dict(zip(verdict.after.model.names, parameter_values(verdict), strict=True))
     named = {name for accepted in verdict.accepted for name in accepted.alias_set}
     return {
         "verdict": verdict.verdict,
@@ -107,56 +107,6 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
     }
 
 
-def sentence(verdict: Verdict) -> str:
-    """Say the verdict in one sentence that a student understands."""
-    before, after = (f"{np.degrees(p.rmse):.3g}°" for p in (verdict.before_held_out, verdict.after_held_out))
-    if verdict.verdict == "nothing_missing" and not verdict.first_test.passed:
-        return (
-            f"Nothing is missing that this camera could show: what θ̈ = c·u − a·θ̇ − b·θ leaves over ({before} on "
-            f"recordings that it was not fitted to) is not noise alone, but no larger than errors of the measurement "
-            f"itself may be, whose angles are uncertain by {np.degrees(verdict.noise.sigma):.3g}°."
-        )
-    if verdict.verdict == "nothing_missing":
-        return (
-            f"Nothing is missing: what θ̈ = c·u − a·θ̇ − b·θ leaves over ({before} on recordings that it was not "
-            f"fitted to) looks like the camera's noise and like nothing else."
-        )
-    if verdict.verdict == "unexplained":
-        return (
-            f"Something is missing (the model errs by {before} on recordings that it was not fitted to), and none "
-            f"of the effects that anglecam knows surely explains it."
-        )
-    first, *others = [_cause(a.effect, a.alias_set[1:]) for a in verdict.accepted]
-    causes = "; ".join([first, *(cause[0].lower() + cause[1:] for cause in others)])
-    this = "this" if len(verdict.accepted) == 1 else "these"
-    return (
-        f"{causes}; with {this} in the model its error on recordings that it was not fitted to falls from {before} "
-        f"to {after}."
-    )
-
-
-def plain(effect_id: str) -> str:
-    """Return an effect's name as it is spoken."""
-    return effect_id.replace("_", " ").replace("coulomb", "Coulomb")
-
-
-def describe(effect: Effect, verdict: Verdict) -> str:
-    """Return an effect's fitted parameters with their standard uncertainties, as text."""
-    model = dict(zip(verdict.after.model.names, _values(verdict), strict=True))
-    fitted = ((p.name, model[p.name]) for p in effect.parameters)
-    return ", ".join(f"{name} = {with_uncertainty(told['value'], told['sigma'])}" for name, told in fitted)
-
-
-def with_uncertainty(value: float, sigma: float, unit: str = "") -> str:
-    """Write a value to the second digit of its standard uncertainty, if it has one, and ``unit`` as it is behind it."""
-    if not np.isfinite(value):
-        return "none"
-    if not 0.0 < sigma < np.inf:
-        return f"{value:.4g}{unit} (not told by these recordings, or held by a bound of what is possible)"
-    digits = int(np.clip(1 - np.floor(np.log10(sigma)), 0, 8))
-    return f"{value:.{digits}f} ± {sigma:.{digits}f}{unit}"
-
-
 def split_unit(name: str) -> tuple[str, str]:
     """Part a parameter's name from the unit that it ends in (``dry_friction_deg_per_s2`` → dry friction, deg/s2)."""
     words = name.split("_")
@@ -168,18 +118,6 @@ def split_unit(name: str) -> tuple[str, str]:
 def size_of(effect_id: str) -> Parameter:
     """Return the parameter that says how large an effect is."""
     return effect(effect_id).parameters[0]
-
-
-def _cause(effect: Effect, others: tuple[str, ...]) -> str:
-    """Say what an effect is, whose doing, and what else it may be."""
-    told = effect.summary.removesuffix(".")
-    if effect.station == "camera":
-        told += ", which is the camera's doing and not the mechanism's"
-    if others:
-        *most, last = (plain(other) for other in others)
-        either = f"{', '.join(most)} or {last}" if most else last
-        told += f" (or it is {either}, which these recordings cannot tell from it)"
-    return told
 
 
 def _what_to_film(effect: Effect, experiment: Experiment | None) -> str:
@@ -194,14 +132,14 @@ def _what_to_film(effect: Effect, experiment: Experiment | None) -> str:
 
 def _held_out_error(candidate: Candidate, verdict: Verdict) -> float:
     """Return a candidate's error, rad, on what is held out, also where the loop had no hope of it."""
-    if candidate.told is not None:
-        return candidate.told.rmse
+    if candidate.held_out is not None:
+        return candidate.held_out.rmse
     if verdict.held_out:
         return predict_output_error(candidate.fit, verdict.held_out).rmse
     return predict_held_out(candidate.fit, verdict.fitted, ())[0].rmse
 
 
-def _values(verdict: Verdict) -> list[dict[str, float]]:
+def parameter_values(verdict: Verdict) -> list[dict[str, float]]:
     fit = verdict.after
     own = [p for a in verdict.accepted for p in a.effect.parameters]
     base = len(fit.parameters) - len(own)
