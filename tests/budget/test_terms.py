@@ -64,7 +64,9 @@ def test_registration_errs_by_its_own_sigma_and_its_own_pull_of_the_pivot():
     pull = np.column_stack([np.linspace(0.0, 4e-4, N), np.linspace(1e-4, -3e-4, N)])
     sigma = np.full(N, 4e-5)
     plain, _ = nod_sources(noise=0.0, pose=0.0)
-    neutral = replace(plain.neutral, registration=4e-5 / math.sqrt(REST.sum()), pivot_sensitivity=pull[REST].mean(axis=0))
+    neutral = replace(
+        plain.neutral, registration=4e-5 / math.sqrt(REST.sum()), pivot_sensitivity=pull[REST].mean(axis=0)
+    )
     sources = replace(plain, registration=sigma, pivot_sensitivity=pull, neutral=neutral)
     off = pull - pull[REST].mean(axis=0)
     expected = sigma**2 * (1.0 + 1.0 / REST.sum()) + np.einsum("ni,ij,nj->n", off, COVARIANCE, off)
@@ -76,7 +78,9 @@ def test_the_geometrys_own_pull_is_the_geometry():
     sources, _ = nod_sources(lever_px=np.full(N, 200.0))
     along = np.column_stack([np.sin(sources.line), np.cos(sources.line)])
     pull = along / 200.0
-    pulled = replace(sources, pivot_sensitivity=pull, neutral=replace(sources.neutral, pivot_sensitivity=pull[REST].mean(axis=0)))
+    pulled = replace(
+        sources, pivot_sensitivity=pull, neutral=replace(sources.neutral, pivot_sensitivity=pull[REST].mean(axis=0))
+    )
     assert _joined(pulled) == pytest.approx(_joined(sources), rel=1e-9)
     assert _spread(pulled, 60) == pytest.approx(_spread(sources, 60), rel=0.006)
 
