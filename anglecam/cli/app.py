@@ -32,6 +32,7 @@ from anglecam.io.session import (
     recording_name,
     rig_beside,
 )
+from anglecam.io.tracks.files import tracker_names
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def _anglecam(
 def measure(
     clips: Annotated[
         list[Path],
-        typer.Argument(metavar="CLIP", help="Clips, folders of clips, or tracks from DeepLabCut or SLEAP."),
+        typer.Argument(metavar="CLIP", help=f"Clips, folders of clips, or tracks from {tracker_names()}."),
     ],
     out: Out,
     rig: RigFile = None,
