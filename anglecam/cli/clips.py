@@ -17,6 +17,7 @@ from anglecam.errors import AnglecamError, InputError, RigError, blame, printabl
 from anglecam.io.netcdf_parquet import Also
 from anglecam.io.rig import Rig, read_rig
 from anglecam.io.session import find_clips, find_measurable, recording_name, rig_beside
+from anglecam.io.tracks.files import tracker_names
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 def measure(
     clips: Annotated[
         list[Path],
-        typer.Argument(metavar="CLIP", help="Clips, folders of clips, or tracks from DeepLabCut or SLEAP."),
+        typer.Argument(metavar="CLIP", help=f"Clips, folders of clips, or tracks from {tracker_names()}."),
     ],
     out: Out,
     rig: RigFile = None,

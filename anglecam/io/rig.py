@@ -13,13 +13,13 @@ Byte = Annotated[int, Field(ge=0, le=255)]
 SlantDeg = Annotated[float, Field(gt=-80, lt=80, allow_inf_nan=False)]
 
 
-class Mouth(Declared):
+class RigMark(Declared):
     """The mark at the far end of the lever: its colour, or ``None`` to find it."""
 
     rgb: tuple[Byte, Byte, Byte] | None = None
 
 
-class Pivot(Declared):
+class RigPivot(Declared):
     """Where the mechanism turns and how that place is marked."""
 
     near: tuple[Finite, Finite] | None = None
@@ -28,7 +28,7 @@ class Pivot(Declared):
     """``none``: the centre of rotation fitted to the mouth's path."""
 
 
-class Camera(Declared):
+class RigCamera(Declared):
     """What is known about the camera."""
 
     calibration: str | None = None
@@ -47,20 +47,20 @@ class Camera(Declared):
     exposure_s: Positive | None = None
 
     @model_validator(mode="after")
-    def _one_focal_length(self) -> Camera:
+    def _one_focal_length(self) -> RigCamera:
         if self.calibration is not None and self.focal_px is not None:
             raise ValueError("focal_px stands in the calibration already; declare one of them")
         return self
 
 
-class Sync(Declared):
+class RigSync(Declared):
     """What ties the command's clock to the clip's."""
 
     lamp: tuple[Finite, Finite] | None = None
     """Where in the picture a lamp stands that lights at the first command change, px."""
 
 
-class Model(Declared):
+class RigModel(Declared):
     """Starting values of θ̈ = c·u − a·θ̇ − b·θ (Eq. (30) of the paper)."""
 
     a: Finite = 26.0
@@ -73,7 +73,7 @@ class Model(Declared):
     """The centre of mass from upright at neutral, degrees."""
 
 
-class Marks(Declared):
+class RigKeypoints(Declared):
     """Which points that another program has tracked are mouth and pivot."""
 
     mouth: str
@@ -84,7 +84,7 @@ class Marks(Declared):
     """Points less likely than this are missing; ``None``: the tracking program's own default."""
 
     @model_validator(mode="after")
-    def _two_points(self) -> Marks:
+    def _two_points(self) -> RigKeypoints:
         if self.mouth == self.pivot:
             raise ValueError("mouth and pivot are the same point; an angle needs two")
         return self
@@ -93,18 +93,18 @@ class Marks(Declared):
 class Rig(Declared):
     """One rig, as ``rig.yaml`` declares it."""
 
-    mouth: Mouth | Literal["auto"] = "auto"
-    pivot: Pivot = Pivot()
+    mouth: RigMark | Literal["auto"] = "auto"
+    pivot: RigPivot = RigPivot()
     facing: Literal["right", "left"] = "right"
     neutral: Finite | Literal["auto"] = "auto"
     """``line_deg`` that counts as zero; ``auto``: the rest before the first command change, else the median."""
     pixel_error_px: tuple[Positive, ...] = (6.0, 10.0)
     held_out: tuple[str, ...] = ()
-    camera: Camera = Camera()
-    marks: Marks | None = None
+    camera: RigCamera = RigCamera()
+    marks: RigKeypoints | None = None
     """Of sessions whose recordings are tracks of points."""
-    sync: Sync = Sync()
-    model: Model = Model()
+    sync: RigSync = RigSync()
+    model: RigModel = RigModel()
 
     @property
     def mouth_rgb(self) -> tuple[int, int, int] | None:

@@ -108,7 +108,8 @@ def _first(error: ValidationError) -> str:
     findings = error.errors()
     unknown = [f for f in findings if f["type"] == "extra_forbidden"]
     finding = (unknown or findings)[0]
-    key = ".".join(str(part)[:60] for part in finding["loc"] if part not in ("Mouth", "literal['auto']", "float"))
+    kinds = {"literal['auto']", "float", *(section.__name__ for section in Declared.__subclasses__())}
+    key = ".".join(str(part)[:60] for part in finding["loc"] if part not in kinds)
     if unknown:
         return f"unknown key {key}"
     said = finding["msg"].removeprefix("Value error, ").replace("tuple", "list")

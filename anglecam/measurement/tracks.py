@@ -19,7 +19,7 @@ from anglecam.data.command import Command
 from anglecam.data.series import OK, AngleSeries
 from anglecam.data.typing import Flags, Floats
 from anglecam.errors import InputError, RigError
-from anglecam.io.rig import Marks, Rig
+from anglecam.io.rig import Rig, RigKeypoints
 from anglecam.io.session import recording_name
 from anglecam.io.tracks.files import read_tracks
 from anglecam.io.tracks.tracks import choose_pair
@@ -133,7 +133,7 @@ def measure_tracks(path: Path, rig: Rig, command: Command | None = None, *, film
     return MeasuredTracks(series, angles, points.by, (*points.notes, *([zero] if zero else [])))
 
 
-def _read_points(path: Path, rig: Rig, film: Film | None) -> tuple[Marks, _Points]:
+def _read_points(path: Path, rig: Rig, film: Film | None) -> tuple[RigKeypoints, _Points]:
     """Read the two points that the rig names, in as many frames as the film has."""
     tracks, marks = read_tracks(path), rig.marks
     if marks is None:

@@ -276,11 +276,11 @@ def readers() -> dict[str, Reader]:
     from anglecam.io.command_csv import read_command
     from anglecam.io.neck_file import read_neck
     from anglecam.io.responses_json import nod_from_responses
-    from anglecam.io.rig import Marks, Rig, read_rig
+    from anglecam.io.rig import Rig, RigKeypoints, read_rig
     from anglecam.io.series_csv import read_series
     from anglecam.measurement.tracks import measure_tracks
 
-    marks = Rig(marks=Marks(mouth="lips", pivot="ear", rate_hz=30))
+    marks = Rig(marks=RigKeypoints(mouth="lips", pivot="ear", rate_hz=30))
 
     def calibration(path: Path) -> object:
         read_calibration(path)

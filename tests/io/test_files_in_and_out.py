@@ -12,7 +12,7 @@ from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError, RigError
 from anglecam.io.command_csv import read_command
 from anglecam.io.csv_columns import SERIES_COLUMNS as COLUMNS
-from anglecam.io.rig import Marks, Rig, read_rig
+from anglecam.io.rig import Rig, RigKeypoints, read_rig
 from anglecam.io.series_csv import read_series, write_series
 from anglecam.io.session import find_measurable, read_session
 from anglecam.workflow.session import measure_session
@@ -202,7 +202,7 @@ def test_tracks_stand_in_the_place_of_their_clip_where_the_rig_tells_them(tmp_pa
     head = "scorer,x,x,x\nbodyparts,nose,nose,nose\ncoords,x,y,likelihood\n"
     tracks = tmp_path / "aDLC_resnet50_labshuffle1_100.csv"
     tracks.write_text(head + "0,1,2,0.9\n")
-    rig = Rig(marks=Marks(mouth="nose", pivot="neck"))
+    rig = Rig(marks=RigKeypoints(mouth="nose", pivot="neck"))
     assert find_measurable(tmp_path, rig) == ([tracks, tmp_path / "b.avi"], [])
     clips, (idle,) = find_measurable(tmp_path, Rig())
     assert [clip.name for clip in clips] == ["a.avi", "b.avi"]

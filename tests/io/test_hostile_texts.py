@@ -177,7 +177,7 @@ def test_a_hostile_table_is_one_short_line(tmp_path, text, says):
 
 
 def test_a_table_may_have_a_million_rows_and_no_more(tmp_path, monkeypatch):
-    monkeypatch.setattr("anglecam.io.series_csv._MOST_ROWS", 5)
+    monkeypatch.setattr("anglecam.io.csv_columns._MOST_ROWS", 5)
     path = tmp_path / "a.command.csv"
     path.write_text("time_s,command_deg\n" + "".join(f"{k},0\n" for k in range(5)))
     assert len(read_command(path).time) == 5

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import sys
+import time
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 import xarray as xr
 from pyarrow import parquet
 
-from anglecam.cli.app import app as cli
+from anglecam.cli import app as cli
+from anglecam.data.camera_evidence import CameraEvidence
 from anglecam.data.series import AngleSeries
+from anglecam.errors import InputError
 from anglecam.io.csv_columns import SERIES_COLUMNS as COLUMNS
-from anglecam.io.netcdf_parquet import Also, write_also, write_netcdf, write_parquet
+from anglecam.io.netcdf_parquet import GROUP, Also, read_netcdf, write_also, write_netcdf, write_parquet
 from anglecam.io.series_csv import read_series, write_series
 from support.tracked import nod, write_sleap
 
@@ -39,6 +43,87 @@ def series() -> AngleSeries:
         pivot_px=there(rng.uniform(0, 600, (n, 2))),
         bounds={r: there(np.full(n, r / 180.0)) for r in (4.0, 6.0, 10.0)},
     )
+
+
+EVIDENCE = CameraEvidence(
+    picture_px=(640, 480),
+    marker_px=(211.25, 1.0 / 3.0),
+    from_mark=True,
+    outline_turn=(-0.0, 5e-324),
+    lamp_s=(0.1, 0.1 + 1e-17),
+    only_pivot_differs=False,
+)
+VARIANTS = {
+    "with evidence": lambda series: replace(series, evidence=EVIDENCE),
+    "without evidence": lambda series: series,
+    "of a clip whose name is not text": lambda series: replace(series, name="nick\udcff\udce9-é"),
+    "with None in every optional field": lambda series: replace(
+        series, line=None, mark_px=None, pivot_px=None, bounds={}, evidence=replace(EVIDENCE, marker_px=None)
+    ),
+    "with numbers that a table would round": lambda series: replace(
+        series, angle=np.nextafter(series.angle, 9.0), sigma=np.full(50, -0.0), bounds={0.1 + 0.2: np.full(50, 1e-310)}
+    ),
+}
+
+
+def bits(value):
+    """Return a value such that two are equal exactly if they are equal bit for bit, NaN and the sign of 0 included."""
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, dict):
+        return [(bits(key), bits(item)) for key, item in value.items()]
+    if isinstance(value, tuple):
+        return [bits(item) for item in value]
+    return type(value), value.hex() if isinstance(value, float) else value
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_series_comes_back_from_netcdf_bit_for_bit(series, tmp_path, variant):
+    written = VARIANTS[variant](series)
+    write_netcdf(written, tmp_path / "a.nc")
+    back = read_netcdf(tmp_path / "a.nc")
+    for field in fields(AngleSeries):
+        if field.name != "evidence":
+            assert bits(getattr(back, field.name)) == bits(getattr(written, field.name)), field.name
+    for field in fields(CameraEvidence):
+        assert bits(getattr(back.evidence, field.name)) == bits(getattr(written.evidence, field.name)), field.name
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_two_writes_of_a_series_give_equal_bytes_at_different_times(series, tmp_path, variant):
+    write_netcdf(VARIANTS[variant](series), tmp_path / "a.nc")
+    time.sleep(1.1)  # HDF5 would store times of whole seconds
+    write_netcdf(VARIANTS[variant](series), tmp_path / "b.nc")
+    assert (tmp_path / "a.nc").read_bytes() == (tmp_path / "b.nc").read_bytes()
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_xarray_opens_every_variant_in_the_layout_of_movement(series, tmp_path, variant):
+    written = VARIANTS[variant](series)
+    write_netcdf(written, tmp_path / "a.nc")
+    with xr.open_dataset(tmp_path / "a.nc", engine="h5netcdf") as data:
+        assert data.position.dims == ("time", "space", "keypoints", "individuals")
+        assert data.attrs["ds_type"] == "poses"
+        data.attrs["source_file"].encode()  # text, whatever the clip is called
+        np.testing.assert_array_equal(data.angle_deg, np.degrees(written.angle))
+    with xr.open_dataset(tmp_path / "a.nc", engine="h5netcdf", group=GROUP) as exact:
+        np.testing.assert_array_equal(exact.angle, written.angle)
+
+
+def test_a_series_of_one_frame_comes_back(tmp_path):
+    write_netcdf(AngleSeries("a", np.zeros(1), np.zeros(1), np.zeros(1), ("ok",)), tmp_path / "a.nc")
+    back = read_netcdf(tmp_path / "a.nc")
+    assert (back.name, back.status, back.bounds, back.line) == ("a", ("ok",), {}, None)
+    assert back.evidence == CameraEvidence()
+
+
+def test_a_netcdf_file_of_another_program_is_refused_in_one_line(series, tmp_path):
+    xr.Dataset({"position": ("time", np.zeros(3))}).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match=r"other\.nc: not an angle series of anglecam$"):
+        read_netcdf(tmp_path / "other.nc")
+    (tmp_path / "text.nc").write_text("time_s,angle_deg\n")
+    with pytest.raises(OSError, match=r"."):
+        read_netcdf(tmp_path / "text.nc")
 
 
 def test_netcdf_has_the_dimensions_variables_and_attributes_of_movement(series, tmp_path):

@@ -11,7 +11,7 @@ import pytest
 from anglecam.data.command import Command
 from anglecam.errors import InputError
 from anglecam.io.command_csv import read_command
-from anglecam.io.rig import Mouth, Pivot, Rig, read_rig
+from anglecam.io.rig import Rig, RigMark, RigPivot, read_rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.sigma import angle_sigma, place_errors, worst_case, worst_case_both_ends
@@ -28,7 +28,7 @@ REST = Command(np.array([0.0, 0.51]), np.array([0.0, 0.1]))
 
 def _rig(look: Look, **more) -> Rig:
     x, y = look.pivot
-    return Rig(**{"facing": look.facing, "pivot": Pivot(near=(x + 8, y - 7))} | more)
+    return Rig(**{"facing": look.facing, "pivot": RigPivot(near=(x + 8, y - 7))} | more)
 
 
 def _film(folder: Path, look: Look, angle=SWING, edit=None) -> Path:
@@ -175,7 +175,7 @@ def test_a_clip_at_rest_is_measured_beside_a_larger_red_mug(tmp_path):
 @pytest.mark.parametrize("rgb", [(225, 62, 70), (150, 20, 20)])
 def test_a_declared_colour_may_be_30_levels_off(film, rgb):
     look = Look()
-    measured = measure_clip(open_film(film), _rig(look, mouth=Mouth(rgb=rgb)), REST)
+    measured = measure_clip(open_film(film), _rig(look, mouth=RigMark(rgb=rgb)), REST)
     error, _ = _errors(measured.series, SWING)
     assert np.sqrt((error**2).mean()) < 0.03
     assert np.abs(np.array(measured.detections.colour_rgb) - look.lips_rgb).max() < 15
@@ -223,7 +223,7 @@ def test_a_marker_away_from_the_centre_of_rotation_is_reported(tmp_path):
 def test_a_clip_without_the_declared_mouth_is_one_line_with_counts_and_colour(tmp_path):
     clip = broken.clip_without_mouth(tmp_path)
     with pytest.raises(InputError) as error:
-        measure_clip(open_film(clip), Rig(mouth=Mouth(rgb=(190, 35, 40))))
+        measure_clip(open_film(clip), Rig(mouth=RigMark(rgb=(190, 35, 40))))
     assert str(error.value) == f"{clip}: no mouth found in 30 of 30 frames (colour 190,35,40); is it in the picture?"
 
 
@@ -290,7 +290,7 @@ def test_a_mouth_that_rests_in_two_places_is_found_though_the_hint_is_far_from_i
     look = Look()
     held = np.concatenate([np.full(45, -15.0), [-10.0, -2.0, 4.0, 3.0, 0.5, -0.3], np.zeros(25)])
     x, y = look.pivot
-    rig = Rig(facing=look.facing, pivot=Pivot(near=(x + off[0], y + off[1]), marker="none"))
+    rig = Rig(facing=look.facing, pivot=RigPivot(near=(x + off[0], y + off[1]), marker="none"))
     measured = measure_clip(open_film(_film(tmp_path, look, held)), rig)
     assert set(measured.series.status) == {"ok"}
     assert np.hypot(*(measured.angles.pivot.centre_px - look.pivot)) < 3.0

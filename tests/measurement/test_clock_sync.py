@@ -15,7 +15,7 @@ from anglecam.identification.noise import DISTANCE, Noise
 from anglecam.identification.output_error import fit_output_error
 from anglecam.identification.systematic import full_sigma
 from anglecam.io.command_csv import read_command
-from anglecam.io.rig import Rig, Sync
+from anglecam.io.rig import Rig, RigSync
 from anglecam.io.session import read_session, rig_beside
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.clock_sync import AGREED, offsets
@@ -101,10 +101,10 @@ def test_a_clip_of_its_own_says_that_the_clocks_disagree(late):
 
 def test_a_lamp_that_stays_dark_is_missed_and_one_outside_the_picture_is_an_error(filmed):
     clip, command = filmed / "steps-0.avi", read_command(filmed / "steps-0.command.csv")
-    dark = measure_clip(open_film(clip), Rig(sync=Sync(lamp=(5.0, 235.0))), command)
+    dark = measure_clip(open_film(clip), Rig(sync=RigSync(lamp=(5.0, 235.0))), command)
     assert any("not seen to light" in note for note in dark.notes)
     with pytest.raises(RigError, match=r"sync: \{lamp: \[400, 20\]\} lies outside its picture of 320 × 240 pixels"):
-        measure_clip(open_film(clip), Rig(sync=Sync(lamp=(400.0, 20.0))), command)
+        measure_clip(open_film(clip), Rig(sync=RigSync(lamp=(400.0, 20.0))), command)
 
 
 def levels(*course):

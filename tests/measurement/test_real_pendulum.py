@@ -7,7 +7,7 @@ import csv
 import numpy as np
 import pytest
 
-from anglecam.io.rig import Mouth, Pivot, Rig
+from anglecam.io.rig import Rig, RigMark, RigPivot
 from anglecam.measurement.clip import measure_clip
 from anglecam.video.film import open_film
 from support.real import REAL
@@ -20,8 +20,8 @@ pytestmark = pytest.mark.skipif(not (FOLDER / "esempio.avi").exists(), reason="t
 
 @pytest.fixture(scope="module", params=["auto", "declared"])
 def measured(request):
-    mouth = "auto" if request.param == "auto" else Mouth(rgb=(215, 50, 25))
-    return measure_clip(open_film(FOLDER / "esempio.avi"), Rig(mouth=mouth, pivot=Pivot(marker="none")))
+    mouth = "auto" if request.param == "auto" else RigMark(rgb=(215, 50, 25))
+    return measure_clip(open_film(FOLDER / "esempio.avi"), Rig(mouth=mouth, pivot=RigPivot(marker="none")))
 
 
 def test_the_ball_is_found_once_the_hand_is_off_it(measured):

@@ -16,7 +16,7 @@ from anglecam.cli.app import app as cli
 from anglecam.data.command import Command
 from anglecam.errors import InputError, RigError
 from anglecam.io.csv_columns import SERIES_COLUMNS as COLUMNS
-from anglecam.io.rig import Camera, Marks, Rig
+from anglecam.io.rig import Rig, RigCamera, RigKeypoints
 from anglecam.io.session import read_session, recording_name
 from anglecam.measurement.tracks import measure_tracks
 from anglecam.workflow.session import loop_input, measure_session
@@ -28,7 +28,7 @@ N = 360
 TIME = np.arange(N) / 60.0
 SWING = 14.0 * np.sin(2 * np.pi * 0.9 * (TIME - 1.0)) * (TIME > 1.0)
 REST = Command(np.array([0.0, 1.0]), np.array([0.0, 0.1]))
-MARKS = Marks(mouth="nose", pivot="neck", rate_hz=60.0)
+MARKS = RigKeypoints(mouth="nose", pivot="neck", rate_hz=60.0)
 RIG = Rig(marks=MARKS)
 
 
@@ -131,7 +131,7 @@ def test_missing_and_unlikely_points_leave_empty_rows_with_their_cause(tmp_path)
     for values in (series.angle, series.sigma, series.line, *series.mark_px.T, *series.pivot_px.T, series.bounds[6.0]):
         assert np.isnan(values[~series.ok]).all()
     assert np.abs(_pulls(series, SWING)).max() < 5.0
-    lenient = Rig(marks=Marks(mouth="nose", pivot="neck", rate_hz=60.0, least_likelihood=0.2))
+    lenient = Rig(marks=RigKeypoints(mouth="nose", pivot="neck", rate_hz=60.0, least_likelihood=0.2))
     assert measure_tracks(path, lenient, REST).series.ok.sum() == N - 3
 
 
@@ -150,7 +150,7 @@ def test_a_tilted_view_is_undone_for_tracks_too(tmp_path):
     points[..., 1] = PIVOT[1] + (points[..., 1] - PIVOT[1]) * np.cos(tilt)
     path = write_sleap(tmp_path / "a.h5", points)
     plain = measure_tracks(path, RIG, REST).series
-    undone = measure_tracks(path, Rig(marks=MARKS, camera=Camera(tilt_deg=25.0)), REST).series
+    undone = measure_tracks(path, Rig(marks=MARKS, camera=RigCamera(tilt_deg=25.0)), REST).series
     assert np.abs(np.degrees(plain.angle) - SWING).max() > 1.0
     assert np.abs(np.degrees(undone.angle) - SWING).max() < 0.05
 
@@ -185,17 +185,17 @@ def test_tracks_longer_than_the_clip_beside_are_not_of_it(clip):
 def test_without_clip_and_rate_or_with_too_few_points_or_without_marks_there_is_one_line(tmp_path):
     path = write_sleap(tmp_path / "a.analysis.h5", nod(SWING, np.random.default_rng(0)))
     with pytest.raises(InputError, match=r"nothing says when its frames were taken: put the clip a\.… beside it"):
-        measure_tracks(path, Rig(marks=Marks(mouth="nose", pivot="neck")))
+        measure_tracks(path, Rig(marks=RigKeypoints(mouth="nose", pivot="neck")))
     with pytest.raises(RigError, match="which of nose, neck is which"):
         measure_tracks(path, Rig())
     with pytest.raises(InputError, match="no point mouth in it; it has nose, neck"):
-        measure_tracks(path, Rig(marks=Marks(mouth="mouth", pivot="neck", rate_hz=60.0)))
+        measure_tracks(path, Rig(marks=RigKeypoints(mouth="mouth", pivot="neck", rate_hz=60.0)))
     with pytest.raises(
         InputError, match=r"nose and neck are both there in 0 of 360 frames only \(likelihood at least 0"
     ):
-        measure_tracks(path, Rig(marks=Marks(mouth="nose", pivot="neck", rate_hz=60.0, least_likelihood=0.9)))
+        measure_tracks(path, Rig(marks=RigKeypoints(mouth="nose", pivot="neck", rate_hz=60.0, least_likelihood=0.9)))
     with pytest.raises(InputError, match="need the clip beside the tracks"):
-        measure_tracks(path, Rig(marks=MARKS, camera=Camera(row_time_s=1e-5)))
+        measure_tracks(path, Rig(marks=MARKS, camera=RigCamera(row_time_s=1e-5)))
 
 
 def test_the_name_is_the_longest_that_stands_beside(tmp_path):
@@ -252,7 +252,7 @@ def test_the_loop_sees_tracks_as_they_are_measured_and_a_tilted_view_of_them_as_
     opened = read_session(tmp_path)
     measured = measure_session(opened)
     assert not loop_input(measured).differs
-    tilted = replace(opened, rig=opened.rig.model_copy(update={"camera": Camera(tilt_deg=30.0)}))
+    tilted = replace(opened, rig=opened.rig.model_copy(update={"camera": RigCamera(tilt_deg=30.0)}))
     undone = measure_session(tilted)
     shown = loop_input(undone)
     assert shown.differs

@@ -37,7 +37,7 @@ def frame(points: np.ndarray, likelihood: np.ndarray, names=("nose", "neck"), in
     return pd.DataFrame(values.reshape(len(points), -1), columns=columns)
 
 
-def write_deeplabcut(path: Path, points: np.ndarray, likelihood=None, *, format: str = "table", **more) -> Path:
+def write_deeplabcut(path: Path, points: np.ndarray, likelihood=None, *, layout: str = "table", **more) -> Path:
     """Write a table as DeepLabCut does, CSV or HDF5 by the file's ending."""
     points = points if points.ndim == 4 else points[:, None]
     likelihood = np.full(points.shape[:3], 0.99) if likelihood is None else likelihood.reshape(points.shape[:3])
@@ -45,7 +45,7 @@ def write_deeplabcut(path: Path, points: np.ndarray, likelihood=None, *, format:
     if path.suffix == ".csv":
         table.to_csv(path)
     else:
-        table.to_hdf(path, key="df_with_missing", format=format, mode="w")
+        table.to_hdf(path, key="df_with_missing", format=layout, mode="w")
     return path
 
 

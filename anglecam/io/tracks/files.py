@@ -1,82 +1,114 @@
-"""Which files are tracks of points, whose clip they belong to, and reading them."""
+"""Find files of tracks, read them, and name the clip that they belong to, in every format of this package."""
 
 from __future__ import annotations
 
-import re
-import sys
+import importlib
+import pkgutil
+from dataclasses import replace
 from pathlib import Path
 
 from anglecam.errors import InputError
-from anglecam.io.files import open_text
-from anglecam.io.tracks import deeplabcut, sleap
-from anglecam.io.tracks.hdf5 import open_hdf5
+from anglecam.io import tracks as package
 from anglecam.io.tracks.tracks import Tracks
+from anglecam.io.tracks.tracks_format import HDF5_ENDINGS, TracksFile, TracksFormat, open_tracks_file
 
-HDF5_ENDINGS = (".h5", ".hdf5")
-TRACKS_ENDINGS = (".csv", *HDF5_ENDINGS)
 
-_SCORER = re.compile(r"(?P<name>.+?)(?:DLC_|DeepCut_|_superanimal_)")
-_ANALYSIS = re.compile(r"(?:.*\.\d{3}_)?(?P<name>.+)\.analysis")
+def _collect() -> tuple[TracksFormat, ...]:
+    modules = (importlib.import_module(f"{package.__name__}.{m.name}") for m in pkgutil.iter_modules(package.__path__))
+    return tuple(sorted((m.FORMAT for m in modules if hasattr(m, "FORMAT")), key=lambda f: f.program))
+
+
+FORMATS: tuple[TracksFormat, ...] = _collect()
+"""Every ``FORMAT`` that a module of `anglecam.io.tracks` defines, in the order of the programs' names."""
+TRACKS_ENDINGS = tuple(dict.fromkeys(ending for f in FORMATS for ending in f.endings))
+"""File endings, lower case, that a file of tracks can have."""
+_COMPANIONS = tuple(ending for f in FORMATS for ending in f.companions)
 
 
 def read_tracks(path: Path) -> Tracks:
-    """Read the points that DeepLabCut or SLEAP has found in a clip.
+    """Read the points that another program has found in a clip.
 
     Parameters
     ----------
     path : Path
-        DeepLabCut's CSV or HDF5, or SLEAP's analysis HDF5.
+        A file of one of `FORMATS`.
 
     Returns
     -------
     Tracks
-        Pixels as those programs count them; half a pixel that all points share turns no line between two of them.
+        Pixels as the program counts them. An offset of half a pixel that all points share does not turn the line
+        between two of them.
 
     Raises
     ------
     InputError
-        Where the file is none of these, is damaged, or claims an absurd size.
+        If the file is of no known format, is damaged, or claims an absurd size.
     """
-    if path.suffix.lower() not in HDF5_ENDINGS:
-        return deeplabcut.read_csv(path)
-    with open_hdf5(path) as file:
-        if sleap.is_analysis(file):
-            return sleap.read_analysis(path, file)
-        group = deeplabcut.pandas_group(file)
-        if group is not None:
-            return deeplabcut.read_hdf5(path, group)
-        holds = ", ".join(list(file)[:5]) or "nothing"
-    raise InputError(f"{path}: neither a DeepLabCut table nor a SLEAP analysis file (it holds {holds})")
+    with open_tracks_file(path) as file:
+        found = _format_of(file)
+        return replace(found.read(file), software=found.program, usual_limit=found.usual_limit)
 
 
 def find_tracks(directory: Path) -> list[Path]:
-    """List the files of a folder that are tracks, by name.
+    """List the files of a folder that are tracks, in the order of their names.
 
-    An HDF5 file that cannot be opened is among them, so that it is not passed over in silence; one that holds something
-    else is not, nor are the lengths of bones that DeepLabCut calls a skeleton.
+    A damaged HDF5 file is listed, so that reading it reports the damage. A text file that cannot be read is not: most
+    text files of a folder hold something else. Files that a program writes next to its tracks
+    (`TracksFormat.companions`) are not listed.
     """
     found = [p for p in directory.iterdir() if p.suffix.lower() in TRACKS_ENDINGS and p.is_file()]
-    return sorted(p for p in found if not p.stem.endswith("_skeleton") and _looks_like_tracks(p))
+    return sorted(p for p in found if not p.stem.endswith(_COMPANIONS) and _is_tracks(p))
 
 
 def name_by_tool(stem: str) -> str | None:
-    """Return the clip's name out of a name that DeepLabCut or SLEAP gave, ``None`` if neither did.
+    """Return the clip's name contained in a file name that a tracking program made of it.
 
-    DeepLabCut appends its scorer (``NAMEDLC_resnet50_…shuffle1_50000``); SLEAP says ``PROJECT.000_NAME.analysis``.
+    Parameters
+    ----------
+    stem : str
+        The file's name without its ending.
+
+    Returns
+    -------
+    str or None
+        ``None`` if the name follows no program's pattern.
     """
-    found = _SCORER.match(stem) or _ANALYSIS.fullmatch(stem)
-    return found["name"] if found else None
+    names = (f.clip_name(stem) for f in FORMATS)
+    return next((name for name in names if name is not None), None)
 
 
-def _looks_like_tracks(path: Path) -> bool:
-    if path.suffix.lower() not in HDF5_ENDINGS:
-        try:
-            with open_text(path, sys.maxsize) as stream:
-                return stream.readline(7) == "scorer,"
-        except (OSError, UnicodeDecodeError):
-            return False
+def tracker_names() -> str:
+    """Return the names of the programs whose files can be read, for messages: ``DeepLabCut or SLEAP``."""
+    return _alternatives([f.program for f in FORMATS])
+
+
+def _format_of(file: TracksFile) -> TracksFormat:
+    """Return the format of a file.
+
+    If only one format has the file's ending, it is returned without a test: its reader states what is wrong in more
+    detail.
+    """
+    candidates = _candidates(file.path)
+    if len(candidates) == 1:
+        return candidates[0]
+    found = next((f for f in candidates if f.recognises(file)), None)
+    if found is not None:
+        return found
+    known = _alternatives([f"{f.program} {f.kind}" for f in candidates or FORMATS])
+    raise InputError(f"{file.path}: not a {known} ({file.content()})")
+
+
+def _is_tracks(path: Path) -> bool:
     try:
-        with open_hdf5(path) as file:
-            return sleap.is_analysis(file) or deeplabcut.pandas_group(file) is not None
+        with open_tracks_file(path) as file:
+            return any(f.recognises(file) for f in _candidates(path))
     except InputError:
-        return True
+        return path.suffix.lower() in HDF5_ENDINGS
+
+
+def _candidates(path: Path) -> list[TracksFormat]:
+    return [f for f in FORMATS if path.suffix.lower() in f.endings]
+
+
+def _alternatives(names: list[str]) -> str:
+    return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)

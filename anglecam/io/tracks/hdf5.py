@@ -1,6 +1,6 @@
-"""HDF5 files read as plain data: arrays and texts, nothing pickled, nothing that lies in another file.
+"""Read HDF5 files as plain data: arrays and texts, nothing pickled and nothing from another file.
 
-HDF5 lets a dataset live in another file, raw or not, and claim any size. Neither is followed here.
+HDF5 allows a dataset to be stored in another file and to claim any size. Such datasets are refused.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 
 @contextmanager
 def open_hdf5(path: Path) -> Iterator[h5py.File]:
-    """Open an HDF5 file; whatever goes wrong with it while it is open is an `InputError` that names it."""
+    """Open an HDF5 file; an error that it causes while it is open becomes an `InputError` that names it."""
     import h5py
 
     try:
-        with open_regular(path):  # HDF5's own opening waits for ever at a pipe
+        with open_regular(path):  # HDF5 itself would wait for ever at a pipe
             pass
         with h5py.File(path, "r") as file:
             yield file
@@ -38,24 +38,24 @@ def open_hdf5(path: Path) -> Iterator[h5py.File]:
 
 
 def read_array(group: h5py.Group, name: str) -> NDArray[Any]:
-    """Read a whole dataset that lies in this file itself.
+    """Read a whole dataset that is stored in this file itself.
 
     Parameters
     ----------
     group : h5py.Group
-        Where it stands.
+        The group that holds it.
     name : str
-        Its name in there.
+        Its name in the group.
 
     Returns
     -------
     ndarray
-        As it is stored.
+        The values as they are stored.
 
     Raises
     ------
     ValueError
-        Where it is missing, too large, or no dataset of this file.
+        If the dataset is missing, larger than `MOST_VALUES`, or stored outside this file.
     """
     import h5py
 
@@ -63,19 +63,19 @@ def read_array(group: h5py.Group, name: str) -> NDArray[Any]:
         raise ValueError(f"no {name} in it")
     dataset = group[name]
     if not isinstance(dataset, h5py.Dataset) or dataset.is_virtual or dataset.external or dataset.shape is None:
-        raise ValueError(f"{name} is no dataset of this file")
+        raise ValueError(f"{name} is not a dataset of this file")
     if dataset.size * max(dataset.dtype.itemsize // 8, 1) > MOST_VALUES:
         raise ValueError(f"{name} claims {dataset.size:.3g} values, too many for tracks")
     return np.asarray(dataset[()])
 
 
 def read_texts(group: h5py.Group, name: str) -> tuple[str, ...]:
-    """Read a dataset of texts; raises `ValueError` as `read_array`, and where they are something else."""
+    """Read a dataset of texts; raises `ValueError` as `read_array` does, and if a value is not text."""
     return tuple(as_text(value) for value in np.atleast_1d(read_array(group, name)).tolist())
 
 
 def as_text(value: object) -> str:
-    """Return a stored text, bytes or not; raises `ValueError` where it is neither."""
+    """Return a text that is stored as bytes or as a string; raises `ValueError` if it is neither."""
     if isinstance(value, bytes):
         return value.decode("utf-8")
     if isinstance(value, str):
@@ -84,7 +84,7 @@ def as_text(value: object) -> str:
 
 
 def _reason(fault: Exception) -> str:
-    """Give h5py's own reason, the part in brackets of its long messages."""
+    """Return the reason from one of h5py's long messages: the part in brackets."""
     text = str(fault.args[0] if isinstance(fault, KeyError) and fault.args else fault).splitlines()[0]
     _, bracket, rest = text.partition("(")
     return rest.removesuffix(")") if bracket and text.endswith(")") and text.startswith("Unable") else text

@@ -1,8 +1,8 @@
-"""The names of a pandas table's columns, which PyTables leaves as a pickle, read off it without loading it.
+"""Read the names of a pandas table's columns from the pickle in which PyTables stores them, without unpickling it.
 
-A pickle is a program. This one, where it is what it should be, only builds lists, tuples and texts, so its
-instructions are listed by the standard library's disassembler (`pickletools.genops`, which runs nothing) and those
-few are followed. Any other instruction, above all one that would fetch or call something, ends the reading.
+A pickle is a program. A pickle of names only builds lists, tuples and texts. The standard library's disassembler
+(`pickletools.genops`, which runs nothing) lists its instructions, and this module follows the few that build those.
+Any other instruction, above all one that would import or call something, ends the reading with an error.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ _VALUES = {"UNICODE", "BINUNICODE", "SHORT_BINUNICODE", "STRING", "BINSTRING", "
 _PUT = {"PUT", "BINPUT", "LONG_BINPUT"}
 _GET = {"GET", "BINGET", "LONG_BINGET"}
 _TUPLES = {"EMPTY_TUPLE": 0, "TUPLE1": 1, "TUPLE2": 2, "TUPLE3": 3}
-_NOTHING = {"PROTO", "FRAME"}
+_WITHOUT_EFFECT = {"PROTO", "FRAME"}
 _MARK = object()
 
 
 def read_names(pickled: bytes) -> list[tuple[str, ...]]:
-    """Read a list of tuples of texts off a pickle.
+    """Read a list of tuples of texts from a pickle.
 
     Parameters
     ----------
     pickled : bytes
-        Of any protocol.
+        A pickle of any protocol.
 
     Returns
     -------
     list of tuple of str
-        In order.
+        The tuples in their order.
 
     Raises
     ------
     ValueError
-        Where it is anything but that.
+        If the pickle holds anything else or is damaged.
     """
     try:
         found = _follow(pickled)
@@ -49,7 +49,7 @@ def read_names(pickled: bytes) -> list[tuple[str, ...]]:
 
 
 def _follow(pickled: bytes) -> Any:
-    """Build what the instructions build."""
+    """Return the object that the instructions build."""
     stack: list[Any] = []
     memo: dict[int, Any] = {}
     for opcode, given, _ in pickletools.genops(pickled):
@@ -79,13 +79,13 @@ def _follow(pickled: bytes) -> Any:
             stack[-1].extend(items)
         elif name == "STOP":
             return stack.pop()
-        elif name not in _NOTHING:
+        elif name not in _WITHOUT_EFFECT:
             raise ValueError(f"the names of its columns are stored as a program ({name}), which is not run")
     raise IndexError("no end")
 
 
 def _since_mark(stack: list[Any]) -> list[Any]:
-    """Take from the stack what was put there since the last mark, and the mark."""
+    """Remove the last mark and everything above it from the stack; return what was above it."""
     marks = [i for i, item in enumerate(stack) if item is _MARK]
     at = marks[-1]
     items = stack[at + 1 :]

@@ -1,4 +1,4 @@
-"""Named points over the frames of a film, as trackers write them; nothing here knows which tracker it was."""
+"""Named points over the frames of a clip, independent of the program that tracked them."""
 
 from __future__ import annotations
 
@@ -12,48 +12,48 @@ from anglecam.data.typing import Floats
 from anglecam.errors import InputError
 
 MOST_VALUES = 50_000_000
-"""A file that says it holds more numbers than this is not read: a day of film with six points has fewer."""
+"""A file that claims to hold more numbers than this is not read: six points filmed for a day are fewer."""
 _FARTHEST_PX = 1e6
-"""No picture is that large: what lies beyond is no place."""
+"""A point with a larger coordinate counts as missing: no picture is that large."""
 
 
 @dataclass(frozen=True)
 class Tracks:
-    """Points of one film; a point that was not found is NaN."""
+    """Points of one clip; a point that was not found is NaN."""
 
     path: Path
-    software: str
-    """Who tracked: ``DeepLabCut`` or ``SLEAP``."""
     individuals: tuple[str, ...]
     keypoints: tuple[str, ...]
     position_px: Floats
-    """(frames, individuals, keypoints, 2) x to the right and y down, px, a row for every frame from the first."""
+    """(frames, individuals, keypoints, 2) x to the right and y down, px, for every frame from the first."""
     likelihood: Floats
     """(frames, individuals, keypoints); NaN where none is stated, as for points that a person has set."""
-    usual_limit: float
-    """The likelihood below which this program's own default leaves a point out."""
+    software: str = ""
+    """Name of the program that tracked; `anglecam.io.tracks.files.read_tracks` sets it."""
+    usual_limit: float = 0.0
+    """That program's default for the likelihood below which a point counts as missing; set by the same function."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two points of one individual; arrays over all frames of the tracks."""
+    """Mark and pivot of one individual; arrays over all frames of the tracks."""
 
     mark_px: Floats
-    """(frames, 2) NaN where missing or not likely enough."""
+    """(frames, 2) px; NaN where the point is missing or its likelihood too low."""
     pivot_px: Floats
-    """(frames, 2)."""
+    """(frames, 2) px; NaN likewise."""
     followed: str | None
-    """Which of several individuals it is, and how often each is there; ``None`` where there is but one."""
+    """Which individual was chosen, and in how many frames each shows both points; ``None`` if there is only one."""
 
 
-def choose_pair(tracks: Tracks, mouth: str, pivot: str, least: float) -> Pair:
-    """Take two points out of tracks, of the individual that shows both of them in the most frames.
+def choose_pair(tracks: Tracks, mark: str, pivot: str, least: float) -> Pair:
+    """Return two points of the individual that shows both of them in the most frames.
 
     Parameters
     ----------
     tracks : Tracks
-        One film's.
-    mouth, pivot : str
+        Tracks of one clip.
+    mark, pivot : str
         Names of the points.
     least : float
         Likelihood below which a point counts as missing.
@@ -61,27 +61,27 @@ def choose_pair(tracks: Tracks, mouth: str, pivot: str, least: float) -> Pair:
     Returns
     -------
     Pair
-        With a line on the choice, where there was one.
+        With a line on the chosen individual, if there are several.
 
     Raises
     ------
     InputError
-        Where a point of that name is not in the file; the line lists those that are.
+        If the file has no point of that name; the line lists those that it has.
     """
-    for name in (mouth, pivot):
+    for name in (mark, pivot):
         if name not in tracks.keypoints:
             raise InputError(f"{tracks.path}: no point {name} in it; it has {', '.join(tracks.keypoints)}")
-    which = [tracks.keypoints.index(mouth), tracks.keypoints.index(pivot)]
-    places, likelihood = tracks.position_px[:, :, which], tracks.likelihood[:, :, which]
+    which = [tracks.keypoints.index(mark), tracks.keypoints.index(pivot)]
+    position, likelihood = tracks.position_px[:, :, which], tracks.likelihood[:, :, which]
     with np.errstate(invalid="ignore"):
-        good = (np.abs(places) < _FARTHEST_PX).all(axis=-1) & ~(likelihood < least)
-    both = np.where(good[..., None], places, np.nan)
-    there = np.isfinite(both).all(axis=(2, 3)).sum(axis=0)
-    best = int(np.argmax(there))
+        good = (np.abs(position) < _FARTHEST_PX).all(axis=-1) & ~(likelihood < least)
+    both = np.where(good[..., None], position, np.nan)
+    frames = np.isfinite(both).all(axis=(2, 3)).sum(axis=0)
+    best = int(np.argmax(frames))
     followed = None
     if len(tracks.individuals) > 1:
-        counts = ", ".join(f"{name} {n}" for name, n in zip(tracks.individuals, there, strict=True))
-        followed = f"{tracks.individuals[best]} is followed: it shows {mouth} and {pivot} most often ({counts} frames)"
+        counts = ", ".join(f"{name} {n}" for name, n in zip(tracks.individuals, frames, strict=True))
+        followed = f"{tracks.individuals[best]} is followed: it shows {mark} and {pivot} most often ({counts} frames)"
     return Pair(both[:, best, 0], both[:, best, 1], followed)
 
 
