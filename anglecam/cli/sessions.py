@@ -69,7 +69,7 @@ def close(
     shown = loop_input(measured)
     if shown.differs:
         errors.print(
-            "measuring corrected an effect of the camera (lens, slanted view, or a mark beside the axis); the loop "
+            "measuring corrected an effect of the camera (lens, slanted view, or a marker off the axis); the loop "
             "starts from the uncorrected angles and reports the effect if its size exceeds the stated uncertainty"
         )
     with progress_bars() as bars:

@@ -1,6 +1,6 @@
-"""From places in the picture to angles: the line from pivot to mouth, its zero, and how sure each of them is.
+"""From positions in the picture to angles: the line from pivot to mark, its zero, and their uncertainty.
 
-What an angle is, which way is up and where its zero lies, is said here once, for marks of our own and of others.
+The definition of the angle, of its sign and of its zero is here, for marks that anglecam finds and for tracks.
 """
 
 from __future__ import annotations
@@ -23,66 +23,70 @@ from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 
 _THICK = 0.25
-"""Standard deviation of the height of what is seen of a mouth, as a share of the root of its area."""
+"""Standard deviation of the height of a mark's visible part, as a share of the root of its area."""
 
 
 @dataclass(frozen=True)
 class ViewErrors:
-    """What the uncertainty of lens and tilt does to the angles; arrays of length n, standard uncertainties, rad."""
+    """Contribution of lens and tilt to the angles' uncertainty; arrays of length n, standard uncertainties, rad."""
 
     lens: Floats
+    """Due to the calibration."""
     tilt: Tilt | None
     by_tilt: Floats
+    """Due to the declared tilt."""
 
     @property
     def sigma(self) -> Floats:
-        """Of both, rad."""
+        """Combined standard uncertainty, rad."""
         return np.asarray(np.hypot(self.lens, self.by_tilt))
 
 
 @dataclass(frozen=True)
 class Angles:
-    """The frames in which the mouth was seen; arrays of length n."""
+    """The frames in which the mark was found; arrays of length n."""
 
     line: Floats
-    """Direction from pivot to mouth from the picture's horizontal, upward positive for either facing, rad."""
+    """Direction from pivot to mark from the picture's horizontal, upward positive for either facing, rad."""
     sigma: Floats
-    """Standard uncertainty of ``line`` less ``neutral``, rad."""
+    """Standard uncertainty of ``line`` minus ``neutral``, rad."""
     mark_px: Floats
-    """(n, 2) px."""
+    """(n, 2) mark, px."""
     pivot: PivotEstimate
     neutral: float
-    """Line that counts as zero, rad."""
+    """Direction that counts as zero, rad."""
     resting: NDArray[np.bool_] | None
-    """Frames that neutral is taken from; ``None`` where it is declared."""
+    """Frames whose mean is neutral; ``None`` where neutral is declared."""
     errors: PlaceErrors
-    """Of the mouth's centroid."""
+    """Of the mark's centroid."""
     view: ViewErrors
-    """Of lens and tilt."""
+    """Contribution of lens and tilt."""
     within_exposure: Floats
-    """Standard uncertainty by motion that is not steady within the exposure, rad."""
+    """Standard uncertainty due to acceleration within the exposure, rad."""
     registered: Registered | None = None
-    """What the fine angles come from."""
+    """Source of the fine angles; ``None`` for coarse angles."""
     shared: float = 0.0
-    """Standard uncertainty of neutral that all fine angles share, the pivot's aside, rad."""
+    """Standard uncertainty of neutral that all fine angles share, without the pivot's contribution, rad."""
 
     @property
     def lever_px(self) -> Floats:
-        """Pivot to mouth, (n,) px."""
+        """(n,) distance from pivot to mark, px."""
         return np.asarray(np.hypot(*(self.mark_px - self.pivot.centre_px).T))
 
 
-def coarse_angles(seen: Detections, ok: NDArray[np.bool_], time: Floats, rig: Rig, command: Command | None) -> Angles:
-    """Read angles from the mouth's centroid.
+def coarse_angles(
+    detections: Detections, ok: NDArray[np.bool_], time: Floats, rig: Rig, command: Command | None
+) -> Angles:
+    """Return the angles of the mark's centroid.
 
     Parameters
     ----------
-    seen : Detections
-        Mouth and pivot.
+    detections : Detections
+        Mark and pivot.
     ok : ndarray
-        (frames,) which n of them count.
+        (frames,) the n frames to use.
     time : ndarray
-        (frames,) when the mouth was where it was seen, s.
+        (frames,) time at which the mark was at the measured position, s.
     rig : Rig
         Facing and neutral.
     command : Command, optional
@@ -93,22 +97,22 @@ def coarse_angles(seen: Detections, ok: NDArray[np.bool_], time: Floats, rig: Ri
     Angles
         Without registration.
     """
-    if seen.head is not None:
-        return _angles_of_head(seen, seen.head, ok, time, rig, command)
-    regions = [r for r, counts in zip(seen.regions, ok, strict=True) if counts and r is not None]
-    mouth, circle = np.array([r.centre_px for r in regions]), seen.circle
-    arm = mouth - seen.pivot.centre_px
+    if detections.body is not None:
+        return _angles_of_body(detections, detections.body, ok, time, rig, command)
+    regions = [r for r, counts in zip(detections.regions, ok, strict=True) if counts and r is not None]
+    mark, circle = np.array([r.centre_px for r in regions]), detections.circle
+    arm = mark - detections.pivot.centre_px
     lever = np.hypot(*arm.T)
-    off = lever - np.median(lever) if circle is None else np.hypot(*(mouth - circle.centre_px).T) - circle.radius_px
+    off = lever - np.median(lever) if circle is None else np.hypot(*(mark - circle.centre_px).T) - circle.radius_px
     out = arm / lever[:, None]
-    noise = seen.noise**2 * np.array([r.noise_px2 for r in regions])
+    noise = detections.noise**2 * np.array([r.noise_px2 for r in regions])
     across, along = (
         np.sqrt(np.einsum("ni,nij,nj->n", v, noise, v)) for v in (out, np.column_stack([-out[:, 1], out[:, 0]]))
     )
-    errors = place_errors(mouth, off, across, along)
-    # of a mouth that is seen at a slant, other parts come into sight as it turns: they stand at other heights
+    errors = place_errors(mark, off, across, along)
+    # of a mark seen obliquely, other parts become visible as it rotates, and they lie at other heights
     thick = _THICK * float(np.median(np.sqrt([r.area_px2 for r in regions])))
-    return angles_of_places(mouth, seen.pivot, errors, seen.lens, time[ok], rig, command, thick_px=thick)
+    return angles_of_places(mark, detections.pivot, errors, detections.lens, time[ok], rig, command, thick_px=thick)
 
 
 def angles_of_places(
@@ -122,18 +126,18 @@ def angles_of_places(
     *,
     thick_px: float = 0.0,
 ) -> Angles:
-    """Read the angle off the line from the pivot to the mouth.
+    """Return the angles of the line from the pivot to the mark.
 
     Parameters
     ----------
     mark_px : ndarray
-        (n, 2) places in the plane of motion, px.
+        (n, 2) positions in the plane of motion, px.
     pivot : Pivot
         In the plane of motion.
     errors : PlaceErrors
-        Of those places.
+        Of those positions.
     lens : Lens
-        Through which they were seen.
+        Between the picture and the plane of motion.
     time : ndarray
         (n,) s.
     rig : Rig
@@ -141,7 +145,7 @@ def angles_of_places(
     command : Command, optional
         Its first change ends the rest that defines neutral.
     thick_px : float
-        Standard deviation of the height of what is seen of the mouth, px.
+        Standard deviation of the height of the mark's visible part, px.
 
     Returns
     -------
@@ -149,7 +153,7 @@ def angles_of_places(
         Without registration.
     """
     arm = mark_px - pivot.centre_px
-    # y goes down in the image; a face that looks to the left is mirrored, so that an upward nod is positive.
+    # y points down in the image; facing left is mirrored, so that an upward motion is positive
     line = np.unwrap(np.arctan2(-arm[:, 1], _ahead(arm[:, 0], rig)))
     line -= 2.0 * np.pi * np.round(np.median(line) / (2.0 * np.pi))
     lever = np.hypot(*arm.T)
@@ -162,39 +166,39 @@ def angles_of_places(
     return Angles(line, sigma, mark_px, pivot, neutral, resting, errors, view, unsteady)
 
 
-def _angles_of_head(
-    seen: Detections, head: RigidMotion, ok: Flags, time: Floats, rig: Rig, command: Command | None
+def _angles_of_body(
+    detections: Detections, body: RigidMotion, ok: Flags, time: Floats, rig: Rig, command: Command | None
 ) -> Angles:
-    """Read angles from the rigid head: of the line from the pivot to its middle."""
-    turn, sigma = head.turn[ok], head.sigma[ok]
-    arm = seen.lens.rectify(head.centre_px) - seen.pivot.centre_px
+    """Return the angles of the line from the pivot to the middle of the rigid body."""
+    turn, sigma = body.turn[ok], body.sigma[ok]
+    arm = detections.lens.rectify(body.centre_px) - detections.pivot.centre_px
     c, s = np.cos(turn), np.sin(turn)
-    mouth = seen.pivot.centre_px + np.column_stack([c * arm[0] + s * arm[1], -s * arm[0] + c * arm[1]])
+    mark = detections.pivot.centre_px + np.column_stack([c * arm[0] + s * arm[1], -s * arm[0] + c * arm[1]])
     signed = turn if rig.facing == "right" else -turn
     line = float(np.arctan2(-arm[1], _ahead(arm[:1], rig)[0])) + signed
     lever = np.full(len(turn), float(np.hypot(*arm)))
     neutral, resting = neutral_of(rig, command, time[ok], line, lever)
     errors = PlaceErrors(sigma * lever, 0.0)
-    view = _view_errors(seen.lens, mouth, seen.pivot.centre_px, line, neutral, resting, rig)
-    known = angle_sigma(mouth, seen.pivot.centre_px, seen.pivot.covariance_px2, errors, resting)
+    view = _view_errors(detections.lens, mark, detections.pivot.centre_px, line, neutral, resting, rig)
+    known = angle_sigma(mark, detections.pivot.centre_px, detections.pivot.covariance_px2, errors, resting)
     unsteady = mean_off_middle(time[ok], line, rig.camera.exposure_s)
     sigma = np.sqrt(known**2 + view.sigma**2 + unsteady**2)
-    return Angles(line, sigma, mouth, seen.pivot, neutral, resting, errors, view, unsteady)
+    return Angles(line, sigma, mark, detections.pivot, neutral, resting, errors, view, unsteady)
 
 
 def turns(angles: Angles, rig: Rig) -> Floats:
-    """Turn of the head from the median line, counter-clockwise as seen, (n,) rad."""
+    """Return (n,) rotation of the body from the median line, counter-clockwise as seen, rad."""
     turn = angles.line - np.median(angles.line)
     return turn if rig.facing == "right" else -turn
 
 
 def _view_errors(
-    lens: Lens, mouth: Floats, pivot: Floats, line: Floats, neutral: float, resting: Flags | None, rig: Rig
+    lens: Lens, mark: Floats, pivot: Floats, line: Floats, neutral: float, resting: Flags | None, rig: Rig
 ) -> ViewErrors:
-    """See what lenses that err by one standard deviation each make of the angles."""
+    """Propagate one standard deviation of each lens parameter to the angles."""
     zero = slice(None) if resting is None and rig.neutral == "auto" else resting
     variance = np.zeros(len(line))
-    filmed, filmed_pivot = lens.distort(mouth), lens.distort(pivot)
+    filmed, filmed_pivot = lens.distort(mark), lens.distort(pivot)
     for deviant in lens.deviants():
         if deviant.tilt != lens.tilt:
             continue
@@ -217,9 +221,9 @@ def _ahead(x: Floats, rig: Rig) -> Floats:
 def neutral_of(
     rig: Rig, command: Command | None, time: Floats, line: Floats, lever: Floats
 ) -> tuple[float, NDArray[np.bool_] | None]:
-    """Return the line that counts as zero, and the frames that it is taken from, if it is.
+    """Return the direction that counts as zero, rad, and the frames it is the mean of; ``None`` where it is declared.
 
-    A median errs as the frames do that lie within half a pixel of it.
+    The median's uncertainty is that of the frames within half a pixel of it.
     """
     if rig.neutral != "auto":
         return float(np.radians(rig.neutral)), None

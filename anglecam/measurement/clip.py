@@ -1,7 +1,8 @@
-"""From a clip to the angle in every frame: coarse by the mouth's place, fine by the whole head.
+"""Measure the angle in every frame of a clip: a coarse pass by the mark's position, a fine pass by the whole body.
 
-`anglecam.measurement.mark_pass` finds mouth and pivot. Where more of the head than the mouth is rigid and has edges,
-`anglecam.measurement.registration_pass` reads on and finds the turn from all of it; the more certain of the two is taken.
+`anglecam.measurement.mark_pass` finds mark and pivot. Where more of the body than the mark is rigid and has edges,
+`anglecam.measurement.registration_pass` finds the rotation of the whole body. The result with the smaller uncertainty
+is used.
 """
 
 from __future__ import annotations
@@ -32,77 +33,80 @@ from anglecam.video.film import Film
 from anglecam.vision.mark.outline_turn import outline_turn
 
 _CARRIED_PX = 1.0
-"""How far from where the head carries it a mouth may seem to be that is smeared and not hidden."""
+"""Largest distance of a smeared mark from the position predicted by the body's rotation, px; beyond, it is hidden."""
 _MOVING = 5.0
-"""Standard uncertainties by which the angle must change on both sides of a repeated frame for it to be one."""
+"""Change of the angle, in standard uncertainties, required on both sides of a repeated frame to call it a duplicate."""
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """What was measured in a clip, and how."""
+    """The result of measuring a clip."""
 
     series: AngleSeries
     detections: Detections
-    """The coarse pass."""
+    """Result of the coarse pass."""
     angles: Angles
-    """The measured frames, and what their uncertainties are made of."""
+    """The measured frames, and the contributions to their uncertainty."""
     why_coarse: str | None
-    """Why the angles are the mouth's own; ``None`` where they are the whole head's."""
+    """Cause why the angles are those of the mark alone; ``None`` where they are those of the whole body."""
     zero: str | None
-    """Where zero is not where it should be, and why."""
+    """Message where zero is not the rest before the first command change."""
     clock: str | None
-    """Where the lamp shows that the command's clock is not the clip's, or does not show it."""
+    """Message where the lamp shows an offset between the command's clock and the clip's, or is not seen."""
+
+    display: str | None = None
+    """Message where players rotate the stored picture."""
 
     @property
     def pivot(self) -> str:
-        """Where the pivot's place comes from."""
+        """Source of the pivot's position."""
         return self.angles.pivot.source
 
     @property
     def by(self) -> str:
-        """What the angles were read off."""
+        """Object that the angles were measured on."""
         if self.why_coarse is None:
-            return "whole head"
-        return "mouth" if self.detections.head is None else "head's key frames"
+            return "whole body"
+        return "mark" if self.detections.body is None else "body's keyframes"
 
     @property
     def truncated(self) -> str | None:
-        """What could not be read of a file that ends too early."""
+        """How much could be read of a file that ends too early; ``None`` for a complete file."""
         return self.detections.truncated
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the user should know, a line each."""
-        coarse = () if self.why_coarse is None else (f"measured by the {self.by} alone: {self.why_coarse}",)
-        return (*self.detections.notes, *coarse, *(note for note in (self.zero, self.clock) if note is not None))
+        """Messages to the user, a line each."""
+        coarse = () if self.why_coarse is None else (f"measured on the {self.by} alone: {self.why_coarse}",)
+        found = (note for note in (self.display, self.zero, self.clock) if note is not None)
+        return (*self.detections.notes, *coarse, *found)
 
     @property
     def contours_px(self) -> tuple[NDArray[np.int32] | None, ...]:
-        """Each frame's (k, 2) outline of the mouth, where one was found."""
+        """Each frame's (k, 2) outline of the mark, where one was found."""
         return tuple(None if r is None else r.contour_px for r in self.detections.regions)
 
 
 def measure_clip(
     film: Film, rig: Rig, command: Command | None = None, *, progress: Callable[[int, int], None] | None = None
 ) -> Measurement:
-    """Measure the nodding angle in every frame of a clip.
+    """Measure the angle in every frame of a clip.
 
     Parameters
     ----------
     film : Film
         The clip.
     rig : Rig
-        What is declared about mouth, pivot, direction, neutral and camera.
+        Declares mark, pivot, direction, neutral and camera.
     command : Command, optional
-        What was commanded; its first change ends the rest that defines neutral. Where the rig declares a lamp, it is
-        dated by that.
+        Its first change ends the rest that defines neutral. Where the rig declares a lamp, the lamp dates that change.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
 
     Returns
     -------
     Measurement
-        The series has a row for every frame of the file, measured or not.
+        Its series has a row for every frame of the file, measured or not.
 
     Raises
     ------
@@ -113,87 +117,100 @@ def measure_clip(
     lamp = see_lamp(film, rig) if changes else None
     offset = offset_of(command, lamp)
     command = on_clip_clock(command, offset)
-    seen = detect_mark(film, rig, progress)
-    ok = np.array([s == OK for s in seen.status])
-    row = _mouth_rows(seen)
-    time = measurement_time(seen.time, row, seen.size[1], rig.camera.row_time_s)
-    angles = coarse_angles(seen, ok, time, rig, command)
-    why_coarse: str | None = "the mouth does not move"
-    if seen.moves:
-        start = _start(seen, ok, time, row, angles, rig)
-        registered = register_clip(film, start, seen.lens, progress)
+    detections = detect_mark(film, rig, progress)
+    ok = np.array([s == OK for s in detections.status])
+    row = _mark_rows(detections)
+    time = measurement_time(detections.time, row, detections.size[1], rig.camera.row_time_s)
+    angles = coarse_angles(detections, ok, time, rig, command)
+    why_coarse: str | None = "the mark does not move"
+    if detections.moves:
+        start = _start(detections, ok, time, row, angles, rig)
+        registered = register_clip(film, start, detections.lens, progress)
         why_coarse = registered if isinstance(registered, str) else None
         if isinstance(registered, Registered):
-            registered = replace(registered, turn=registered.turn - _rolls(seen))
-            start = replace(start, turn=start.turn - _rolls(seen))
+            registered = replace(registered, turn=registered.turn - _rolls(detections))
+            start = replace(start, turn=start.turn - _rolls(detections))
             found = np.isfinite(registered.turn)
-            ok = ok | (found & _carried_along(seen, start, registered, angles))
+            ok = ok | (found & _carried_along(detections, start, registered, angles))
             row = np.where(found, registered.row, row)
-            time = measurement_time(seen.time, row, seen.size[1], rig.camera.row_time_s)
-            angles = coarse_angles(seen, ok, time, rig, command)
-            filmed = seen.in_picture(_among(ok, angles.mark_px))[ok]
+            time = measurement_time(detections.time, row, detections.size[1], rig.camera.row_time_s)
+            angles = coarse_angles(detections, ok, time, rig, command)
+            filmed = detections.in_picture(_in_all_frames(ok, angles.mark_px))[ok]
             angles = fine_angles(angles, registered, np.flatnonzero(ok), filmed, time[ok], rig, command)
-        elif _only_the_path_tells(seen, rig):
-            # a pivot that only a mouth's path tells is far less sure than one that the whole head turns about
-            head = detect_rigid_body(film, rig)
-            if isinstance(head, Detections):
-                rigid = np.array([s == OK for s in head.status])
-                other = coarse_angles(head, rigid, head.time, rig, command)
+        elif _pivot_from_path_alone(detections, rig):
+            # a centre fitted to the mark's path is much less certain than the centre of rotation of the whole body
+            body = detect_rigid_body(film, rig)
+            if isinstance(body, Detections):
+                rigid = np.array([s == OK for s in body.status])
+                other = coarse_angles(body, rigid, body.time, rig, command)
                 if (other.sigma**2).mean() < (angles.sigma**2).mean():
-                    seen, ok, time, angles = head, rigid, head.time, other
-    series = _series(film.path, rig, time, seen, ok, angles, lamp)
+                    detections, ok, time, angles = body, rigid, body.time, other
+    series = _series(film.path, rig, time, detections, ok, angles, lamp)
     zero = why_zero_is_elsewhere(rig, command, time[ok])
     dark = changes and lamp is None and rig.sync.lamp is not None
-    return Measurement(series, seen, angles, why_coarse, zero, DARK if dark else note_on(offset))
+    return Measurement(series, detections, angles, why_coarse, zero, DARK if dark else note_on(offset), _display(film))
 
 
-def _only_the_path_tells(seen: Detections, rig: Rig) -> bool:
-    """Tell whether the pivot is where the mouth's path has its centre, and a rigid head could be followed instead."""
-    followable = seen.head is None and seen.shakes is None and seen.lens.is_identity
-    return followable and seen.marker is None and rig.pivot.near is None
+def _display(film: Film) -> str | None:
+    turn = film.rotation_deg
+    return (
+        f"players rotate this film by {turn}°; all pixels and angles are those of the stored picture" if turn else None
+    )
 
 
-def _among(ok: NDArray[np.bool_], places_px: Floats) -> Floats:
-    """Lay the places of the measured frames among all the clip's frames."""
-    among = np.full((len(ok), 2), np.nan)
-    among[ok] = places_px
-    return among
+def _pivot_from_path_alone(detections: Detections, rig: Rig) -> bool:
+    """Return whether the pivot is only the centre of the mark's path, and a rigid body could be followed instead."""
+    followable = detections.body is None and detections.camera_moves is None and detections.lens.is_identity
+    return followable and detections.marker is None and rig.pivot.near is None
 
 
-def _rolls(seen: Detections) -> Floats:
-    """Return how far the camera rolled in each frame, rad."""
-    return np.zeros(len(seen.time)) if seen.shakes is None else np.array([move.roll for move in seen.shakes])
+def _in_all_frames(ok: NDArray[np.bool_], places_px: Floats) -> Floats:
+    """Arrange the positions of the measured frames in all frames; NaN elsewhere."""
+    placed = np.full((len(ok), 2), np.nan)
+    placed[ok] = places_px
+    return placed
 
 
-def _mouth_rows(seen: Detections) -> Floats:
-    """Return the rows of the picture in which the mouth was seen."""
+def _rolls(detections: Detections) -> Floats:
+    """Return (n,) roll of the camera in each frame, rad."""
+    return (
+        np.zeros(len(detections.time))
+        if detections.camera_moves is None
+        else np.array([move.roll for move in detections.camera_moves])
+    )
+
+
+def _mark_rows(detections: Detections) -> Floats:
+    """Return (n,) rows of the picture in which the mark was found, px."""
     nowhere = np.full(2, np.nan)
-    places = np.array([nowhere if r is None else r.centre_px for r in seen.regions])
-    if seen.head is not None:
-        places = np.where(np.isfinite(seen.head.turn)[:, None], seen.lens.rectify(seen.head.centre_px), nowhere)
-    return np.asarray(seen.in_picture(places)[:, 1])
+    places = np.array([nowhere if r is None else r.centre_px for r in detections.regions])
+    if detections.body is not None:
+        places = np.where(
+            np.isfinite(detections.body.turn)[:, None], detections.lens.rectify(detections.body.centre_px), nowhere
+        )
+    return np.asarray(detections.in_picture(places)[:, 1])
 
 
-def _carried_along(seen: Detections, start: Start, registered: Registered, angles: Angles) -> NDArray[np.bool_]:
-    """Tell in which of the doubtful frames the mouth is where the head carries it: all of it is seen, but smeared."""
+def _carried_along(detections: Detections, start: Start, registered: Registered, angles: Angles) -> NDArray[np.bool_]:
+    """Return the smeared frames whose mark is at the position predicted by the body's rotation: blurred, not hidden."""
     off = registered.turn - start.turn - start.turn_per_row * (registered.row - start.row)
     sure, lever = np.isfinite(start.sigma) & np.isfinite(off), float(np.median(angles.lever_px))
     nowhere = np.full(2, np.nan)
-    places = np.array([nowhere if r is None else r.centre_px for r in seen.regions])
-    outward = np.hypot(*(places - seen.pivot.centre_px).T) - lever
+    places = np.array([nowhere if r is None else r.centre_px for r in detections.regions])
+    outward = np.hypot(*(places - detections.pivot.centre_px).T) - lever
     along = (off - np.median(off[sure])) * lever
     with np.errstate(invalid="ignore"):
-        return np.asarray(seen.smeared & (np.hypot(along, outward) < _CARRIED_PX))
+        return np.asarray(detections.smeared & (np.hypot(along, outward) < _CARRIED_PX))
 
 
-def _start(seen: Detections, ok: NDArray[np.bool_], time: Floats, row: Floats, angles: Angles, rig: Rig) -> Start:
-    """Lay the coarse turns among all the clip's frames."""
+def _start(detections: Detections, ok: NDArray[np.bool_], time: Floats, row: Floats, angles: Angles, rig: Rig) -> Start:
+    """Return the coarse rotation in all frames, as the fine pass starts from it."""
     n = len(time)
     turn, sigma, speed = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n)
     turn[ok], sigma[ok] = turns(angles, rig), angles.sigma
-    guessed = np.flatnonzero(seen.smeared)
+    guessed = np.flatnonzero(detections.smeared)
     if len(guessed):
-        arm = np.array([r.centre_px for i in guessed if (r := seen.regions[i])]) - seen.pivot.centre_px
+        arm = np.array([r.centre_px for i in guessed if (r := detections.regions[i])]) - detections.pivot.centre_px
         line = np.arctan2(-arm[:, 1], arm[:, 0] if rig.facing == "right" else -arm[:, 0])
         near = line - np.median(angles.line)
         near -= 2.0 * np.pi * np.round(near / (2.0 * np.pi))
@@ -201,18 +218,18 @@ def _start(seen: Detections, ok: NDArray[np.bool_], time: Floats, row: Floats, a
     known = np.isfinite(turn)
     if rig.camera.row_time_s is not None and known.sum() > 1:
         speed[known] = np.gradient(turn[known], time[known])
-    pivots, wander = np.broadcast_to(seen.pivot.centre_px, (n, 2)), None
-    if seen.shakes is not None:
-        pivots = seen.lens.rectify(seen.in_picture(pivots))
-        filmed = seen.lens.distort(seen.pivot.centre_px)
-        wander = np.array([move.place_covariance(filmed) for move in seen.shakes])
-        turn = turn + _rolls(seen)
+    pivots, covariance = np.broadcast_to(detections.pivot.centre_px, (n, 2)), None
+    if detections.camera_moves is not None:
+        pivots = detections.lens.rectify(detections.in_picture(pivots))
+        filmed = detections.lens.distort(detections.pivot.centre_px)
+        covariance = np.array([move.place_covariance(filmed) for move in detections.camera_moves])
+        turn = turn + _rolls(detections)
     return Start(
         turn=turn,
         sigma=sigma,
-        pivot=seen.pivot,
+        pivot=detections.pivot,
         pivots_px=pivots,
-        wander_px2=wander,
+        pivot_covariance_px2=covariance,
         turn_per_row=speed * (rig.camera.row_time_s or 0.0),
         row=row,
     )
@@ -222,53 +239,53 @@ def _series(
     path: Path,
     rig: Rig,
     time: Floats,
-    seen: Detections,
+    detections: Detections,
     ok: NDArray[np.bool_],
     angles: Angles,
     lamp: tuple[float, float] | None,
 ) -> AngleSeries:
-    """Lay the measured frames among all the clip's frames, less the duplicates."""
-    status = [OK if k else s for k, s in zip(ok, seen.status, strict=True)]
+    """Return the series of all frames, the duplicates marked."""
+    status = [OK if k else s for k, s in zip(ok, detections.status, strict=True)]
     lines, sigmas = np.full((2, len(time)), np.nan)
     lines[ok], sigmas[ok] = angles.line, angles.sigma
-    for i in _duplicates(lines, sigmas, seen.repeated):
+    for i in _duplicates(lines, sigmas, detections.repeated):
         status[i] = "duplicate"
-    mouths = seen.in_picture(_among(ok, angles.mark_px))
-    pivots = seen.in_picture(np.broadcast_to(angles.pivot.centre_px, (len(time), 2)))
-    from_mark = seen.head is None and angles.registered is None
+    marks = detections.in_picture(_in_all_frames(ok, angles.mark_px))
+    pivots = detections.in_picture(np.broadcast_to(angles.pivot.centre_px, (len(time), 2)))
+    from_mark = detections.body is None and angles.registered is None
     evidence = CameraEvidence(
-        picture_px=seen.size,
-        marker_px=_marker(seen),
+        picture_px=detections.size,
+        marker_px=_marker(detections),
         from_mark=from_mark,
-        outline_turn=_outline_turn(seen, ok) if from_mark else None,
+        outline_turn=_outline_turn(detections, ok) if from_mark else None,
         lamp_s=lamp,
     )
-    return series_of_angles(recording_name(path), time, status, ok, angles, mouths, pivots, rig, evidence)
+    return series_of_angles(recording_name(path), time, status, ok, angles, marks, pivots, rig, evidence)
 
 
-def _outline_turn(seen: Detections, ok: NDArray[np.bool_]) -> tuple[float, float] | None:
-    regions = [seen.regions[i] for i in np.flatnonzero(ok)]
+def _outline_turn(detections: Detections, ok: NDArray[np.bool_]) -> tuple[float, float] | None:
+    regions = [detections.regions[i] for i in np.flatnonzero(ok)]
     whole = [region for region in regions if region is not None]
-    if seen.circle is None or not whole:
+    if detections.circle is None or not whole:
         return None
-    arm = np.array([region.centre_px for region in whole]) - seen.circle.centre_px
+    arm = np.array([region.centre_px for region in whole]) - detections.circle.centre_px
     return outline_turn(whole, np.unwrap(np.arctan2(arm[:, 1], arm[:, 0])))
 
 
-def _marker(seen: Detections) -> tuple[float, float] | None:
-    if seen.head is not None or seen.shakes is not None or seen.lens.calibration is not None:
+def _marker(detections: Detections) -> tuple[float, float] | None:
+    if detections.body is not None or detections.camera_moves is not None or detections.lens.calibration is not None:
         return None
-    if seen.marker is not None:
-        x, y = seen.marker.centre_px
-    elif seen.lens.is_identity:
+    if detections.marker is not None:
+        x, y = detections.marker.centre_px
+    elif detections.lens.is_identity:
         return None
-    else:  # a slanted view was undone: the line is then to be seen from where the picture shows its centre
-        x, y = seen.lens.distort(seen.pivot.centre_px)
+    else:  # a slanted view was corrected: the line then starts at the position of its centre in the picture
+        x, y = detections.lens.distort(detections.pivot.centre_px)
     return float(x), float(y)
 
 
 def _duplicates(line: Floats, sigma: Floats, repeated: NDArray[np.bool_]) -> list[int]:
-    """List the frames that repeat the one before while the mechanism moves before and after them."""
+    """List the frames that repeat the previous one while the mechanism moves before and after them."""
     rows: list[int] = []
     starts = np.flatnonzero(repeated & ~np.insert(repeated[:-1], 0, False))
     for i in starts:

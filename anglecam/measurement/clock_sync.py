@@ -1,8 +1,8 @@
-"""The command's clock and the clip's: a lamp that lights at the first command change shows both.
+"""The offset between the command's clock and the clip's, from a lamp that lights at the first command change.
 
-Between a dark frame and a lit one lies the instant of the change on the clip's clock; the command file says when it was
-on the command's. Clips of one session are taken to be off by one and the same time where one time suits them all: the
-frames of five clips then tell it several times better than those of one. A time of zero that suits is not corrected.
+The change lies between the last dark frame and the first lit one on the clip's clock; the command file states it on the
+command's clock. Where one offset agrees with all clips of a session, it is used for all of them: five clips determine
+it several times better than one. Where an offset of zero agrees, nothing is corrected.
 """
 
 from __future__ import annotations
@@ -25,33 +25,33 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True)
 class Offset:
-    """By how much a clip's clock is ahead of its command's."""
+    """How far a clip's clock is ahead of its command's."""
 
     value: float
-    """s; 0 where the lamp does not contradict it."""
+    """s; 0 where the lamp agrees with it."""
     sigma: float
     """Standard uncertainty, s."""
 
 
 AGREED = Offset(0.0, 0.0)
-DARK = "the lamp is not seen to light; the command's clock is taken for the clip's"
+DARK = "the lamp is not seen to light; command and clip are assumed to share one clock"
 
 
 def see_lamp(film: Film, rig: Rig) -> Interval | None:
-    """Find when the lamp that the rig declares is lit first.
+    """Find when the lamp that the rig declares first lights.
 
     Parameters
     ----------
     film : Film
         The clip.
     rig : Rig
-        Whose ``sync.lamp`` says where the lamp is to be seen.
+        Its ``sync.lamp`` is the position of the lamp in the picture.
 
     Returns
     -------
     (float, float) or None
-        The last instant at which it was surely dark and the first at which it was fully lit, s on the clip's clock;
-        ``None`` where no lamp is declared, or it does not light.
+        The last instant at which it was certainly dark and the first at which it was fully lit, s on the clip's clock;
+        ``None`` where no lamp is declared or it does not light.
 
     Raises
     ------
@@ -74,19 +74,19 @@ def see_lamp(film: Film, rig: Rig) -> Interval | None:
 
 
 def offsets(commands: Mapping[str, Command | None], lit: Mapping[str, Interval | None]) -> dict[str, Offset]:
-    """Tell how far each clip's clock is ahead of its command's.
+    """Return how far each clip's clock is ahead of its command's.
 
     Parameters
     ----------
     commands : mapping
         From a recording's name to its command.
     lit : mapping
-        From a recording's name to what `see_lamp` found.
+        From a recording's name to the result of `see_lamp`.
 
     Returns
     -------
     dict
-        For each name in ``commands``; where no lamp was seen, as of a series from elsewhere, the clocks agree.
+        For each name in ``commands``. Without a lamp, as for a series from elsewhere, the clocks are taken to agree.
     """
     ahead = {}
     for name, command in commands.items():
@@ -97,28 +97,28 @@ def offsets(commands: Mapping[str, Command | None], lit: Mapping[str, Interval |
         max((low for low, _ in ahead.values()), default=0.0),
         min((high for _, high in ahead.values()), default=0.0),
     )
-    suits = common[0] <= common[1]
-    return {name: _offset(common if suits else ahead[name]) if name in ahead else AGREED for name in commands}
+    agrees = common[0] <= common[1]
+    return {name: _offset(common if agrees else ahead[name]) if name in ahead else AGREED for name in commands}
 
 
 def offset_of(command: Command | None, lit: Interval | None) -> Offset:
-    """Tell how far one clip's clock is ahead of its command's, as `offsets` does for several."""
+    """Return the offset of one clip, as `offsets` does for several."""
     return offsets({"": command}, {"": lit})[""]
 
 
 def note_on(offset: Offset) -> str | None:
-    """Say in a line that clocks disagree; ``None`` where they do not."""
+    """Return a message where the clocks disagree, else ``None``."""
     if offset == AGREED:
         return None
     side = "ahead of" if offset.value > 0.0 else "behind"
     return (
         f"the lamp shows the clip's clock {abs(offset.value):.4f} s {side} the command's, ±{offset.sigma:.4f} s; "
-        "the command is dated by the lamp"
+        "the command's times are corrected by it"
     )
 
 
 def on_clip_clock(command: Command | None, offset: Offset) -> Command | None:
-    """Return a command as the clip's clock dates it."""
+    """Return a command with its times on the clip's clock."""
     return None if command is None else replace(command, time=command.time + offset.value)
 
 

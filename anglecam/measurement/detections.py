@@ -1,7 +1,7 @@
-"""What the coarse pass over a clip finds: the mouth in every frame, and the pivot that it turns about.
+"""The result of the coarse pass over a clip: the mark in every frame, and the pivot.
 
-Places are those in the plane of motion: what lens, tilt and a shaking stand do to the picture is undone for points,
-frames stay as they were filmed.
+Positions are in the plane of motion: the effects of lens, tilt and a shaking camera are corrected for points. The
+frames themselves are not transformed.
 """
 
 from __future__ import annotations
@@ -25,91 +25,93 @@ from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 from anglecam.vision.stabilise.background_motion import CameraMove
 
 _SAMPLE_BYTES = 100_000_000
-"""Memory for the frames of the first pass."""
+"""Memory for the frames that the first pass keeps."""
 _SAMPLES = 32
+"""Frames that the first pass keeps at most."""
 _STILL = 9
-"""Frames whose median shows what does not move."""
+"""Frames whose median shows the still background."""
 _HINT_PX = 10.0
-"""Standard uncertainty of a hint at the pivot."""
+"""Standard uncertainty of the rig file's hint at the pivot."""
 _SLANTED_HINT_PX = 25.0
-"""The same where nothing is found so near: a mark before the plane of motion is shifted by a slanted view."""
+"""The same where nothing is found so near: a slanted view shifts a marker that lies in front of the plane of motion."""
 _REACH = 2.0
-"""Times its stated uncertainty that the centre of rotation may be off when a marker is looked for about it …"""
+"""Radius, in standard uncertainties of the centre of rotation, within which a marker is sought."""
 _LEAST_REACH_PX = 3.0
-"""… and at least so far."""
+"""Lower limit of that radius."""
 _DEPTH = 0.15
-"""Standard uncertainty of the marker's height over the mouth's, as a share of the lever arm."""
+"""Standard uncertainty of the marker's height above the mark's, as a share of the lever arm."""
 
 
 @dataclass(frozen=True)
 class Detections:
-    """The mouth through a clip; sequences have an entry a frame."""
+    """The mark in a clip; sequences have an entry a frame."""
 
     time: Floats
-    """The frames' own stamps, s."""
+    """Time stamps of the frames, s."""
     status: tuple[str, ...]
     regions: tuple[Region | None, ...]
-    """The mouth where it was seen, in the plane of motion."""
+    """The mark where it was found, in the plane of motion."""
     smeared: NDArray[np.bool_]
-    """Frames that are ``occluded`` for all that is known, but may be fast motion's blur."""
+    """Frames whose status is ``occluded`` although motion blur may be the cause."""
     pivot: PivotEstimate
     """In the plane of motion."""
     marker: RoundMarker | None
-    """The round mark at the pivot, as the picture shows it."""
+    """The round marker at the pivot, in the picture."""
     circle: Circle | None
-    """Fitted to the mouth's path in the plane of motion, where it moved."""
+    """Fitted to the mark's path in the plane of motion; ``None`` where it does not move."""
     moves: bool
+    """Whether the mark or the body moves."""
     lens: Lens
     """From the picture of a camera at rest to the plane of motion."""
-    shakes: tuple[CameraMove, ...] | None
-    """What the camera did in each frame; ``None`` where it stood still."""
-    head: RigidMotion | None
-    """The rigid head where there is no mouth; ``regions`` are empty then."""
+    camera_moves: tuple[CameraMove, ...] | None
+    """Motion of the camera in each frame; ``None`` where it stands still."""
+    body: RigidMotion | None
+    """Motion of the rigid body where there is no mark; ``regions`` are empty then."""
     noise: float
     """Standard deviation of the pixels, grey levels."""
     repeated: NDArray[np.bool_]
-    """Frames that are bit by bit the one before."""
+    """Frames that equal the previous frame bit for bit."""
     colour_rgb: tuple[int, int, int] | None
-    """The mouth's colour in this clip."""
+    """The mark's colour in this clip."""
     size: tuple[int, int]
     """Width and height of the picture, px."""
     truncated: str | None
     """``truncated: 71 of 120 frames could be read`` where the file ends too early."""
     notes: tuple[str, ...]
-    """What the user should know, a line each."""
+    """Messages to the user, a line each."""
 
     def in_picture(self, places_px: Floats) -> Floats:
-        """Return where the frames, one after another, show places (frames, 2) of the plane of motion, px."""
+        """Return the picture positions, px, of (frames, 2) positions in the plane of motion, one for each frame."""
         filmed = self.lens.distort(places_px)
-        if self.shakes is None:
+        if self.camera_moves is None:
             return filmed
-        return np.array([move.to_frame(place) for move, place in zip(self.shakes, filmed, strict=True)])
+        return np.array([move.to_frame(place) for move, place in zip(self.camera_moves, filmed, strict=True)])
 
 
 def find_pivot(
     images: Sequence[Image], rig: Rig, circle: Circle | None, lens: Lens
 ) -> tuple[RoundMarker | None, PivotEstimate | None, str | None]:
-    """Find the pivot from its marker and from what turns about it.
+    """Estimate the pivot from its marker and from the centre of rotation.
 
     Parameters
     ----------
     images : sequence of ndarray
-        (h, w, 3) frames, levelled where the camera shakes.
+        (h, w, 3) frames, stabilised where the camera shakes.
     rig : Rig
         What is declared about the pivot.
     circle : Circle, optional
-        Whose centre is the centre of rotation, in the plane of motion.
+        The mark's path in the plane of motion; its centre is the centre of rotation.
     lens : Lens
         From the picture to the plane of motion.
 
     Returns
     -------
-    marker : Marker or None
-        As the picture shows it.
-    pivot : Pivot or None
+    marker : RoundMarker or None
+        In the picture.
+    pivot : PivotEstimate or None
         In the plane of motion.
     note : str or None
-        What to report where the two disagree.
+        A message where the two disagree.
     """
     marker = _find_marker(images, rig, circle, lens)
     return marker, *combine_pivot(*_reconciled(marker, circle, lens))
@@ -126,7 +128,7 @@ def _find_marker(images: Sequence[Image], rig: Rig, circle: Circle | None, lens:
         return near or find_marker(still, hint, _SLANTED_HINT_PX**2 * np.eye(2))
     if circle is None:
         return find_marker(still, None, None)
-    # a short arc knows well in which direction its centre lies, and badly how far off
+    # a short arc determines the direction to its centre well, and the distance badly
     values, axes = np.linalg.eigh(np.nan_to_num(circle.centre_covariance_px2, nan=1e12, posinf=1e12))
     reach = np.clip(_REACH * np.sqrt(np.abs(values)), _LEAST_REACH_PX, 0.5 * float(np.hypot(*still.shape[:2])))
     return find_marker(still, lens.distort(circle.centre_px), (axes * reach**2) @ axes.T)
@@ -135,11 +137,11 @@ def _find_marker(images: Sequence[Image], rig: Rig, circle: Circle | None, lens:
 def _reconciled(
     marker: RoundMarker | None, circle: Circle | None, lens: Lens
 ) -> tuple[RoundMarker | None, Circle | None]:
-    """Bring marker and centre of rotation to where they can be compared: the plane of motion.
+    """Bring marker and centre of rotation into the plane of motion, in which they can be compared.
 
-    In a tilted view what stands at another height turns about another centre, beside the pivot's along the parallax:
-    there the marker says little about the centre that the mouth turns about. And without a focal length perspective
-    moves the centre of the mouth's circle, unseen (`anglecam.camera.lens`).
+    In a tilted view, points at another height rotate about another image point, displaced from the pivot along the
+    parallax. There the marker determines the mark's centre of rotation only loosely. Without a focal length,
+    perspective displaces the centre of the mark's circle by an unknown amount (`anglecam.camera.lens`).
     """
     if marker is not None and not lens.is_identity:
         J = lens.jacobian(marker.centre_px)

@@ -1,7 +1,7 @@
-"""Fine angles: from the turn of the whole head, which knows nothing of the mouth.
+"""Fine angles: from the rotation of the whole body, which is measured without the mark.
 
-The line to the mouth's median place on the head is turned along. The mouth's own place in a frame stays the centroid
-that was measured there.
+The line to the mark's median position on the body is rotated with it. The mark's position in a frame remains the
+centroid that was measured there.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ def fine_angles(
     rig: Rig,
     command: Command | None,
 ) -> Angles:
-    """Take the turns of the whole head in place of the mouth's.
+    """Replace the mark's angles by the rotation of the whole body.
 
-    A frame in which the head was not found keeps its coarse angle. Neutral is a mean over frames of its own: its
-    error is shared by all angles, and part of the pivot's error cancels against it.
+    A frame in which the body was not found keeps its coarse angle. Neutral is the mean over a set of frames: all angles
+    share its error, and part of the pivot's error cancels against it.
 
     Parameters
     ----------
     coarse : Angles
-        From the mouth's centroid.
+        From the mark's centroid.
     found : Registered
-        The turns, in every frame of the clip.
+        The rotations, in every frame of the clip.
     rows : ndarray
-        (n,) numbers of the frames in which the mouth was seen.
+        (n,) numbers of the frames in which the mark was found.
     filmed_px : ndarray
-        (n, 2) where those frames show it, px.
+        (n, 2) the mark's positions in these frames, px.
     time : ndarray
         (n,) s.
     rig : Rig
@@ -56,26 +56,31 @@ def fine_angles(
     Angles
         With registration.
     """
-    turn, noise, pose, pull = found.turn[rows], found.noise[rows], found.pose[rows], found.pivot_sensitivity[rows]
-    seen = np.isfinite(turn)
+    turn, noise, pose, sensitivity = (
+        found.turn[rows],
+        found.noise[rows],
+        found.pose[rows],
+        found.pivot_sensitivity[rows],
+    )
+    registered = np.isfinite(turn)
     signed = turn if rig.facing == "right" else -turn
-    base = float(np.median(coarse.line[seen] - signed[seen]))
-    line = np.where(seen, base + signed, coarse.line)
+    base = float(np.median(coarse.line[registered] - signed[registered]))
+    line = np.where(registered, base + signed, coarse.line)
     neutral, resting = neutral_of(rig, command, time, line, coarse.lever_px)
-    used = seen if resting is None or not (resting & seen).any() else resting & seen
-    shared = _sigma_of_mean(turn[used], noise[used], float(np.median(pose[seen])), filmed_px[used])
-    against = pull - pull[used].mean(axis=0)
+    used = registered if resting is None or not (resting & registered).any() else resting & registered
+    shared = _sigma_of_mean(turn[used], noise[used], float(np.median(pose[registered])), filmed_px[used])
+    against = sensitivity - sensitivity[used].mean(axis=0)
     by_pivot = np.einsum("ni,ij,nj->n", against, found.pivot_covariance_px2, against)
     unsteady = mean_off_middle(time, line, rig.camera.exposure_s)
     sigma = np.sqrt(noise**2 + pose**2 + shared**2 + by_pivot + coarse.view.sigma**2 + unsteady**2)
     if resting is None:
-        # an absolute line stands on the mouth's mean place on the head, and on the pivot
-        sigma = np.sqrt(sigma**2 + float(np.median(coarse.sigma[seen])) ** 2)
-    pivot = PivotEstimate(found.pivot_px, found.pivot_covariance_px2, f"{coarse.pivot.source} and the head's turns")
+        # an absolute direction depends on the mark's mean position on the body, and on the pivot
+        sigma = np.sqrt(sigma**2 + float(np.median(coarse.sigma[registered])) ** 2)
+    pivot = PivotEstimate(found.pivot_px, found.pivot_covariance_px2, f"{coarse.pivot.source} and the body's rotation")
     return replace(
         coarse,
         line=line,
-        sigma=np.where(seen, sigma, coarse.sigma),
+        sigma=np.where(registered, sigma, coarse.sigma),
         pivot=pivot,
         neutral=neutral,
         resting=resting,
@@ -86,16 +91,16 @@ def fine_angles(
 
 
 def _sigma_of_mean(turn: Floats, noise: Floats, pose: float, filmed_px: Floats) -> float:
-    """Return the standard uncertainty of the mean turn of frames in few poses, rad.
+    """Return the standard uncertainty of the mean rotation of frames in few poses, rad.
 
-    What goes with the place on the pixel grid does not grow less by resting there. As far as frames at rest scatter
-    more than the pixels' noise makes them, it is another in every frame: a codec's errors where noise stirs them, a
-    camera's that shakes.
+    The error that depends on the position on the pixel grid does not average out at rest. Where frames at rest scatter
+    more than the pixels' noise explains, that excess part differs from frame to frame and does average out: errors of a
+    codec that noise varies, or of a shaking camera.
     """
     n, places = len(turn), np.unique(np.round(filmed_px).astype(int), axis=0, return_inverse=True)[1].ravel()
     count = np.bincount(places)
-    own = 0.0
+    independent = 0.0
     if n > len(count):
         within = turn - (np.bincount(places, turn) / count)[places]
-        own = float(np.clip((within**2).sum() / (n - len(count)) - (noise**2).mean(), 0.0, pose**2))
-    return float(np.sqrt(((noise**2).mean() + own) / n + (pose**2 - own) / len(count)))
+        independent = float(np.clip((within**2).sum() / (n - len(count)) - (noise**2).mean(), 0.0, pose**2))
+    return float(np.sqrt(((noise**2).mean() + independent) / n + (pose**2 - independent) / len(count)))

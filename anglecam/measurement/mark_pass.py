@@ -1,7 +1,7 @@
-"""The coarse pass over a clip: the mouth in every frame, and the pivot that it turns about.
+"""The coarse pass over a clip: find the mark in every frame, and the pivot.
 
-The first reading keeps a few frames, from which the mouth's colour, its rough path and the pivot's marker are learnt;
-the second finds the mouth in every frame. Where there is no mouth to see, a head that turns as one rigid body will do.
+The first reading keeps a few frames, from which the mark's colour, its rough path and the pivot's marker are learnt.
+The second reading finds the mark in every frame. Where there is no mark, a body that turns rigidly is followed instead.
 """
 
 from __future__ import annotations
@@ -33,25 +33,25 @@ from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, Background
 from anglecam.vision.stabilise.learn import learn_background
 
 _SMALLEST_SHARE = 0.25
-"""Of the mouth's area; a smaller region is no mouth even if partly hidden."""
+"""Of the mark's area; a smaller region is not the mark, even if partly hidden."""
 
 
 def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | None = None) -> Detections:
-    """Find the mouth in every frame of a clip, and the pivot.
+    """Find the mark in every frame of a clip, and the pivot.
 
     Parameters
     ----------
     film : Film
         The clip.
     rig : Rig
-        What is declared about mouth, pivot and camera.
+        Declares mark, pivot and camera.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
 
     Returns
     -------
     Detections
-        At least one frame of it with status ``ok``.
+        At least one frame has the status ``ok``.
 
     Raises
     ------
@@ -72,14 +72,14 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
 
     found = find_mark(images, rig.mouth_rgb, near, placed) if images else None
     if found is None:
-        head = detect_rigid_body(film, rig) if rig.mouth_rgb is None and images else None
-        if isinstance(head, Detections):
-            return head
-        besides = "" if head is None else f"; nor can the head be followed without one: {head}"
-        raise InputError(_no_mouth(path, sample, rig) + besides)
+        body = detect_rigid_body(film, rig) if rig.mouth_rgb is None and images else None
+        if isinstance(body, Detections):
+            return body
+        besides = "" if body is None else f"; nor can the body be followed without a mark: {body}"
+        raise InputError(_no_mark(path, sample, rig) + besides)
     time, filmed, decoded, repeated, shakes = _read_regions(film, found, sample.count, steady, progress)
     candidates = filmed if shakes is None else [_unshaken(r, move) for r, move in zip(filmed, shakes, strict=True)]
-    images = [_levelled(image, move) for image, move in zip(images, moves, strict=True)] if moves else images
+    images = [_stabilised(image, move) for image, move in zip(images, moves, strict=True)] if moves else images
     lens, track, marker, pivot, disagreement = _follow(candidates, time, found, images, rig, lens)
     hidden = np.zeros(len(time), bool) if shakes is None else np.array([not move.known for move in shakes])
     status = tuple(
@@ -90,16 +90,16 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
         raise InputError(_nothing_measured(path, status, sample, rig))
     if pivot is None:
         raise InputError(
-            f"{path}: no pivot found: the mouth's way is too short to tell, and no round marker is to be seen near its"
-            " centre; say where it is: pivot: {near: [x, y]} in rig.yaml"
+            f"{path}: no pivot found: the mark's path is too short to determine its centre, and there is no round"
+            " marker near it; declare it: pivot: {near: [x, y]} in rig.yaml"
         )
     notes = [disagreement] if disagreement else []
     if shakes is not None:
         notes.append(
-            f"the camera shakes by {_restlessness(shakes):.2f} px RMS; the scenery tells how, and it is undone"
+            f"the camera shakes by {_rms_shift(shakes):.2f} px RMS; this was measured on the background and corrected"
         )
     if found.circle is None:
-        notes.append("the mouth does not move in this clip")
+        notes.append("the mark does not move in this clip")
     return Detections(
         time=time,
         status=status,
@@ -110,8 +110,8 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
         circle=track.circle,
         moves=found.circle is not None,
         lens=lens,
-        shakes=shakes,
-        head=None,
+        camera_moves=shakes,
+        body=None,
         noise=noise,
         repeated=repeated,
         colour_rgb=found.model.mean_rgb,
@@ -129,7 +129,7 @@ def _follow(
     rig: Rig,
     lens: Lens,
 ) -> tuple[Lens, MarkTrack, RoundMarker | None, PivotEstimate | None, str | None]:
-    """Follow the mouth in the plane of motion; where the view is a tilted perspective, once more about its pivot."""
+    """Follow the mark in the plane of motion; in a tilted perspective, repeat it with the lens centred on the pivot."""
     for again in (lens.tilt != 0.0 and lens.focal_px is not None, False):
         placed = [[_in_plane(region, lens) for region in regions] for regions in candidates]
         track = follow_mark(placed, time, found)
@@ -146,12 +146,12 @@ def _follow(
 
 
 def _unshaken(regions: Sequence[Region], move: CameraMove) -> list[Region]:
-    """Bring a frame's regions to where a camera at rest would show them; none where that is not known."""
+    """Return a frame's regions where a camera at rest would show them; none where the camera's motion is not known."""
     return [replace(r, centre_px=move.to_reference(r.centre_px)) for r in regions] if move.known else []
 
 
-def _levelled(image: Image, move: CameraMove) -> Image:
-    """Bring a frame to where a camera at rest would show it, for what is sought in the middle of many frames."""
+def _stabilised(image: Image, move: CameraMove) -> Image:
+    """Return a frame as a camera at rest would show it; used for the median of many frames."""
     if not move.known:
         return image
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -161,7 +161,7 @@ def _levelled(image: Image, move: CameraMove) -> Image:
     return np.asarray(cv2.warpAffine(image, matrix, size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP))
 
 
-def _restlessness(moves: Sequence[CameraMove]) -> float:
+def _rms_shift(moves: Sequence[CameraMove]) -> float:
     shifts = np.array([move.shift_px for move in moves if move.known])
     return float(np.sqrt(((shifts - shifts.mean(axis=0)) ** 2).mean())) if len(shifts) else 0.0
 
@@ -186,9 +186,9 @@ def _read_regions(
     steady: BackgroundMotion | None,
     progress: Callable[[int, int], None] | None,
 ) -> tuple[Floats, list[list[Region]], list[bool], NDArray[np.bool_], tuple[CameraMove, ...] | None]:
-    """Find the regions of the mouth's colour in every frame, and how the camera moved if it did.
+    """Find the regions of the mark's colour in every frame.
 
-    Tell too which frames repeat the one before bit by bit.
+    Also return which frames equal the previous one bit for bit, and the camera's motion where it moves.
     """
     time: list[float] = []
     candidates: list[list[Region]] = []
@@ -215,18 +215,18 @@ def _colour(rig: Rig) -> str:
     return "auto" if rig.mouth_rgb is None else ",".join(map(str, rig.mouth_rgb))
 
 
-def _no_mouth(path: Path, sample: Sample, rig: Rig) -> str:
+def _no_mark(path: Path, sample: Sample, rig: Rig) -> str:
     if not sample.decoded:
         return f"{path}: none of its {sample.count} frames can be decoded"
-    hint = "" if rig.pivot.near is None else ", turning about the hint at {:g},{:g}".format(*rig.pivot.near)
+    hint = "" if rig.pivot.near is None else ", rotating about the hint at {:g},{:g}".format(*rig.pivot.near)
     return (
-        f"{path}: no mouth found in {sample.count} of {sample.count} frames (colour {_colour(rig)}{hint});"
+        f"{path}: no mark found in {sample.count} of {sample.count} frames (colour {_colour(rig)}{hint});"
         " is it in the picture?"
     )
 
 
 def _nothing_measured(path: Path, status: Sequence[str], sample: Sample, rig: Rig) -> str:
     if set(status) <= {"no_mouth", "undecodable"}:
-        return _no_mouth(path, sample, rig)
+        return _no_mark(path, sample, rig)
     causes = ", ".join(f"{cause} in {k}" for cause, k in Counter(status).most_common())
     return f"{path}: none of {len(status)} frames could be measured: {causes}"

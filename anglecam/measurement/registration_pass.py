@@ -1,7 +1,8 @@
-"""The fine pass over a clip: how the head is turned in every frame, from all that is rigid on it.
+"""The fine pass over a clip: the rotation of the body in every frame, by registering all that is rigid on it.
 
-Two more readings of the file: one keeps the frames from which the head is learnt, the other finds its turn in every
-frame, one frame at a time, so that memory does not grow with the clip beyond what `anglecam.video.film` keeps.
+The film is read twice more: one reading keeps the frames from which the body's appearance is learnt, the other finds
+the rotation in every frame, one frame at a time. So memory does not grow with the clip beyond what
+`anglecam.video.film` keeps.
 """
 
 from __future__ import annotations
@@ -23,93 +24,93 @@ from anglecam.vision.registration.tiles import FrameView, choose_tiles, motion_p
 from anglecam.vision.registration.turn import NO_TURN, BodyAppearance, TurnEstimate, find_turn, refine_doubtful_turn
 
 _LEARNT = 120
-"""Frames from which the head is learnt, at most."""
+"""Frames from which the body is learnt, at most."""
 _BYTES = 300_000_000
-"""Memory for them."""
+"""Memory for these frames."""
 _LEAST_LEARNT = 30
-"""And at least, as long as there are so many."""
+"""Frames from which the body is learnt, at least, where the clip has as many."""
 _PER_POSE = 2
-"""Frames of one pose, unless there are too few poses."""
+"""Frames taken of one pose, unless there are too few poses."""
 _POSE = 0.001
-"""Turns closer than this are one pose, rad: a fifth of a pixel at the rim of an ordinary head."""
+"""Rotations closer than this are one pose, rad: a fifth of a pixel at the rim of a body of 200 px."""
 _STACK = 15
-"""Of those, spread evenly over the turns, that are laid over one another to see what is rigid."""
+"""Number of the learnt frames, evenly spaced over the rotations, that are superposed to find the rigid tiles."""
 _FEWEST = 12
-"""A head seen in fewer frames is not learnt."""
+"""A body seen in fewer frames is not learnt."""
 _FEWEST_TILES = 3
 _YIELDING = 0.5
-"""Of `BodyAppearance.absorbed_share`: 0.05 to 0.1 in clips of steps and swings, 0.8 in a nod of 70° with six frames on
+"""Of `BodyAppearance.absorbed_share`: 0.05 to 0.1 in clips of steps and swings, 0.8 in a swing of 70° with six frames on
 the way."""
 _DOUBT_PX = 10.0
-"""How far off a guess may be."""
+"""Largest error of a guessed rotation, px at the mark."""
 _AGREE = 4.0
-"""Times its uncertainty that the coarse angle may typically be off the fine one: beyond, what was learnt is not what
-carries the mouth."""
+"""Limit of the median difference between coarse and fine rotation, in standard uncertainties of the coarse one. Beyond
+it, the body that was learnt is not the one that carries the mark."""
 _ASTRAY = 13.8
-"""99.9 % point of χ² with two degrees of freedom: a centre of rotation farther from where it was expected is none."""
+"""99.9 % point of χ² with two degrees of freedom: a centre of rotation farther from the pivot is rejected."""
 
 
 @dataclass(frozen=True)
 class Start:
-    """Where the coarse measurement has the head; arrays of length n, a frame of the clip each."""
+    """Rotation of the body by the coarse pass; arrays of length n, an entry a frame of the clip."""
 
     turn: Floats
-    """Counter-clockwise as seen, from some reference, rad; NaN where it is not known: such a frame is left alone."""
+    """Counter-clockwise as seen, from an arbitrary reference, rad; NaN where unknown: such a frame is skipped."""
     sigma: Floats
-    """Its standard uncertainty, rad; NaN where the turn is a guess that nothing is learnt from."""
+    """Standard uncertainty of ``turn``, rad; NaN where ``turn`` is a guess, from which nothing is learnt."""
     pivot: PivotEstimate
     """In the plane of motion."""
     pivots_px: Floats
-    """(n, 2) where it is in each frame, where camera or base move, in the plane of motion, px."""
+    """(n, 2) position of the pivot in each frame, in the plane of motion, px; it varies where the camera moves."""
     turn_per_row: Floats
-    """What the head turns while the shutter goes on by a row, rad."""
+    """Rotation of the body during the exposure delay of one row, rad."""
     row: Floats
-    """Row of the picture to whose exposure ``turn`` refers."""
-    wander_px2: Floats | None = None
-    """(n, 2, 2) covariance of ``pivots_px`` against each other, px²; ``None`` where the camera stands still."""
+    """Row of the picture at whose exposure ``turn`` holds."""
+    pivot_covariance_px2: Floats | None = None
+    """(n, 2, 2) covariance of ``pivots_px`` between frames, px²; ``None`` where the camera stands still."""
 
 
 @dataclass(frozen=True)
 class Registered:
-    """The head's turn in every frame; arrays of length n, NaN where it was not found."""
+    """Rotation of the body in every frame; arrays of length n, NaN where it was not found."""
 
     turn: Floats
     """Counter-clockwise as seen, from the reference, rad."""
     noise: Floats
-    """Standard uncertainty from the pixels' noise, rad."""
+    """Standard uncertainty due to the pixels' noise, rad."""
     pose: Floats
-    """Standard uncertainty that all frames share in which the head is at the same place, rad."""
+    """Standard uncertainty shared by all frames of the same pose, rad."""
     pivot_sensitivity: Floats
-    """(n, 2) change of the turn with an error of the pivot, rad/px."""
+    """(n, 2) derivative of the rotation with respect to the pivot's position, rad/px."""
     row: Floats
-    """Row of the picture to whose exposure the turn refers."""
+    """Row of the picture at whose exposure ``turn`` holds."""
     pivot_px: Floats
-    """(2,) centre of rotation as the whole head has it, px."""
+    """(2,) centre of rotation estimated from the whole body, px."""
     pivot_covariance_px2: Floats
     """(2, 2) px²."""
-    look: BodyAppearance
-    """What was learnt."""
+    appearance: BodyAppearance
+    """The appearance that was learnt."""
 
     @property
     def sigma(self) -> Floats:
-        """Standard uncertainty of each turn, rad."""
+        """(n,) standard uncertainty of ``turn``, rad."""
         return np.asarray(np.hypot(self.noise, self.pose))
 
 
 def register_clip(
     film: Film, start: Start, lens: Lens, progress: Callable[[int, int], None] | None = None
 ) -> Registered | str:
-    """Find the head's turn in every frame.
+    """Find the rotation of the body in every frame.
 
-    Where colour is stored at a lower resolution than brightness, brightness alone is looked at: edges of colour then
-    lie up to half a pixel beside it.
+    Where colour is stored at a lower resolution than brightness, only the brightness is used, because edges of colour
+    are then displaced by up to half a pixel.
 
     Parameters
     ----------
     film : Film
         The clip.
     start : Start
-        Where the head is, coarsely.
+        From the coarse pass.
     lens : Lens
         From the picture to the plane of motion.
     progress : callable, optional
@@ -118,74 +119,72 @@ def register_clip(
     Returns
     -------
     Registered or str
-        Why not, in a few words, where the head cannot be registered or is no better for it.
+        The cause, in a few words, where the body cannot be registered or registration is no improvement.
     """
     n, known = len(start.turn), np.flatnonzero(np.isfinite(start.sigma))
     if len(known) < _FEWEST:
-        return f"the mouth is seen in {len(known)} frames only"
+        return f"the mark is seen in {len(known)} frames only"
     plane = motion_plane(lens, film.size)
     planes = 1 if film.coarse_colour else 3
     most = int(np.clip(_BYTES // (planes * film.width * film.height), _FEWEST, _LEARNT))
     wanted = _spread_out(start.turn, known, most)
-    glimpses = [
-        _glimpse(start, frame.index, frame.image)
+    views = [
+        _frame_view(start, frame.index, frame.image)
         for frame in film.frames(brightness=film.coarse_colour)
         if frame.index in wanted and frame.image is not None
     ]
-    by_turn = np.argsort([g.turn for g in glimpses])
+    by_turn = np.argsort([g.turn for g in views])
     stack = by_turn[np.unique(np.linspace(0, len(by_turn) - 1, _STACK).round().astype(int))]
-    tiles = choose_tiles(
-        [glimpses[i] for i in stack], plane, start.pivot.centre_px, pixel_noise([g.image for g in glimpses])
-    )
+    tiles = choose_tiles([views[i] for i in stack], plane, start.pivot.centre_px, pixel_noise([g.image for g in views]))
     if len(tiles.corners) < _FEWEST_TILES:
-        return "too little of the head is rigid and has edges"
-    with threadpool_limits(limits=1, user_api="blas"):  # small systems: threads only wait for one another
-        look = learn_appearance(glimpses, tiles, plane, start.pivot)
-    del glimpses
-    if look.absorbed_share > _YIELDING:
-        return "the head is seen in too few poses, or at too much of a slant, to be learnt"
-    apart = look.pivot_px - start.pivot.centre_px
-    if apart @ np.linalg.solve(look.pivot_covariance_px2 + start.pivot.covariance_px2, apart) > _ASTRAY:
-        return "what is rigid in the picture does not turn about the pivot"
+        return "too little of the body is rigid and has edges"
+    with threadpool_limits(limits=1, user_api="blas"):  # small systems, in which threads only wait for each other
+        appearance = learn_appearance(views, tiles, plane, start.pivot)
+    del views
+    if appearance.absorbed_share > _YIELDING:
+        return "the body is seen in too few poses, or too obliquely, to be learnt"
+    apart = appearance.pivot_px - start.pivot.centre_px
+    if apart @ np.linalg.solve(appearance.pivot_covariance_px2 + start.pivot.covariance_px2, apart) > _ASTRAY:
+        return "the rigid part of the picture does not rotate about the pivot"
     centred = replace(start, pivots_px=start.pivots_px + apart)
     found, rows = [NO_TURN] * n, start.row.copy()
     before: Image | None = None
     for frame in film.frames(brightness=film.coarse_colour):
         i, image = frame.index, frame.image
         if i < n and np.isfinite(start.turn[i]) and image is not None:
-            one = _glimpse(centred, i, image)
+            one = _frame_view(centred, i, image)
             if one.turn_per_row:
-                # at the middle of what is looked at, an error of the speed counts least
-                rows[i] = look.row_of_middle(one)
+                # at the middle of the tiles an error of the speed has the least effect
+                rows[i] = appearance.row_of_middle(one)
                 one = replace(one, turn=one.turn + one.turn_per_row * (rows[i] - one.row), row=rows[i])
             if np.isnan(start.sigma[i]):
-                one = refine_doubtful_turn(look, one, _DOUBT_PX)
-            found[i] = find_turn(look, one, before if frame.predicted else None)
+                one = refine_doubtful_turn(appearance, one, _DOUBT_PX)
+            found[i] = find_turn(appearance, one, before if frame.predicted else None)
         before = image
         if progress is not None:
             progress(i + 1, n)
-    registered = _gathered(found, rows, look)
+    registered = _gathered(found, rows, appearance)
     both = np.isfinite(registered.turn) & np.isfinite(start.sigma)
     if not both.any() or np.median(registered.sigma[both]) > np.median(start.sigma[both]):
-        return "the mouth alone is more certain than the head"
+        return "the mark alone is more certain than the body"
     off = registered.turn[both] - start.turn[both] - (start.turn_per_row * (rows - start.row))[both]
     if np.median(np.abs(off - np.median(off))) > _AGREE * np.median(start.sigma[both]):
-        return "what is rigid in the picture does not turn with the mouth"
+        return "the rigid part of the picture does not rotate with the mark"
     return registered
 
 
-def _glimpse(start: Start, i: int, image: Image) -> FrameView:
-    wander = None if start.wander_px2 is None else start.wander_px2[i]
+def _frame_view(start: Start, i: int, image: Image) -> FrameView:
+    covariance = None if start.pivot_covariance_px2 is None else start.pivot_covariance_px2[i]
     return FrameView(
-        image, float(start.turn[i]), start.pivots_px[i], float(start.turn_per_row[i]), float(start.row[i]), wander
+        image, float(start.turn[i]), start.pivots_px[i], float(start.turn_per_row[i]), float(start.row[i]), covariance
     )
 
 
 def _spread_out(turn: Floats, known: NDArray[np.intp], most: int) -> set[int]:
-    """Choose frames from every pose alike.
+    """Choose frames evenly from all poses.
 
-    Frames at rest all show the head in the same place within the pixels: a look that is learnt from many of them
-    agrees with them wherever they are thought to be, and never finds out how they are turned.
+    All frames at rest show the body at the same position on the pixel grid. An appearance learnt from many of them fits
+    them at any assumed rotation, and so does not determine their rotation.
     """
     mixed = np.random.default_rng(0).permutation(known)
     pose = np.round(turn[mixed] / _POSE).astype(np.int64)
@@ -197,14 +196,14 @@ def _spread_out(turn: Floats, known: NDArray[np.intp], most: int) -> set[int]:
     return set(mixed[np.argsort(rank, kind="stable")[: min(most, enough)]].tolist())
 
 
-def _gathered(found: list[TurnEstimate], rows: Floats, look: BodyAppearance) -> Registered:
+def _gathered(found: list[TurnEstimate], rows: Floats, appearance: BodyAppearance) -> Registered:
     return Registered(
         turn=np.array([one.turn for one in found]),
         noise=np.array([one.noise for one in found]),
         pose=np.array([one.pose for one in found]),
         pivot_sensitivity=np.array([one.pivot_sensitivity for one in found]),
         row=rows,
-        pivot_px=look.pivot_px,
-        pivot_covariance_px2=look.pivot_covariance_px2,
-        look=look,
+        pivot_px=appearance.pivot_px,
+        pivot_covariance_px2=appearance.pivot_covariance_px2,
+        appearance=appearance,
     )

@@ -1,4 +1,4 @@
-"""The coarse pass over a clip without a mouth: a head that turns as one rigid body, a face in profile as it is."""
+"""The coarse pass over a clip without a mark: follow a body that turns rigidly, such as a face in profile."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from anglecam.vision.rigid_body.follow import follow_rigid_body
 
 
 def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
-    """Follow the rigid head in place of a mouth.
+    """Follow the rigid body in place of a mark.
 
     Parameters
     ----------
     film : Film
         The clip.
     rig : Rig
-        What is declared about pivot and camera.
+        Declares pivot and camera.
 
     Returns
     -------
     Detections or str
-        Why not, in a few words.
+        The cause, in a few words, where the body cannot be followed.
 
     Raises
     ------
@@ -38,30 +38,30 @@ def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
     sample = film.sample(frames_to_keep(film))
     images = [f.image for f in sample.frames if f.image is not None]
     noise = pixel_noise(images)
-    head = follow_rigid_body(film.frames(), images, noise)
-    if isinstance(head, str):
-        return head
+    body = follow_rigid_body(film.frames(), images, noise)
+    if isinstance(body, str):
+        return body
     stamps, repeated, before = [], [], None
     for frame in film.frames():
         stamps.append(frame.time)
         same = frame.image is not None and before is not None and np.array_equal(frame.image, before)
         repeated.append(same)
         before = frame.image
-    lever = float(np.hypot(*(head.centre_px - head.pivot_px)))
+    lever = float(np.hypot(*(body.centre_px - body.pivot_px)))
     turned = Circle(
-        head.pivot_px,
+        body.pivot_px,
         lever,
-        head.pivot_scatter_px,
-        np.pad(head.pivot_covariance_px2, (0, 1)) + np.diag([0.0, 0.0, float(np.trace(head.pivot_covariance_px2))]),
+        body.pivot_scatter_px,
+        np.pad(body.pivot_covariance_px2, (0, 1)) + np.diag([0.0, 0.0, float(np.trace(body.pivot_covariance_px2))]),
         np.ones(len(stamps), bool),
     )
     marker, pivot, disagreement = find_pivot(images, rig, turned, lens)
-    if pivot is None or OK not in head.status:
-        return "it hardly turns"
-    notes = ["the rigid head alone is measured, without a mouth", *([disagreement] if disagreement else [])]
+    if pivot is None or OK not in body.status:
+        return "it hardly rotates"
+    notes = ["the rigid body is measured, without a mark", *([disagreement] if disagreement else [])]
     return Detections(
         time=np.array(stamps),
-        status=head.status,
+        status=body.status,
         regions=(None,) * len(stamps),
         smeared=np.zeros(len(stamps), bool),
         pivot=pivot,
@@ -69,8 +69,8 @@ def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
         circle=None,
         moves=True,
         lens=lens,
-        shakes=None,
-        head=head,
+        camera_moves=None,
+        body=body,
         noise=noise,
         repeated=np.array(repeated),
         colour_rgb=None,

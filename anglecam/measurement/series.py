@@ -1,4 +1,4 @@
-"""A recording's angle series from the angles of those of its frames that were measured."""
+"""Arrange the angles of the measured frames as a series of all frames."""
 
 from __future__ import annotations
 
@@ -26,56 +26,59 @@ def series_of_angles(
     rig: Rig,
     evidence: CameraEvidence,
 ) -> AngleSeries:
-    """Lay the measured frames among all the recording's frames.
+    """Return a series of all the recording's frames, with the measured angles in place.
 
     Parameters
     ----------
     name : str
-        The recording's.
+        The recording's name.
     time : ndarray
         (frames,) s.
     status : sequence of str
-        Of every frame; one that is not ``ok`` stays empty, measured or not.
+        Of every frame; a frame that is not ``ok`` stays empty, even if it was measured.
     ok : ndarray
-        (frames,) to which of them ``angles`` belong.
+        (frames,) the n frames that ``angles`` belong to.
     angles : Angles
-        Of those n frames.
+        Of these n frames.
     mark_px, pivot_px : ndarray
-        (frames, 2) where the picture shows them, px.
+        (frames, 2) positions in the picture, px.
     rig : Rig
-        Whose ``pixel_error_px`` the bounds are worked out for, besides the contract's.
+        Declares ``pixel_error_px``, the radii of further bounds besides 6 px and 10 px.
     evidence : CameraEvidence
-        What the film shows besides.
+        What the film shows besides the angle.
 
     Returns
     -------
     AngleSeries
         A row a frame.
     """
-    told = np.array([s == OK for s in status])
+    measured = np.array([s == OK for s in status])
 
-    def among(values: Floats) -> Floats:
-        laid = np.full(len(told), np.nan)
-        laid[ok] = values
-        return np.where(told, laid, np.nan)
+    def in_all_frames(values: Floats) -> Floats:
+        placed = np.full(len(measured), np.nan)
+        placed[ok] = values
+        return np.where(measured, placed, np.nan)
 
-    lines, levers = among(angles.line), among(angles.lever_px)
+    lines, levers = in_all_frames(angles.line), in_all_frames(angles.lever_px)
     return AngleSeries(
         name=name,
         time=time,
         angle=lines - angles.neutral,
-        sigma=among(angles.sigma),
+        sigma=in_all_frames(angles.sigma),
         status=tuple(status),
         line=lines,
-        mark_px=np.where(told[:, None], mark_px, np.nan),
-        pivot_px=np.where(told[:, None], pivot_px, np.nan),
+        mark_px=np.where(measured[:, None], mark_px, np.nan),
+        pivot_px=np.where(measured[:, None], pivot_px, np.nan),
         evidence=evidence,
         bounds={r: worst_case(r, levers) for r in {*CONTRACT_RADII_PX, *rig.pixel_error_px}},
     )
 
 
 def why_zero_is_elsewhere(rig: Rig, command: Command | None, time: Floats) -> str | None:
-    """Say in a line that zero is not where it should be, ``None`` where it is; ``time`` (n,) of measured frames, s."""
+    """Return a message where zero is not the rest before the first command change, ``None`` where it is.
+
+    ``time`` holds the times of the measured frames, s.
+    """
     change = None if command is None or rig.neutral != "auto" else command.first_change()
     if change is None or (time < change).any():
         return None

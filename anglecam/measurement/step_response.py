@@ -1,9 +1,9 @@
-"""Rise, overshoot and settling of measured motion, from one rest to the next, robot or human alike.
+"""Rise time, overshoot and settling time of measured motion, from one rest to the next.
 
-The figures are MATLAB's ``stepinfo`` on data: rise from 10 % to 90 % of the way, overshoot beyond the level where the
-motion comes to rest as a share of the way, settling to within 2 % of the way for good. A film has a frame every so
-often, so the angle is read between frames from a smoothing spline that stays within the noise (Reinsch 1967); each
-figure's uncertainty is what noise makes of it (Monte Carlo, GUM Supplement 1) and what another spline would have said.
+The figures are those of MATLAB's ``stepinfo``: rise from 10 % to 90 % of the step, overshoot beyond the final rest as a
+share of the step, settling to within 2 % of the step for good. Between frames the angle is interpolated by a smoothing
+spline that stays within the noise (Reinsch 1967). Each figure's uncertainty combines the propagated noise (Monte Carlo,
+GUM Supplement 1) and the difference that another spline makes.
 """
 
 from __future__ import annotations
@@ -21,47 +21,47 @@ from anglecam.data.step_figures import HIGH, LOW, SETTLED, first_crossing, last_
 from anglecam.data.typing import Floats
 
 _STILL_SIGMAS, _STILL_SHARE = 3.0, 0.005
-"""Half-width of the band that a rest stays in: times sigma, of the clip's whole range; the larger holds."""
+"""Half-width of the band of a rest: multiple of sigma, or share of the clip's range, whichever is larger."""
 _FLAT = 0.5
-"""Of that half-width, by which the means of a rest's three parts may differ."""
+"""Share of that half-width by which the means of a rest's three parts may differ."""
 _LEAST_REST_S, _LEAST_REST_FRAMES = 0.1, 5
 _LEAST_WAY = 6.0
-"""Half-widths of that band; a shorter way between two rests is no response."""
+"""Half-widths of that band; a smaller step between two rests is no response."""
 _GAP_FRAMES = 3.5
-"""Frame intervals without a measurement from which on what happened in them is not known."""
+"""Frame intervals without a measurement beyond which the motion in between is unknown."""
 _DRAWS = 100
 _MARGIN_FRAMES = 60
-"""Of either rest that the spline sees."""
+"""Frames of either rest that the spline is fitted to."""
 _PER_FRAME = 32
-"""Points between two frames at which a curve is looked at."""
+"""Points between two frames at which a curve is evaluated."""
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A number read off a response."""
+    """A quantity of a response."""
 
     value: float
-    """NaN where frames that tell it are missing."""
+    """NaN where the frames that determine it are missing."""
     sigma: float
     """Standard uncertainty."""
 
 
 @dataclass(frozen=True)
 class Response:
-    """The way from one rest to another."""
+    """The motion from one rest to another."""
 
     start: Figure
-    """When it begins, s: the command's change where that is known, else when the angle leaves the rest by 2 %."""
+    """Start, s: the command's change where it is known, else the time at which the angle leaves the rest by 2 %."""
     from_angle: Figure
-    """Level of the rest before, rad."""
+    """Angle of the rest before, rad."""
     to_angle: Figure
-    """Level of the rest after: the steady state, rad."""
+    """Angle of the rest after, the steady state, rad."""
     rise_time: Figure
-    """From 10 % to 90 % of the way, s."""
+    """From 10 % to 90 % of the step, s."""
     overshoot: Figure
-    """Farthest beyond ``to_angle`` as a share of the way, not below 0."""
+    """Largest excursion beyond ``to_angle`` as a share of the step, not below 0."""
     settling_time: Figure
-    """From ``start`` until the angle stays within 2 % of the way of ``to_angle``, s."""
+    """From ``start`` until the angle stays within 2 % of the step around ``to_angle``, s."""
     peak_speed: Figure
     """Greatest angular speed towards ``to_angle``, rad/s."""
 
@@ -75,10 +75,10 @@ class _Rest:
 
 
 def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[float] = ()) -> tuple[Response, ...]:
-    """Find every way from one rest to another, and its figures.
+    """Find every motion from one rest to another, and its figures.
 
-    A rest is a stretch that stays in a narrow band and neither bends nor creeps in it, and lasts at least as long as
-    the rises before and after it: a turning point of a swing and a pause on the way are none.
+    A rest is an interval in which the angle stays in a narrow band without curvature or drift, and which lasts at least
+    as long as the rises before and after it. A turning point of a swing and a short pause are not rests.
 
     Parameters
     ----------
@@ -87,10 +87,11 @@ def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[floa
     angle : ndarray
         (n,) rad; NaN where it was not measured.
     sigma : ndarray
-        (n,) standard uncertainty, rad; where it is NaN throughout, it is taken from the angle's own roughness.
+        (n,) standard uncertainty, rad; where it is NaN, it is estimated from the angle's second differences.
     changes : sequence of float
-        Times at which a command changed, s, where they are known: a response then begins at the last one before the
-        angle leaves its rest, and a way on which it changed again is no response to one change and is left out.
+        Times at which a command changed, s, where they are known. A response then begins at the last change before the
+        angle leaves its rest. A motion during which the command changed again is no response to one change and is
+        left out.
 
     Returns
     -------
@@ -106,41 +107,41 @@ def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[floa
     rests = _lasting(_distinct(_rests(t, y, s, band), t, y, band), t, y, band)
     found, frame = [], float(np.median(np.diff(t)))
     for before, after in pairwise(rests):
-        # what acts late is answered late: the angle may stay at rest for a while after the change that moves it
+        # with a delay the angle stays at rest for a while after the change that moves it
         away = np.abs(y[before.last : after.first + 1] - before.level) > 2.0 * band
         leaves = t[before.last + int(np.argmax(away))]
-        meant = [c for c in changes if t[before.first] <= c <= leaves]
+        causes = [c for c in changes if t[before.first] <= c <= leaves]
         again = any(leaves < c < t[after.first] for c in changes)
         if abs(after.level - before.level) >= _LEAST_WAY * band and not again:
-            found.append(_response(t, y, s, before, after, meant[-1] if meant else None, frame))
+            found.append(_response(t, y, s, before, after, causes[-1] if causes else None, frame))
     return tuple(found)
 
 
 def responses_as_dicts(answers: Sequence[Response]) -> list[dict[str, dict[str, float]]]:
-    """Return what ``NAME.responses.json`` holds, angles in degrees; overshoot is a share."""
+    """Return the content of ``NAME.responses.json``: angles in degrees, overshoot as a share."""
     in_degrees = {"from_angle": "from_deg", "to_angle": "to_deg", "peak_speed": "peak_speed_deg_per_s"}
     in_seconds = {"start": "start_s", "rise_time": "rise_time_s", "settling_time": "settling_time_s"}
 
-    def told(answer: Response, name: str, factor: float) -> dict[str, float]:
-        figure: Figure = getattr(answer, name)
-        return {"value": factor * figure.value, "sigma": factor * figure.sigma}
+    def figure(answer: Response, name: str, factor: float) -> dict[str, float]:
+        quantity: Figure = getattr(answer, name)
+        return {"value": factor * quantity.value, "sigma": factor * quantity.sigma}
 
     return [
-        {key: told(answer, name, 1.0) for name, key in in_seconds.items()}
-        | {key: told(answer, name, 180.0 / np.pi) for name, key in in_degrees.items()}
-        | {"overshoot": told(answer, "overshoot", 1.0)}
+        {key: figure(answer, name, 1.0) for name, key in in_seconds.items()}
+        | {key: figure(answer, name, 180.0 / np.pi) for name, key in in_degrees.items()}
+        | {"overshoot": figure(answer, "overshoot", 1.0)}
         for answer in answers
     ]
 
 
 def _roughness(y: Floats) -> float:
-    """Estimate white noise from second differences, which a smooth motion hardly has."""
+    """Estimate white noise from second differences, which are small for a smooth motion."""
     second = np.diff(y, 2)
     return max(1.4826 * float(np.median(np.abs(second - np.median(second)))) / np.sqrt(6.0), 1e-9)
 
 
 def _rests(t: Floats, y: Floats, s: Floats, band: float) -> list[_Rest]:
-    """List stretches that stay within ±band and are flat, the longest first chosen, in order of time."""
+    """List the flat intervals within ±band, the longest chosen first, in order of time."""
     frame = float(np.median(np.diff(t)))
     parts = [_flat_part(y, first, last, band) for first, last in _windows(t, y, band, _GAP_FRAMES * frame)]
     lasting = [p for p in parts if p[1] - p[0] + 1 >= _LEAST_REST_FRAMES and t[p[1]] - t[p[0]] >= _LEAST_REST_S]
@@ -150,10 +151,10 @@ def _rests(t: Floats, y: Floats, s: Floats, band: float) -> list[_Rest]:
             taken.append((first, last))
     rests = []
     for first, last in sorted(taken):
-        # its first half may still hold the last of a swing
+        # its first half may still contain the end of a swing
         settled = slice((first + last) // 2, last + 1)
         count = settled.stop - settled.start
-        # a median, since its last frames may be on the way already
+        # a median, because its last frames may belong to the next motion
         level = float(np.median(y[settled]))
         scatter = max(1.4826 * float(np.median(np.abs(y[settled] - level))), float(np.median(s[settled])))
         rests.append(_Rest(first, last, level, scatter * np.sqrt(0.5 * np.pi / count)))
@@ -161,7 +162,7 @@ def _rests(t: Floats, y: Floats, s: Floats, band: float) -> list[_Rest]:
 
 
 def _flat_part(y: Floats, first: int, last: int, band: float) -> tuple[int, int]:
-    """Cut off one end until what is left neither bends, as a turning point does, nor creeps, as a slow ramp."""
+    """Cut off one end until the rest has neither the curvature of a turning point nor the drift of a slow ramp."""
     for cut in np.linspace(0.0, 0.75, 13):
         off = round(cut * (last - first))
         for a, b in ((first + off, last), (first, last - off)):
@@ -173,7 +174,7 @@ def _flat_part(y: Floats, first: int, last: int, band: float) -> tuple[int, int]
 
 
 def _windows(t: Floats, y: Floats, band: float, gap: float) -> list[tuple[int, int]]:
-    """Return, for every first row, the last one up to which the angle's range is within 2·band; none twice."""
+    """Return the longest intervals of rows in which the angle's range is within 2·band."""
     windows: list[tuple[int, int]] = []
     low: deque[int] = deque()
     high: deque[int] = deque()
@@ -202,7 +203,7 @@ def _windows(t: Floats, y: Floats, band: float, gap: float) -> list[tuple[int, i
 
 
 def _distinct(rests: list[_Rest], t: Floats, y: Floats, band: float) -> list[_Rest]:
-    """Of two rests with nothing but the last of a swing between them keep the longer: the other is a turning point."""
+    """Of two rests with only the end of a swing between them keep the longer: the other is a turning point."""
     kept: list[_Rest] = []
     for rest in rests:
         kept.append(rest)
@@ -212,11 +213,11 @@ def _distinct(rests: list[_Rest], t: Floats, y: Floats, band: float) -> list[_Re
 
 
 def _lasting(rests: list[_Rest], t: Floats, y: Floats, band: float) -> list[_Rest]:
-    """Leave out pauses: what is shorter than the rise before or after it is no rest."""
+    """Remove pauses: an interval shorter than the rise before or after it is no rest."""
     while len(rests) > 1:
         rises = [_rough_rise(t, y, a, b, band) for a, b in pairwise(rests)]
-        beside = [max(pair) for pair in pairwise([0.0, *rises, 0.0])]
-        lasting = [(t[r.last] - t[r.first]) / max(rise, 1e-9) for r, rise in zip(rests, beside, strict=True)]
+        neighbours = [max(pair) for pair in pairwise([0.0, *rises, 0.0])]
+        lasting = [(t[r.last] - t[r.first]) / max(rise, 1e-9) for r, rise in zip(rests, neighbours, strict=True)]
         if min(lasting) >= 1.0:
             break
         del rests[int(np.argmin(lasting))]
@@ -227,7 +228,7 @@ def _rough_rise(t: Floats, y: Floats, before: _Rest, after: _Rest, band: float) 
     rows = slice(before.last, after.first + 1)
     way = after.level - before.level
     if abs(way) < 2.0 * band:
-        # out and back again: neither rise can be longer than half of it
+        # out and back: neither rise can be longer than half the interval
         return 0.5 * float(t[after.first] - t[before.last])
     share = (y[rows] - before.level) / way
     return first_crossing(t[rows], share, HIGH) - first_crossing(t[rows], share, LOW)
@@ -242,10 +243,10 @@ def _response(
     levels = before.level, after.level
     curve = _smooth(t, y, s)
     figures = _read(curve, grid, levels, begun)
-    # what lies between frames is guessed; a spline's error where the acceleration jumps goes with the square of the
-    # interval, so every second frame errs by three times as much more (Richardson 1911)
+    # between frames the curve is interpolated; where the acceleration jumps, a spline's error grows with the square of
+    # the interval, so that with every second frame it is larger by three times its value (Richardson 1911)
     halves = [_read(_smooth(t[k::2], y[k::2], s[k::2]), grid, levels, begun) for k in (0, 1)]
-    guess = np.sqrt(np.mean([((half - figures) / 3.0) ** 2 for half in halves], axis=0))
+    interpolation = np.sqrt(np.mean([((half - figures) / 3.0) ** 2 for half in halves], axis=0))
     rng = np.random.default_rng(0)
     drawn = np.array(
         [
@@ -261,13 +262,13 @@ def _response(
             for _ in range(_DRAWS)
         ]
     )
-    # a smoothed rise is slower than the rise: what that does to the curve again, it has done to it once
-    sigma = np.sqrt(drawn.var(axis=0) + (drawn.mean(axis=0) - figures) ** 2 + guess**2)
+    # smoothing slows a rise: the bias of smoothing the curve a second time estimates that of the first
+    sigma = np.sqrt(drawn.var(axis=0) + (drawn.mean(axis=0) - figures) ** 2 + interpolation**2)
     start, low, high, settled = figures[:4]
     gaps = np.flatnonzero(np.diff(t) > _GAP_FRAMES * frame)
     blind = [(t[g], t[g + 1]) for g in gaps]
 
-    def told(value: float, error: float, needs: Sequence[float], whole: bool = False) -> Figure:
+    def figure(value: float, error: float, needs: Sequence[float], whole: bool = False) -> Figure:
         ends = min(needs), max(needs)
         lost = (
             any(a < ends[1] and b > ends[0] for a, b in blind)
@@ -277,26 +278,26 @@ def _response(
         return Figure(np.nan, np.nan) if lost else Figure(float(value), float(error))
 
     return Response(
-        start=told(start, sigma[0], [start]),
+        start=figure(start, sigma[0], [start]),
         from_angle=Figure(before.level, before.sigma),
         to_angle=Figure(after.level, after.sigma),
-        rise_time=told(high - low, sigma[4], [low, high]),
-        overshoot=told(figures[5], sigma[5], [high, settled, t[-1]], whole=True),
-        settling_time=told(settled - start, sigma[6], [start, settled]),
-        peak_speed=told(figures[7], sigma[7], [low, high], whole=True),
+        rise_time=figure(high - low, sigma[4], [low, high]),
+        overshoot=figure(figures[5], sigma[5], [high, settled, t[-1]], whole=True),
+        settling_time=figure(settled - start, sigma[6], [start, settled]),
+        peak_speed=figure(figures[7], sigma[7], [low, high], whole=True),
     )
 
 
 def _smooth(t: Floats, y: Floats, s: Floats) -> UnivariateSpline:
-    """Fit the smoothest spline that leaves the noise over."""
+    """Fit the smoothest spline whose residual is the noise."""
     with warnings.catch_warnings():
-        # where the noise was overrated the spline stops short of it, which is well
+        # where the noise was overestimated the spline stops before reaching it, which is harmless
         warnings.simplefilter("ignore", UserWarning)
         return UnivariateSpline(t, y, w=1.0 / s, s=len(t))
 
 
 def _read(curve: UnivariateSpline, grid: Floats, levels: tuple[float, float], begun: float | None) -> Floats:
-    """Read start, 10 %, 90 %, settled (s), rise, overshoot, settling and peak speed off a curve."""
+    """Return start, 10 %, 90 %, settled (s), rise, overshoot, settling and peak speed of a curve."""
     way = levels[1] - levels[0]
     share = (curve(grid) - levels[0]) / way
     low, high = first_crossing(grid, share, LOW), first_crossing(grid, share, HIGH)

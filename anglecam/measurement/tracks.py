@@ -1,7 +1,7 @@
-"""From two tracked points to the angle in every frame: other eyes than ours, the same angle.
+"""Measure the angle in every frame from two points that another program has tracked.
 
-Zero, direction, bounds and how errors travel are those of `anglecam.measurement.angles`; only the places and what is known of
-their errors are made here.
+Zero, sign, bounds and the propagation of errors are those of `anglecam.measurement.angles`. Only the positions and the
+estimate of their errors are specific to tracks.
 """
 
 from __future__ import annotations
@@ -30,42 +30,42 @@ from anglecam.video.film import Film
 from anglecam.vision.pivot.estimate import PivotEstimate
 
 _SHORTEST_PX = 1.0
-"""A lever shorter than this has no direction worth the name."""
+"""A shorter lever has no meaningful direction."""
 _LEAST_FRAMES = 3
 _LEAST_TRIPLES = 10
-"""Fewer second differences than this tell no scatter."""
+"""Fewest second differences from which a scatter is estimated."""
 _FAR = 4.0
-"""Standard deviations beyond which a frame's own distance from the pivot says how wrong it is."""
+"""Standard deviations beyond which a frame's distance from the pivot counts as its error."""
 
 
 @dataclass(frozen=True)
 class MeasuredTracks:
-    """What tracks of points gave."""
+    """The result of measuring tracks of points."""
 
     series: AngleSeries
     angles: Angles
-    """The measured frames, and what their uncertainties are made of."""
+    """The measured frames, and the contributions to their uncertainty."""
     by: str
-    """What the angles were read off."""
+    """Object that the angles were measured on."""
     notes: tuple[str, ...]
-    """What the user should know, a line each."""
+    """Messages to the user, a line each."""
     truncated: str | None = None
-    """What of the film could not be read."""
+    """How much of the film could be read, where it ends too early."""
 
     @property
     def pivot(self) -> str:
-        """Where the pivot's place comes from."""
+        """Source of the pivot's position."""
         return self.angles.pivot.source
 
     @property
     def contours_px(self) -> tuple[None, ...]:
-        """No frame has an outline: points have none."""
+        """One ``None`` a frame: points have no outline."""
         return (None,) * len(self.series.time)
 
 
 @dataclass(frozen=True)
 class _Points:
-    """Mouth and pivot in every frame of the film."""
+    """Mark and pivot in every frame of the film."""
 
     mark_px: Floats
     """(frames, 2) NaN where missing."""
@@ -74,53 +74,53 @@ class _Points:
     time: Floats
     """(frames,) s."""
     size: tuple[int, int] | None
-    """Of the picture; ``None`` where the film is not there."""
+    """Width and height of the picture, px; ``None`` without the film."""
     by: str
     notes: tuple[str, ...]
 
 
 def measure_tracks(path: Path, rig: Rig, command: Command | None = None, *, film: Film | None = None) -> MeasuredTracks:
-    """Measure the nodding angle in every frame from two tracked points.
+    """Measure the angle in every frame from two tracked points.
 
     Parameters
     ----------
     path : Path
-        DeepLabCut's or SLEAP's file.
+        A file of tracks, in a format of `anglecam.io.tracks`.
     rig : Rig
-        Whose ``marks`` name the points; facing, neutral, camera and bounds count as for a clip.
+        Its ``marks`` name the points; facing, neutral, camera and bounds are used as for a clip.
     command : Command, optional
-        What was commanded; its first change ends the rest that defines neutral.
+        Its first change ends the rest that defines neutral.
     film : Film, optional
         The clip that the tracks were made from; its frames date the rows.
 
     Returns
     -------
     MeasuredTracks
-        The series has a row for every frame of the clip beside the tracks, else of the tracks.
+        Its series has a row for every frame of the film, without a film of the tracks.
 
     Raises
     ------
     InputError
-        Where the file cannot be used, lacks a point, or nothing says when its frames were taken.
+        Where the file cannot be used, lacks a point, or nothing dates its frames.
     RigError
-        Where the rig does not say which points are mouth and pivot.
+        Where the rig does not declare which points are mark and pivot.
     """
     marks, points = _read_points(path, rig, film)
-    mouth, pivot, size = points.mark_px, points.pivot_px, points.size
-    seen, based = np.isfinite(mouth[:, 0]), np.isfinite(pivot[:, 0])
+    mark, pivot, size = points.mark_px, points.pivot_px, points.size
+    seen, based = np.isfinite(mark[:, 0]), np.isfinite(pivot[:, 0])
     ok = seen & based
     lens = lens_from_rig(rig, size or (1, 1), path).looking_at(np.median(pivot[ok], axis=0))
-    mouth_in_plane, pivot_in_plane = lens.rectify(mouth), lens.rectify(pivot)
+    mark_in_plane, pivot_in_plane = lens.rectify(mark), lens.rectify(pivot)
     fixed = _fixed_pivot(pivot_in_plane, ok, marks.pivot)
-    arm = mouth_in_plane - (pivot_in_plane if fixed is None else fixed.centre_px)
+    arm = mark_in_plane - (pivot_in_plane if fixed is None else fixed.centre_px)
     ok[ok] = np.hypot(*arm[ok].T) >= _SHORTEST_PX
     if ok.sum() < _LEAST_FRAMES:
         raise InputError(f"{path}: {marks.mouth} and {marks.pivot} lie in the same place; there is no angle")
     status = [_cause(*row) for row in zip(ok, seen, based, strict=True)]
-    time = points.time if size is None else measurement_time(points.time, mouth[:, 1], size[1], rig.camera.row_time_s)
-    # A pivot that moves carries the mouth along: as seen from it, the mouth turns about one place.
+    time = points.time if size is None else measurement_time(points.time, mark[:, 1], size[1], rig.camera.row_time_s)
+    # a moving pivot carries the mark along; relative to it, the mark rotates about a fixed point
     about = fixed or _moving_pivot(pivot_in_plane[ok], marks.pivot)
-    errors = _place_errors(arm[ok], np.flatnonzero(ok), float(np.abs(mouth[ok]).max()))
+    errors = _place_errors(arm[ok], np.flatnonzero(ok), float(np.abs(mark[ok]).max()))
     angles = angles_of_places(arm[ok] + about.centre_px, about, errors, lens, time[ok], rig, command)
     shown, marker = pivot, None
     if fixed is not None:
@@ -128,24 +128,26 @@ def measure_tracks(path: Path, rig: Rig, command: Command | None = None, *, film
         shown = np.broadcast_to((x, y), pivot.shape)
         marker = (float(x), float(y)) if lens.calibration is None else None
     evidence = CameraEvidence(picture_px=size, marker_px=marker, from_mark=True)
-    series = series_of_angles(recording_name(path), time, status, ok, angles, mouth, shown, rig, evidence)
+    series = series_of_angles(recording_name(path), time, status, ok, angles, mark, shown, rig, evidence)
     zero = why_zero_is_elsewhere(rig, command, time[ok])
     return MeasuredTracks(series, angles, points.by, (*points.notes, *([zero] if zero else [])))
 
 
 def _read_points(path: Path, rig: Rig, film: Film | None) -> tuple[RigKeypoints, _Points]:
-    """Read the two points that the rig names, in as many frames as the film has."""
+    """Read the two points that the rig names, for every frame of the film."""
     tracks, marks = read_tracks(path), rig.marks
     if marks is None:
         known = ", ".join(tracks.keypoints)
-        raise RigError(f"{path}: which of {known} is which? marks: {{mouth: …, pivot: …}} in rig.yaml says it")
+        raise RigError(
+            f"{path}: declare which of {known} are mark and pivot: marks: {{mouth: …, pivot: …}} in rig.yaml"
+        )
     least = tracks.usual_limit if marks.least_likelihood is None else marks.least_likelihood
     pair = choose_pair(tracks, marks.mouth, marks.pivot, least)
     rows = len(pair.mark_px)
     both = int(np.isfinite(pair.mark_px + pair.pivot_px).all(axis=1).sum())
     if both < _LEAST_FRAMES:
         raise InputError(
-            f"{path}: {marks.mouth} and {marks.pivot} are both there in {both} of {rows} frames only (likelihood at"
+            f"{path}: {marks.mouth} and {marks.pivot} are both present in only {both} of {rows} frames (likelihood at"
             f" least {least:g})"
         )
     notes = [] if pair.followed is None else [pair.followed]
@@ -155,22 +157,22 @@ def _read_points(path: Path, rig: Rig, film: Film | None) -> tuple[RigKeypoints,
         undecodable = film.undecodable
         if rows > len(time):
             raise InputError(
-                f"{path}: {rows} frames, but {film.path.name} has {len(time)}: it was not made from this clip"
+                f"{path}: {rows} frames, but {film.path.name} has {len(time)}: the tracks were not made from this clip"
             )
         if undecodable:
-            notes.append(f"{undecodable} frames of {film.path.name} cannot be decoded; {path.name} may count past them")
+            notes.append(f"{undecodable} frames of {film.path.name} cannot be decoded; {path.name} may not count them")
     elif marks.rate_hz is None:
         raise InputError(
-            f"{path}: nothing says when its frames were taken: put the clip {recording_name(path)}.… beside it, or"
+            f"{path}: its frames have no times: put the clip {recording_name(path)}.… in the same folder, or declare"
             " marks: {rate_hz: …} in rig.yaml"
         )
     elif rig.camera.calibration is not None or rig.camera.row_time_s is not None:
-        raise InputError(f"{path}: calibration and row_time_s need the clip beside the tracks; its size is not known")
+        raise InputError(f"{path}: calibration and row_time_s need the clip in the folder of the tracks, for its size")
     else:
         time = np.arange(rows) / marks.rate_hz
     missing = ((0, len(time) - rows), (0, 0))
-    mouth, pivot = (np.pad(places, missing, constant_values=np.nan) for places in (pair.mark_px, pair.pivot_px))
-    return marks, _Points(mouth, pivot, time, size, f"{marks.mouth} ({tracks.software})", tuple(notes))
+    mark, pivot = (np.pad(places, missing, constant_values=np.nan) for places in (pair.mark_px, pair.pivot_px))
+    return marks, _Points(mark, pivot, time, size, f"{marks.mouth} ({tracks.software})", tuple(notes))
 
 
 def _cause(ok: bool, seen: bool, based: bool) -> str:
@@ -182,11 +184,10 @@ def _cause(ok: bool, seen: bool, based: bool) -> str:
 
 
 def _fixed_pivot(pivot_px: Floats, there: Flags, name: str) -> PivotEstimate | None:
-    """Return the median of a pivot that moves less than it scatters, ``None`` of one that moves more.
+    """Return the median of a pivot that moves less than it scatters, ``None`` for one that moves more.
 
-    What varies slowly is motion, or the tracker's own wandering; what differs from frame to frame is scatter. The
-    median errs by the slow part, which no number of frames averages out, and by the share of the fast part that is
-    left over.
+    The slow variation is motion or drift of the tracker; the difference from frame to frame is scatter. The median's
+    error is the slow part, which does not average out, and the remaining share of the fast part.
     """
     places, frames = pivot_px[there], np.flatnonzero(there)
     fast = np.array([_fast(axis, frames) for axis in places.T])
@@ -198,35 +199,35 @@ def _fixed_pivot(pivot_px: Floats, there: Flags, name: str) -> PivotEstimate | N
 
 
 def _moving_pivot(pivot_px: Floats, name: str) -> PivotEstimate:
-    """Return the middle of a moving pivot's places; its scatter is in the lever's, frame by frame."""
+    """Return the median position of a moving pivot; its scatter is part of the lever's in each frame."""
     return PivotEstimate(np.median(pivot_px, axis=0), np.zeros((2, 2)), f"{name}, moving")
 
 
 def _place_errors(arm_px: Floats, frames: NDArray[np.intp], farthest_px: float) -> PlaceErrors:
-    """Tell how well the mouth is placed, from what cannot be motion.
+    """Estimate the error of the mark's position from its distance to the pivot, which motion does not change.
 
-    No motion alters the distance from pivot to mouth: all of its scatter is error. The part of it that differs from
-    frame to frame (second differences, ÷√6 for independent errors) is noise; the rest changes slowly and goes with
-    the pose. Both are taken to be as large along the path as they are along the lever. Where second differences along
-    the path, in which noise and motion add up, are smaller still, these are the noise.
+    All scatter of that distance is error. The part that differs from frame to frame (second differences, divided by √6
+    for independent errors) is noise; the rest changes slowly and depends on the pose. Both are assumed to be as large
+    along the path as along the lever. Where second differences along the path, to which noise and motion both
+    contribute, are smaller still, they are used as the noise.
 
-    It is an uncertainty of what varies. It knows nothing of a constant offset between a point and the part of the body
-    that it is meant to be, which turns all lines alike and cancels against neutral as long as the offset turns along;
-    nor of errors along the path alone, such as blur in fast motion.
+    This is the uncertainty of the varying part. It does not include a constant offset between a point and the part of
+    the body that it stands for: that offset rotates all lines equally and cancels against neutral as long as it rotates
+    with the body. Nor does it include errors along the path alone, such as blur in fast motion.
 
     Parameters
     ----------
     arm_px : ndarray
-        (n, 2) from the pivot to the mouth, px.
+        (n, 2) from the pivot to the mark, px.
     frames : ndarray
-        (n,) numbers of those frames.
+        (n,) numbers of these frames.
     farthest_px : float
-        Largest coordinate: trackers write single precision, and no place is known better than that.
+        Largest coordinate, px: trackers write single precision, which limits the resolution of a position.
 
     Returns
     -------
     PlaceErrors
-        A frame whose distance is far off is as wrong as that.
+        A frame whose distance is far off has that deviation as its error.
     """
     lever = np.hypot(*arm_px.T)
     out = lever - np.median(lever)
@@ -240,13 +241,13 @@ def _place_errors(arm_px: Floats, frames: NDArray[np.intp], farthest_px: float) 
 
 
 def _spread(values: Floats) -> float:
-    """Return half the way from the 5th to the 95th percentile as the standard deviation of a normal distribution."""
+    """Estimate a normal distribution's standard deviation from the 5th and the 95th percentile."""
     low, high = np.percentile(values, (5.0, 95.0))
     return float(high - low) / 3.2897
 
 
 def _fast(values: Floats, frames: NDArray[np.intp]) -> float:
-    """Return the standard deviation of what is independent from frame to frame, by frames that follow each other."""
+    """Estimate the standard deviation of the part independent from frame to frame, from consecutive frames."""
     neighbours = (frames[2:] - frames[:-2]) == 2
     if neighbours.sum() < _LEAST_TRIPLES:
         return _spread(values)

@@ -1,1 +1,1 @@
-"""Films as files: frames with their own timestamps, read forward, and the overlay written back."""
+"""Films: frames with their time stamps, read forward, and the overlay that is written."""

@@ -30,8 +30,8 @@ LONGEST_S = 7 * 24 * 3600.0
 MOST_STREAMS = 64
 """A camera writes a few: pictures, sound, time code, its motion."""
 _OPENING_BYTES = 768 * 2**20
-"""Memory that opening may take. FFmpeg builds a film's whole index at once, and its entries may cost no byte in the file.
-The index of `MOST_FRAMES` takes 80 MB; the rest is for the first pictures, which FFmpeg decodes to learn their format."""
+"""Memory that opening may take. FFmpeg builds a film's whole index at once, and an entry may cost no byte in the file.
+The index of `MOST_FRAMES` takes 80 MB; the rest is for the first pictures, which FFmpeg decodes to learn the format."""
 _ONE_AT_A_TIME = threading.Lock()
 """The memory limit holds for the process: a second thread would mistake the first one's limit for the original."""
 _CONTAINERS = "avi,matroska,webm,mov,mp4,asf,flv,mpegts,mpeg,ogg,nut,mxf"

@@ -57,7 +57,7 @@ def decode(path: Path) -> Iterator[Row]:
         first: int | None = None
         last: int | None = None
         delay: int | None = None
-        size = stream.width, stream.height  # the decoder's own change when a film changes in the middle
+        size = stream.width, stream.height  # saved, because the decoder's change when the film does
         other: tuple[int, int] | None = None
 
         def row(pts: int, picture: av.VideoFrame | None) -> tuple[float, av.VideoFrame | None]:

@@ -1,4 +1,4 @@
-"""The clip again with what was measured drawn into it, so that an eye can judge."""
+"""The clip with the measured angle drawn into it, for a check by eye."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from anglecam.io.files import write_whole
 from anglecam.video.film import Film, Frame
 
 RADII_PX = (6.0, 10.0)
-"""Circles of the paper's pixel errors about the mouth."""
+"""Radii of the circles around the mark: the paper's pixel errors."""
 _TICKS = 90_000
-"""Per second; holds 24, 25, 30, 29.97, 60 Hz and milliseconds exactly."""
+"""Per second; represents 24, 25, 30, 29.97, 60 Hz and milliseconds exactly."""
 _SHIFT = 4
 """Fractional bits of cv2's drawing coordinates."""
 _LINE, _CONTOUR, _CIRCLES, _BAD = (255, 220, 0), (0, 255, 0), (0, 220, 255), (60, 60, 255)
 
 
 class Measured(Protocol):
-    """What an overlay shows: an angle series, and the outline from which each place was read."""
+    """The content of an overlay: an angle series, and the outline that each position was measured on."""
 
     @property
     def series(self) -> AngleSeries:
@@ -35,20 +35,20 @@ class Measured(Protocol):
 
     @property
     def contours_px(self) -> Sequence[NDArray[np.int32] | None]:
-        """Each frame's (k, 2) outline of the mouth, where one was found."""
+        """Each frame's (k, 2) outline of the mark, where one was found."""
 
 
 def write_overlay(film: Film, measured: Measured, path: Path) -> None:
-    """Write ``NAME.overlay.mp4``: the clip in H.264, each frame at its own time, with what was measured in it.
+    """Write ``NAME.overlay.mp4``: the clip in H.264, each frame at its time, with the measured angle drawn into it.
 
     Parameters
     ----------
     film : Film
         The clip that was measured.
     measured : Measured
-        What was found in it.
+        The result of measuring it.
     path : Path
-        The film to be; it appears whole or not at all. Its folder is made if missing.
+        The file to write; it appears whole or not at all. Its folder is made if missing.
 
     Raises
     ------
@@ -60,14 +60,14 @@ def write_overlay(film: Film, measured: Measured, path: Path) -> None:
 
 
 def draw_frame(image: Image, measured: Measured, index: int) -> Image:
-    """Draw one frame's line pivot→mouth, outline, 6 px and 10 px circles, angle ± sigma, or why there is none.
+    """Draw one frame's line pivot→mark, outline, 6 px and 10 px circles, angle ± sigma, or the status.
 
     Parameters
     ----------
     image : ndarray
         (h, w, 3) blue, green, red; it is not changed.
     measured : Measured
-        What was found in the clip.
+        The result of measuring the clip.
     index : int
         The frame's number.
 
@@ -84,11 +84,11 @@ def draw_frame(image: Image, measured: Measured, index: int) -> Image:
         cv2.polylines(drawn, [contour], True, _CONTOUR if good else _BAD, 1, cv2.LINE_AA)
     text = f"{series.time[index]:.3f} s  "
     if good and series.mark_px is not None and series.pivot_px is not None:
-        pivot, mouth = _fixed(series.pivot_px[index]), _fixed(series.mark_px[index])
-        cv2.line(drawn, pivot, mouth, _LINE, 1, cv2.LINE_AA, _SHIFT)
+        pivot, mark = _fixed(series.pivot_px[index]), _fixed(series.mark_px[index])
+        cv2.line(drawn, pivot, mark, _LINE, 1, cv2.LINE_AA, _SHIFT)
         cv2.circle(drawn, pivot, 3 << _SHIFT, _LINE, 1, cv2.LINE_AA, _SHIFT)
         for radius in RADII_PX:
-            cv2.circle(drawn, mouth, round(radius * 2**_SHIFT), _CIRCLES, 1, cv2.LINE_AA, _SHIFT)
+            cv2.circle(drawn, mark, round(radius * 2**_SHIFT), _CIRCLES, 1, cv2.LINE_AA, _SHIFT)
         angle, sigma = np.degrees((series.angle[index], series.sigma[index]))
         digits = int(np.clip(1 - np.floor(np.log10(sigma)), 2, 5)) if sigma > 0.0 else 3
         text += f"{angle:+.{digits}f} +- {sigma:.{digits}f} deg"

@@ -224,7 +224,7 @@ def test_a_clip_without_the_declared_mouth_is_one_line_with_counts_and_colour(tm
     clip = broken.clip_without_mouth(tmp_path)
     with pytest.raises(InputError) as error:
         measure_clip(open_film(clip), Rig(mouth=RigMark(rgb=(190, 35, 40))))
-    assert str(error.value) == f"{clip}: no mouth found in 30 of 30 frames (colour 190,35,40); is it in the picture?"
+    assert str(error.value) == f"{clip}: no mark found in 30 of 30 frames (colour 190,35,40); is it in the picture?"
 
 
 def test_a_clip_in_which_nothing_turns_is_one_line(tmp_path):
@@ -232,7 +232,7 @@ def test_a_clip_in_which_nothing_turns_is_one_line(tmp_path):
     clip = _film(tmp_path, look, np.zeros(30))
     with pytest.raises(InputError) as error:
         measure_clip(open_film(clip), Rig())
-    assert str(error.value).startswith(f"{clip}: no mouth found in 30 of 30 frames (colour auto)")
+    assert str(error.value).startswith(f"{clip}: no mark found in 30 of 30 frames (colour auto)")
     assert "\n" not in str(error.value)
 
 
