@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import io, signal
 
-from anglecam.cli.app import app as cli
+from anglecam.cli import app as cli
 from anglecam.data.command import Command
 from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError

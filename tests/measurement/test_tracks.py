@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 
 import anglecam
-from anglecam.cli.app import app as cli
+from anglecam.cli import app as cli
 from anglecam.data.command import Command
 from anglecam.errors import InputError, RigError
 from anglecam.io.csv_columns import SERIES_COLUMNS as COLUMNS
 from anglecam.io.rig import Rig, RigCamera, RigKeypoints
 from anglecam.io.session import read_session, recording_name
 from anglecam.measurement.tracks import measure_tracks
+from anglecam.workflow.clip import measure_source, open_source
 from anglecam.workflow.session import loop_input, measure_session
 from support.drawn import Look, Plant, Recording, draw_frames, write_clip
 from support.motion import command_rows, move
@@ -166,9 +167,10 @@ def clip(tmp_path_factory):
 def test_times_come_from_the_clip_beside_and_every_frame_of_it_has_its_row(clip):
     points = nod(np.linspace(0.0, 20.0, 36), np.random.default_rng(0))
     path = write_deeplabcut(clip.with_name(f"swing{SCORER}.h5"), points)
-    measured = measure_tracks(path, RIG)  # which declares 60 Hz: the clip knows better
+    source = open_source(path, RIG)  # RIG declares 60 Hz; the clip's time stamps are used
+    measured = measure_source(source)
     path.unlink()
-    assert measured.film == clip
+    assert source.film.path == clip
     assert measured.series.name == "swing"
     np.testing.assert_allclose(measured.series.time, np.arange(40) / 30.0, atol=1e-9)
     assert measured.series.evidence.picture_px == (640, 480)
@@ -178,23 +180,23 @@ def test_times_come_from_the_clip_beside_and_every_frame_of_it_has_its_row(clip)
 def test_tracks_longer_than_the_clip_beside_are_not_of_it(clip):
     path = write_sleap(clip.with_name("swing.analysis.h5"), nod(np.zeros(41), np.random.default_rng(0)))
     with pytest.raises(InputError, match=r"41 frames, but swing\.avi has 40"):
-        measure_tracks(path, RIG)
+        measure_source(open_source(path, RIG))
     path.unlink()
 
 
 def test_without_clip_and_rate_or_with_too_few_points_or_without_marks_there_is_one_line(tmp_path):
     path = write_sleap(tmp_path / "a.analysis.h5", nod(SWING, np.random.default_rng(0)))
-    with pytest.raises(InputError, match=r"nothing says when its frames were taken: put the clip a\.… beside it"):
+    with pytest.raises(InputError, match=r"its frames have no times: put the clip a\.… in the same folder"):
         measure_tracks(path, Rig(marks=RigKeypoints(mouth="nose", pivot="neck")))
-    with pytest.raises(RigError, match="which of nose, neck is which"):
+    with pytest.raises(RigError, match="declare which of nose, neck are mark and pivot"):
         measure_tracks(path, Rig())
     with pytest.raises(InputError, match="no point mouth in it; it has nose, neck"):
         measure_tracks(path, Rig(marks=RigKeypoints(mouth="mouth", pivot="neck", rate_hz=60.0)))
     with pytest.raises(
-        InputError, match=r"nose and neck are both there in 0 of 360 frames only \(likelihood at least 0"
+        InputError, match=r"nose and neck are both present in only 0 of 360 frames \(likelihood at least 0"
     ):
         measure_tracks(path, Rig(marks=RigKeypoints(mouth="nose", pivot="neck", rate_hz=60.0, least_likelihood=0.9)))
-    with pytest.raises(InputError, match="need the clip beside the tracks"):
+    with pytest.raises(InputError, match="need the clip in the folder of the tracks"):
         measure_tracks(path, Rig(marks=MARKS, camera=RigCamera(row_time_s=1e-5)))
 
 
