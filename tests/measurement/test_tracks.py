@@ -311,8 +311,8 @@ def test_measure_takes_tracks_and_draws_on_the_clip_beside(tmp_path, clip, run):
     status, said, told = run("measure", path, alone, "--overlay", "--out", out)
     assert status == 1
     assert told == (
-        f"{alone}: nothing says when its frames were taken: put the clip alone.… beside it, or marks: {{rate_hz: …}} in"
-        " rig.yaml\n"
+        f"{alone}: its frames have no times: put the clip alone.… in the same folder, or declare marks:"
+        " {rate_hz: …} in rig.yaml\n"
     )
     assert sorted(p.name for p in out.iterdir()) == ["swing.angles.csv", "swing.overlay.mp4", "swing.png"]
     assert "nose (SLEAP)" in said
