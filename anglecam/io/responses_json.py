@@ -9,10 +9,10 @@ import numpy as np
 
 from anglecam.errors import InputError
 from anglecam.io.files import read_json
-from anglecam.neck.pd_tuning import Nod
+from anglecam.neck.pd_tuning import NodTarget
 
 
-def nod_from_responses(path: Path, number: int | None = None) -> Nod:
+def nod_from_responses(path: Path, number: int | None = None) -> NodTarget:
     """Take the wanted nod from a measured one, robot's or person's.
 
     Parameters
@@ -24,7 +24,7 @@ def nod_from_responses(path: Path, number: int | None = None) -> Nod:
 
     Returns
     -------
-    Nod
+    NodTarget
         With twice the measured uncertainty for tolerance, where that is more than the usual one.
 
     Raises
@@ -48,8 +48,8 @@ def nod_from_responses(path: Path, number: int | None = None) -> Nod:
     (rise, rise_sigma), (overshoot, overshoot_sigma) = np.median(whole, axis=0)
     if not rise > 0.0:
         raise InputError(f"{path}: the rise time is {rise:g} s")
-    usual = Nod()
-    return Nod(
+    usual = NodTarget()
+    return NodTarget(
         float(rise),
         float(overshoot),
         float(np.nanmax([usual.rise_tolerance, 2.0 * rise_sigma / rise])),

@@ -62,7 +62,7 @@ FIGURE_13 = CommandScale(up=math.pi / 255, down=math.pi / 255)
 
 
 @dataclass(frozen=True)
-class Row:
+class NeckPosition:
     """A row of Table 3, worked out from its command."""
 
     position: Literal["upward", "neutral", "down"]
@@ -263,7 +263,7 @@ def resolution(command: ArrayLike, linkage: FourBar, scale: CommandScale = TABLE
     return np.asarray(np.abs(slope(linkage, servo)) * per_count)
 
 
-def table_3(linkage: FourBar, scale: CommandScale = TABLE_3) -> tuple[Row, Row, Row]:
+def table_3(linkage: FourBar, scale: CommandScale = TABLE_3) -> tuple[NeckPosition, NeckPosition, NeckPosition]:
     """Work out Table 3: its three commands, exact and by the straight line of Fig. 4.
 
     Parameters
@@ -275,7 +275,7 @@ def table_3(linkage: FourBar, scale: CommandScale = TABLE_3) -> tuple[Row, Row, 
 
     Returns
     -------
-    tuple of Row
+    tuple of NeckPosition
         Upward, neutral, down.
 
     Raises
@@ -285,10 +285,10 @@ def table_3(linkage: FourBar, scale: CommandScale = TABLE_3) -> tuple[Row, Row, 
     """
     line = straight_line(linkage, *STRAIGHT)
 
-    def row(position: Literal["upward", "neutral", "down"], counts: int) -> Row:
+    def row(position: Literal["upward", "neutral", "down"], counts: int) -> NeckPosition:
         servo = float(servo_of_command(MIDDLE + counts, scale))
         away = servo - scale.neutral
-        return Row(
+        return NeckPosition(
             position=position,
             counts=counts,
             command=MIDDLE + counts,

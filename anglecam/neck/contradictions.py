@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import math
 
-from anglecam.neck.joint import Joint, Quantity
+from anglecam.neck.correlated import CorrelatedQuantities, UncertainValue
 
 _COVERAGE = 2.0
 """Standard uncertainties beyond which a sign or a difference is no accident."""
 
 
-def contradictions(q: Joint, found: tuple[str, ...]) -> tuple[str, ...]:
+def contradictions(q: CorrelatedQuantities, found: tuple[str, ...]) -> tuple[str, ...]:
     """Say in a line each where a motion and what is taken as known cannot both be right.
 
     Parameters
     ----------
-    q : Joint
+    q : CorrelatedQuantities
         All quantities of a route, by the names of `anglecam.neck.design`.
     found : tuple of str
         Those that the route ends at.
@@ -67,13 +67,13 @@ def contradictions(q: Joint, found: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(told)
 
 
-def _doubt(quantity: Quantity) -> str:
+def _doubt(quantity: UncertainValue) -> str:
     if abs(quantity.value) > _COVERAGE * quantity.sigma:
         return ""
     return " (zero lies within two standard uncertainties: the data do not exclude a small positive value)"
 
 
-def said(quantity: Quantity) -> str:
+def said(quantity: UncertainValue) -> str:
     """Write a quantity to the second digit of its uncertainty, or to three where it has none."""
     if quantity.sigma == 0.0:
         return f"{quantity.value:.3g}".replace("-", "−")

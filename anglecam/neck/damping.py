@@ -29,7 +29,7 @@ SAE_20_VISCOSITY = 0.125
 
 
 @dataclass(frozen=True)
-class Film:
+class OilFilm:
     """The film between shaft and bearings; the defaults are the paper's."""
 
     viscosity: float = PAPER_VISCOSITY
@@ -52,22 +52,22 @@ class Film:
         return math.pi * self.viscosity * self.diameter**3 * self.width / (2.0 * self.thickness)
 
 
-def surface_speed(film: Film, omega: ArrayLike) -> Floats:
+def surface_speed(film: OilFilm, omega: ArrayLike) -> Floats:
     """Speed of the shaft's surface, m/s, at a speed of the head, rad/s, Eq. (20)."""
     return np.asarray(np.asarray(omega, dtype=float) * film.diameter / 2.0)
 
 
-def shear_stress(film: Film, speed: ArrayLike) -> Floats:
+def shear_stress(film: OilFilm, speed: ArrayLike) -> Floats:
     """Stress in the film, N/m², at a speed of the shaft's surface, m/s, Eq. (19)."""
     return np.asarray(film.viscosity * np.asarray(speed, dtype=float) / film.thickness)
 
 
-def damping_torque(film: Film, omega: ArrayLike) -> Floats:
+def damping_torque(film: OilFilm, omega: ArrayLike) -> Floats:
     """Work out the torque against the motion from stress, area and radius, Eqs. (19)-(21).
 
     Parameters
     ----------
-    film : Film
+    film : OilFilm
         Oil and bearing.
     omega : array_like
         Δθ̇ of the head, rad/s.

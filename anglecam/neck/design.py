@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from anglecam.neck.contradictions import contradictions
-from anglecam.neck.joint import Joint, Quantity, joint
+from anglecam.neck.correlated import CorrelatedQuantities, UncertainValue, correlated
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.parameters import PAPER, NeckParameters
 from anglecam.neck.variation import PARAMETERS
@@ -50,12 +50,12 @@ class Relations:
     """Names in ``quantities`` that the route starts from."""
     found: tuple[str, ...]
     """Names in ``quantities`` that it ends at."""
-    quantities: Joint
+    quantities: CorrelatedQuantities
     """All of them, with their covariance."""
     contradictions: tuple[str, ...]
     """Where the motion and what is taken as known cannot both be right; empty if nowhere."""
 
-    def __getitem__(self, name: str) -> Quantity:
+    def __getitem__(self, name: str) -> UncertainValue:
         return self.quantities[name]
 
     @property
@@ -64,7 +64,7 @@ class Relations:
         return self["stiffness"].value > 0.0
 
 
-def identified(a: float, b: float, c: float, uncertainty: ArrayLike = (0.0, 0.0, 0.0)) -> Joint:
+def identified(a: float, b: float, c: float, uncertainty: ArrayLike = (0.0, 0.0, 0.0)) -> CorrelatedQuantities:
     """Take the identified parameters of Eq. (30) (step 3).
 
     Parameters
@@ -76,7 +76,7 @@ def identified(a: float, b: float, c: float, uncertainty: ArrayLike = (0.0, 0.0,
 
     Returns
     -------
-    Joint
+    CorrelatedQuantities
         ``a``, ``b`` and ``c``.
 
     Raises
@@ -86,10 +86,10 @@ def identified(a: float, b: float, c: float, uncertainty: ArrayLike = (0.0, 0.0,
     """
     if not c > 0.0:
         raise ValueError(f"c = {c:g} rad/(s²·V) is not positive: turn the sign of the command or of the angle")
-    return joint({"a": a, "b": b, "c": c}, uncertainty)
+    return correlated({"a": a, "b": b, "c": c}, uncertainty)
 
 
-def known(neck: NeckParameters = PAPER, sigmas: Mapping[str, float] | None = None) -> Joint:
+def known(neck: NeckParameters = PAPER, sigmas: Mapping[str, float] | None = None) -> CorrelatedQuantities:
     """Take what is known of the neck beforehand (step 4).
 
     Parameters
@@ -103,10 +103,10 @@ def known(neck: NeckParameters = PAPER, sigmas: Mapping[str, float] | None = Non
 
     Returns
     -------
-    Joint
+    CorrelatedQuantities
         ``inertia`` J + γ·J_r kg·m², ``gamma``, ``spring`` K·L2·L6 N·m, ``weight`` M_h·g·L·cos θ0 N·m, ``damping`` C
         N·m·s, ``sensor_gain`` h V/rad, ``motor_constant`` N·m/A, ``amplifier_gain``, ``gear_ratio``,
-        ``output_impedance`` Ω. `Joint.replaced` puts in one that is known otherwise.
+        ``output_impedance`` Ω. `CorrelatedQuantities.replaced` puts in one that is known otherwise.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def known(neck: NeckParameters = PAPER, sigmas: Mapping[str, float] | None = Non
             "weight": q["M_h"] * head.gravity * q["L"] * np.cos(q["theta_0"]),
         }
 
-    whole = joint(primitives, [errors[s] for s in primitives]).derived(aggregates)
+    whole = correlated(primitives, [errors[s] for s in primitives]).derived(aggregates)
     names = {
         "inertia": "inertia",
         "gamma": "gamma",
@@ -144,17 +144,17 @@ def known(neck: NeckParameters = PAPER, sigmas: Mapping[str, float] | None = Non
         "R_a": "output_impedance",
     }
     at = [whole.names.index(s) for s in names]
-    return Joint(tuple(names.values()), whole.values[at], whole.covariance[np.ix_(at, at)])
+    return CorrelatedQuantities(tuple(names.values()), whole.values[at], whole.covariance[np.ix_(at, at)])
 
 
-def by_inertia(found: Joint, beforehand: Joint) -> Relations:
+def by_inertia(found: CorrelatedQuantities, beforehand: CorrelatedQuantities) -> Relations:
     """Find c3, h and c4 from a known inertia, spring, weight and damping (step 5, the paper's first way).
 
     Parameters
     ----------
-    found : Joint
+    found : CorrelatedQuantities
         From `identified`.
-    beforehand : Joint
+    beforehand : CorrelatedQuantities
         From `known`.
 
     Returns
@@ -182,12 +182,12 @@ def by_inertia(found: Joint, beforehand: Joint) -> Relations:
     return _relations("by_inertia", given, found, beforehand, relation)
 
 
-def by_inertia_and_motor(found: Joint, beforehand: Joint) -> Relations:
+def by_inertia_and_motor(found: CorrelatedQuantities, beforehand: CorrelatedQuantities) -> Relations:
     """Find c3, C and K·L2·L6 from a known inertia and motor (step 5, the paper's second way).
 
     Parameters
     ----------
-    found, beforehand : Joint
+    found, beforehand : CorrelatedQuantities
         From `identified` and `known`.
 
     Returns
@@ -219,12 +219,12 @@ def by_inertia_and_motor(found: Joint, beforehand: Joint) -> Relations:
     return _relations("by_inertia_and_motor", given, found, beforehand, relation)
 
 
-def by_motor(found: Joint, beforehand: Joint) -> Relations:
+def by_motor(found: CorrelatedQuantities, beforehand: CorrelatedQuantities) -> Relations:
     """Find J, h and C from a known motor, spring and weight (step 5, with the motor in place of the inertia).
 
     Parameters
     ----------
-    found, beforehand : Joint
+    found, beforehand : CorrelatedQuantities
         From `identified` and `known`.
 
     Returns
@@ -306,12 +306,12 @@ def sensor_gain_bound(neck: NeckParameters) -> float:
 def _relations(
     route: str,
     given: tuple[str, ...],
-    found: Joint,
-    beforehand: Joint,
+    found: CorrelatedQuantities,
+    beforehand: CorrelatedQuantities,
     relation: Callable[[Mapping[str, Any]], dict[str, Any]],
 ) -> Relations:
     at = [beforehand.names.index(name) for name in given]
-    start = found + Joint(given, beforehand.values[at], beforehand.covariance[np.ix_(at, at)])
+    start = found + CorrelatedQuantities(given, beforehand.values[at], beforehand.covariance[np.ix_(at, at)])
     whole = start.derived(relation)
     told = whole.names[len(start.names) :]
     return Relations(route, given, told, whole, contradictions(whole, told))

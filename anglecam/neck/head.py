@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from anglecam.data.typing import Floats
-from anglecam.neck.parameters import Head
+from anglecam.neck.parameters import HeadParameters
 
 
-def centre_of_mass(head: Head, theta: ArrayLike) -> tuple[Floats, Floats]:
+def centre_of_mass(head: HeadParameters, theta: ArrayLike) -> tuple[Floats, Floats]:
     """Place the centre of mass, Eq. (14).
 
     Parameters
     ----------
-    head : Head
+    head : HeadParameters
         Its distance L from the pivot.
     theta : array_like
         Angle from upright, rad.
@@ -37,13 +37,13 @@ def centre_of_mass(head: Head, theta: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def centre_of_mass_acceleration(
-    head: Head, theta: ArrayLike, omega: ArrayLike, alpha: ArrayLike
+    head: HeadParameters, theta: ArrayLike, omega: ArrayLike, alpha: ArrayLike
 ) -> tuple[Floats, Floats]:
     """Accelerate the centre of mass, Eq. (15).
 
     Parameters
     ----------
-    head : Head
+    head : HeadParameters
         Its distance L from the pivot.
     theta, omega, alpha : array_like
         Angle from upright (rad), speed (rad/s) and acceleration (rad/s²).
@@ -61,13 +61,13 @@ def centre_of_mass_acceleration(
 
 
 def moments_about_pivot(
-    head: Head, theta: ArrayLike, omega: ArrayLike, alpha: ArrayLike, resisting: ArrayLike, torque: ArrayLike
+    head: HeadParameters, theta: ArrayLike, omega: ArrayLike, alpha: ArrayLike, resisting: ArrayLike, torque: ArrayLike
 ) -> Floats:
     """Sum the moments about the pivot with the body's inertia as a load, Eq. (13).
 
     Parameters
     ----------
-    head : Head
+    head : HeadParameters
         Mass and inertia.
     theta, omega, alpha : array_like
         Angle from upright (rad), speed (rad/s) and acceleration (rad/s²).
@@ -88,12 +88,12 @@ def moments_about_pivot(
     return np.asarray(inertial + own + np.asarray(resisting, dtype=float) - np.asarray(torque, dtype=float))
 
 
-def head_acceleration(head: Head, theta: ArrayLike, resisting: ArrayLike, torque: ArrayLike) -> Floats:
+def head_acceleration(head: HeadParameters, theta: ArrayLike, resisting: ArrayLike, torque: ArrayLike) -> Floats:
     """Accelerate the head, Eq. (16) solved for θ̈.
 
     Parameters
     ----------
-    head : Head
+    head : HeadParameters
         Mass and inertia.
     theta : array_like
         Angle from upright, rad.

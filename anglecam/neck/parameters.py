@@ -9,7 +9,7 @@ from anglecam.neck.fourbar import FourBar
 
 
 @dataclass(frozen=True)
-class Servo:
+class ServoParameters:
     """An RC servo with potentiometer feedback, Fig. 5."""
 
     motor_constant: float = 3.3e-3
@@ -39,7 +39,7 @@ class Servo:
 
 
 @dataclass(frozen=True)
-class Head:
+class HeadParameters:
     """The head as a body on the nodding shaft, Fig. 6 (c)."""
 
     mass: float = 2.31
@@ -65,7 +65,7 @@ class Head:
 
 
 @dataclass(frozen=True)
-class Spring:
+class SpringParameters:
     """The spring that holds the head upright, Fig. 6 (a) and (b)."""
 
     rate: float = 1877.8
@@ -80,9 +80,9 @@ class Spring:
 class NeckParameters:
     """All that the paper's equations of motion hold; the defaults are the paper's prototype, Table 5."""
 
-    servo: Servo = field(default_factory=Servo)
-    head: Head = field(default_factory=Head)
-    spring: Spring = field(default_factory=Spring)
+    servo: ServoParameters = field(default_factory=ServoParameters)
+    head: HeadParameters = field(default_factory=HeadParameters)
+    spring: SpringParameters = field(default_factory=SpringParameters)
     linkage: FourBar = field(default_factory=FourBar)
     damping: float = 0.15
     """C, N·m·s."""

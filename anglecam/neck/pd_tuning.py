@@ -20,7 +20,7 @@ _LARGEST_GAIN = 50.0
 
 
 @dataclass(frozen=True)
-class Nod:
+class NodTarget:
     """The response that is wanted."""
 
     rise_time: float = 0.3
@@ -33,7 +33,7 @@ class Nod:
     """By which the overshoot may be larger; it may always be smaller."""
 
 
-ADULT = Nod()
+ADULT = NodTarget()
 """The paper's adult: 0.3 s, no overshoot."""
 
 
@@ -43,7 +43,7 @@ class Tuned:
 
     loop: ClosedLoop
     """With gains, figures and margins."""
-    wanted: Nod
+    wanted: NodTarget
     constraints: tuple[Constraint, ...]
     """Each with value, limit and whether it is active."""
     unmet: tuple[str, ...]
@@ -57,7 +57,7 @@ class Tuned:
 
 def tune_pd(
     plant: control.TransferFunction,
-    wanted: Nod = ADULT,
+    wanted: NodTarget = ADULT,
     *,
     largest_loss: float = 0.05,
     largest_sensitivity: float = 2.0,
@@ -69,7 +69,7 @@ def tune_pd(
     plant : control.TransferFunction
         Stable and strictly proper; of a large-angle neck that of `anglecam.neck.pd.linearised`, and
         `anglecam.neck.pd.simulate_pd` then tells what the gains do to the neck itself.
-    wanted : Nod
+    wanted : NodTarget
         Rise and overshoot.
     largest_loss : float
         Share of the steady state that K_p may take away.
@@ -106,7 +106,7 @@ def tune_pd(
     return Tuned(loop(best.at), wanted, best.constraints, best.unmet)
 
 
-def nod_constraints(wanted: Nod, rise_time: float, overshoot: float) -> tuple[Constraint, ...]:
+def nod_constraints(wanted: NodTarget, rise_time: float, overshoot: float) -> tuple[Constraint, ...]:
     """Return what a response has to meet: rise from both sides, overshoot from above."""
     spare = wanted.rise_tolerance * wanted.rise_time
     return (

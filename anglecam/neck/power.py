@@ -64,7 +64,7 @@ class NodPower:
 
 
 @dataclass(frozen=True)
-class Source:
+class VoltageSource:
     """The fitted source V = V0 − R·I."""
 
     open_voltage: float
@@ -104,7 +104,7 @@ class PowerUse:
 
     nods: tuple[NodPower, ...]
     """In order of time."""
-    source: Source
+    source: VoltageSource
     idle_power: float
     """Mean outside the nods, W; NaN where there is no such time."""
     all_servos: float
@@ -234,7 +234,7 @@ def find_nods(log: PowerLog, *, pause: float = 0.25, shortest: float = 0.05) -> 
     return tuple(s for s in spans if s[1] - s[0] >= shortest)
 
 
-def fit_source(log: PowerLog) -> Source:
+def fit_source(log: PowerLog) -> VoltageSource:
     """Fit V = V0 − R·I to a log.
 
     Least squares of the voltage; its covariance is that of Newey and West (1987), because a servo that speeds up and
@@ -248,7 +248,7 @@ def fit_source(log: PowerLog) -> Source:
 
     Returns
     -------
-    Source
+    VoltageSource
         With uncertainties.
 
     Raises
@@ -272,7 +272,7 @@ def fit_source(log: PowerLog) -> Source:
         meat += (1.0 - lag / (lags + 1.0)) * (both + both.T)
     # Two parameters were fitted to so many independent stretches, not to n rows; n/(n − 2) for white noise.
     covariance = n / max(n - 2 * (lags + 1), 1) * inverse @ meat @ inverse
-    return Source(float(solution[0]), float(solution[1]), covariance, float(left.std(ddof=2)), (low, high))
+    return VoltageSource(float(solution[0]), float(solution[1]), covariance, float(left.std(ddof=2)), (low, high))
 
 
 def _lags(left: Floats) -> int:

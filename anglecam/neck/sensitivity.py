@@ -21,7 +21,7 @@ from anglecam.neck.fourbar import FourBar, crank_reach, head_angle
 from anglecam.neck.linear import LinearNeck, linear_neck
 from anglecam.neck.parameters import PAPER, NeckParameters
 from anglecam.neck.step import linear_step, linear_step_figures
-from anglecam.neck.variation import PARAMETERS, Parameter
+from anglecam.neck.variation import PARAMETERS, NeckQuantity
 
 FIG_9: dict[str, tuple[float, ...]] = {
     "h": (1.0, 1.4, 1.8),
@@ -40,7 +40,7 @@ _SMALL_OVERSHOOT = 1e-9
 
 
 @dataclass(frozen=True)
-class Curve:
+class StepCurve:
     """The step response with one value of the parameter."""
 
     value: float
@@ -67,7 +67,7 @@ class Panel:
     unit: str
     time: Floats
     """(n,) s from the step."""
-    curves: tuple[Curve, ...]
+    curves: tuple[StepCurve, ...]
     """In the order of the values."""
 
 
@@ -170,7 +170,7 @@ def vary(neck: NeckParameters, symbol: str, values: Sequence[float], time: Array
         linear = linear_neck(made)
         above, below = [linear.c], [1.0, linear.a, linear.b]
         angle = height * linear_step(above, below, instants)
-        curves.append(Curve(value, made, linear, angle, linear_step_figures(above, below)))
+        curves.append(StepCurve(value, made, linear, angle, linear_step_figures(above, below)))
     return Panel(symbol, parameter.name, parameter.unit, instants, tuple(curves))
 
 
@@ -220,7 +220,7 @@ def _figures(neck: NeckParameters) -> tuple[float, ...]:
     return tuple(float(getattr(told, name)) for name in FIGURES)
 
 
-def _parameter(symbol: str) -> Parameter:
+def _parameter(symbol: str) -> NeckQuantity:
     if symbol not in PARAMETERS:
         raise ValueError(f"no parameter {symbol}; there are {', '.join(PARAMETERS)}")
     return PARAMETERS[symbol]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from anglecam.data.typing import Floats
-from anglecam.neck.parameters import Servo
+from anglecam.neck.parameters import ServoParameters
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,12 @@ class TorqueSpeed:
         return np.asarray(self.stall_torque * (1.0 - np.asarray(omega_a, dtype=float) / self.no_load_speed))
 
 
-def error_signal(servo: Servo, voltage: ArrayLike, theta_a: ArrayLike) -> Floats:
+def error_signal(servo: ServoParameters, voltage: ArrayLike, theta_a: ArrayLike) -> Floats:
     """Compare the input with the potentiometer, Eq. (5).
 
     Parameters
     ----------
-    servo : Servo
+    servo : ServoParameters
         Its sensor gain h.
     voltage : array_like
         U_in, V.
@@ -57,22 +57,22 @@ def error_signal(servo: Servo, voltage: ArrayLike, theta_a: ArrayLike) -> Floats
     return np.asarray(np.asarray(voltage, dtype=float) - servo.sensor_gain * np.asarray(theta_a, dtype=float))
 
 
-def motor_speed(servo: Servo, omega_a: ArrayLike) -> Floats:
+def motor_speed(servo: ServoParameters, omega_a: ArrayLike) -> Floats:
     """Speed of the motor, rad/s, at a speed of the servo's arm, rad/s: ω_m = θ̇_a/G_g, see the module on Eq. (10)."""
     return np.asarray(np.asarray(omega_a, dtype=float) / servo.gear_ratio)
 
 
-def back_emf(servo: Servo, omega_m: ArrayLike) -> Floats:
+def back_emf(servo: ServoParameters, omega_m: ArrayLike) -> Floats:
     """Voltage that the turning motor makes, V, at its speed, rad/s, Eq. (7)."""
     return np.asarray(servo.motor_constant * np.asarray(omega_m, dtype=float))
 
 
-def motor_current(servo: Servo, error: ArrayLike, omega_m: ArrayLike) -> Floats:
+def motor_current(servo: ServoParameters, error: ArrayLike, omega_m: ArrayLike) -> Floats:
     """Work out the motor's current, Eqs. (6)-(7): I_m = (G_a·e − K_m·ω_m)/R_a.
 
     Parameters
     ----------
-    servo : Servo
+    servo : ServoParameters
         Motor and amplifier; no inductance and no limit of voltage, as in the paper.
     error : array_like
         e, V.
@@ -88,19 +88,19 @@ def motor_current(servo: Servo, error: ArrayLike, omega_m: ArrayLike) -> Floats:
     return np.asarray((amplified - back_emf(servo, omega_m)) / servo.output_impedance)
 
 
-def gear_torque(servo: Servo, current: ArrayLike) -> Floats:
+def gear_torque(servo: ServoParameters, current: ArrayLike) -> Floats:
     """Torque behind the gear, N·m, at a current of the motor, A, Eqs. (8)-(9): T_g = K_m·I_m/G_g."""
     return np.asarray(servo.motor_constant * np.asarray(current, dtype=float) / servo.gear_ratio)
 
 
 def servo_torque(
-    servo: Servo, voltage: ArrayLike, theta_a: ArrayLike, omega_a: ArrayLike, alpha_a: ArrayLike = 0.0
+    servo: ServoParameters, voltage: ArrayLike, theta_a: ArrayLike, omega_a: ArrayLike, alpha_a: ArrayLike = 0.0
 ) -> Floats:
     """Work out the torque that leaves the servo from the motion of its own arm, Eq. (11) solved for T.
 
     Parameters
     ----------
-    servo : Servo
+    servo : ServoParameters
         Motor, amplifier, gear and sensor.
     voltage : array_like
         U_in, V.
@@ -118,13 +118,13 @@ def servo_torque(
 
 
 def drive_torque(
-    servo: Servo, gamma: float, voltage: ArrayLike, delta: ArrayLike, omega: ArrayLike, alpha: ArrayLike = 0.0
+    servo: ServoParameters, gamma: float, voltage: ArrayLike, delta: ArrayLike, omega: ArrayLike, alpha: ArrayLike = 0.0
 ) -> Floats:
     """Work out the torque on the head from the head's motion, Eq. (12).
 
     Parameters
     ----------
-    servo : Servo
+    servo : ServoParameters
         Motor, amplifier, gear and sensor.
     gamma : float
         γ of Eq. (3), θ_a = γ·Δθ.
@@ -142,12 +142,12 @@ def drive_torque(
     return servo_torque(servo, voltage, *arm)
 
 
-def torque_speed(servo: Servo, error: float) -> TorqueSpeed:
+def torque_speed(servo: ServoParameters, error: float) -> TorqueSpeed:
     """Draw the torque-speed line at a constant error, Eqs. (6)-(9).
 
     Parameters
     ----------
-    servo : Servo
+    servo : ServoParameters
         Motor, amplifier and gear.
     error : float
         e, V; what reaches the motor is G_a·e, so that a supply of 6 V ends the line at e = 6 V/G_a.

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from anglecam.data.typing import Floats
-from anglecam.neck.parameters import Spring
+from anglecam.neck.parameters import SpringParameters
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Preload:
         return 1.0 if self.before is None else 0.5
 
 
-def neutral_spring_angle(spring: Spring) -> float:
+def neutral_spring_angle(spring: SpringParameters) -> float:
     """Return θ_f of Fig. 6's right triangle, cos θ_f = L2/L6, rad.
 
     Raises
@@ -61,24 +61,24 @@ def neutral_spring_angle(spring: Spring) -> float:
     return math.acos(spring.base / spring.arm)
 
 
-def large_angle_rate(spring: Spring) -> float:
+def large_angle_rate(spring: SpringParameters) -> float:
     """Return the rate that gives Eq. (18b) the tangent K·L2·L6 at neutral: K·L6/L2, N/m."""
     return spring.rate * spring.arm / spring.base
 
 
-def length(spring: Spring, theta_prime: ArrayLike) -> Floats:
+def length(spring: SpringParameters, theta_prime: ArrayLike) -> Floats:
     """Length ℓ, m, at an angle between L2 and L6, rad: the root in Eqs. (17) and (18b)."""
     base, arm = spring.base, spring.arm
     return np.asarray(np.sqrt(base**2 + arm**2 - 2.0 * base * arm * np.cos(np.asarray(theta_prime, dtype=float))))
 
 
-def moment_arm(spring: Spring, theta_prime: ArrayLike) -> Floats:
+def moment_arm(spring: SpringParameters, theta_prime: ArrayLike) -> Floats:
     """Arm L_s, m, at an angle between L2 and L6, rad, Eq. (17)."""
     angle = np.asarray(theta_prime, dtype=float)
     return np.asarray(spring.base * spring.arm * np.sin(angle) / length(spring, angle))
 
 
-def moment_arm_slope(spring: Spring, theta_prime: ArrayLike) -> Floats:
+def moment_arm_slope(spring: SpringParameters, theta_prime: ArrayLike) -> Floats:
     """∂L_s/∂θ of Eq. (33), m/rad, at an angle between L2 and L6, rad; as printed."""
     angle = np.asarray(theta_prime, dtype=float)
     c1, c2 = spring.base**2 + spring.arm**2, 2.0 * spring.arm * spring.base
@@ -86,23 +86,23 @@ def moment_arm_slope(spring: Spring, theta_prime: ArrayLike) -> Floats:
     return np.asarray((c2 * np.cos(angle) * squared - 0.5 * (c2 * np.sin(angle)) ** 2) / (2.0 * squared**1.5))
 
 
-def elongation(spring: Spring, delta: ArrayLike) -> Floats:
+def elongation(spring: SpringParameters, delta: ArrayLike) -> Floats:
     """Change in length from neutral, m, at an angle of the head from neutral, rad: Δx of Eq. (18b), the sign turned."""
     neutral = neutral_spring_angle(spring)
     return np.asarray(length(spring, neutral + np.asarray(delta, dtype=float)) - length(spring, neutral))
 
 
-def small_angle_torque(spring: Spring, delta: ArrayLike) -> Floats:
+def small_angle_torque(spring: SpringParameters, delta: ArrayLike) -> Floats:
     """Torque back to neutral, N·m, at an angle from there, rad: Eq. (18a) with the arm L2, K·L2·L6·Δθ of Eq. (25)."""
     return np.asarray(spring.rate * spring.arm * np.asarray(delta, dtype=float) * spring.base)
 
 
-def spring_torque(spring: Spring, preload: Preload, delta: ArrayLike) -> Floats:
+def spring_torque(spring: SpringParameters, preload: Preload, delta: ArrayLike) -> Floats:
     """Work out the springs' torque at any angle, F_s·L_s of Eqs. (16)-(18b).
 
     Parameters
     ----------
-    spring : Spring
+    spring : SpringParameters
         Rate K of Eq. (18a) and lengths.
     preload : Preload
         Stretch at neutral.
@@ -121,12 +121,12 @@ def spring_torque(spring: Spring, preload: Preload, delta: ArrayLike) -> Floats:
     return np.asarray(preload.share * rate * torque)
 
 
-def spring_tangent(spring: Spring, preload: Preload, delta: ArrayLike) -> Floats:
+def spring_tangent(spring: SpringParameters, preload: Preload, delta: ArrayLike) -> Floats:
     """Differentiate `spring_torque`: K·(∂Δx/∂θ·L_s + ∂L_s/∂θ·Δx) of Eq. (33), with ∂Δx/∂θ = L_s.
 
     Parameters
     ----------
-    spring : Spring
+    spring : SpringParameters
         Rate K of Eq. (18a) and lengths.
     preload : Preload
         Stretch at neutral.

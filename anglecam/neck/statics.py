@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from anglecam.data.typing import Floats
 from anglecam.neck.linear import passive_stiffness
-from anglecam.neck.parameters import Head, NeckParameters, Spring
+from anglecam.neck.parameters import HeadParameters, NeckParameters, SpringParameters
 from anglecam.neck.spring import Preload, elongation, spring_torque
 
 SEARCHED = math.radians(90.0)
@@ -47,7 +47,7 @@ class StaticCurve:
         return self.spring - self.weight
 
 
-def weight_torque(head: Head, delta: ArrayLike) -> Floats:
+def weight_torque(head: HeadParameters, delta: ArrayLike) -> Floats:
     """Torque of the weight away from upright, M_h·g·L·sin(θ0 + Δθ), N·m, at an angle from neutral, rad."""
     return np.asarray(head.weight_moment * np.sin(head.neutral + np.asarray(delta, dtype=float)))
 
@@ -124,12 +124,12 @@ def balanced(neck: NeckParameters, *, common: float | None = None, excess: float
     return pretension(neck, pretension_angle(neck) - more, common=common)
 
 
-def slack_limit(spring: Spring, low: float, high: float) -> float:
+def slack_limit(spring: SpringParameters, low: float, high: float) -> float:
     """Return the least common stretch, m, with which neither of two springs goes slack between two angles, rad.
 
     Parameters
     ----------
-    spring : Spring
+    spring : SpringParameters
         Lengths.
     low, high : float
         Range of Δθ, rad.

@@ -24,7 +24,7 @@ from anglecam.neck.fourbar import reach, servo_angle
 from anglecam.neck.linear import LinearNeck, linear_neck, passive_stiffness
 from anglecam.neck.parameters import PAPER, NeckParameters
 from anglecam.neck.pd import PdGains
-from anglecam.neck.pd_tuning import Nod, nod_constraints
+from anglecam.neck.pd_tuning import NodTarget, nod_constraints
 from anglecam.neck.statics import pretension_angle
 from anglecam.neck.step import linear_step_figures
 from anglecam.neck.transmission import worst_transmission_angle
@@ -51,7 +51,7 @@ _TYPICAL_K_D = 0.05
 class Wish:
     """What the neck is to do."""
 
-    nod: Nod
+    nod: NodTarget
     """Rise and overshoot."""
     up: float = math.radians(25.0)
     """Range of the head above neutral, rad."""

@@ -37,7 +37,7 @@ class StraightLine:
 
 
 @dataclass(frozen=True)
-class Limits:
+class LinkageLimits:
     """Between which angles the links move with the rocker open and the crank on one branch."""
 
     kind: Kind
@@ -162,7 +162,7 @@ def grashof(linkage: FourBar) -> Kind:
     return kinds[shortest]
 
 
-def limits(linkage: FourBar, branch: Branch = "open") -> Limits:
+def limits(linkage: FourBar, branch: Branch = "open") -> LinkageLimits:
     """Work out how far crank and rocker move between their toggle positions, with the rocker open.
 
     Parameters
@@ -174,7 +174,7 @@ def limits(linkage: FourBar, branch: Branch = "open") -> Limits:
 
     Returns
     -------
-    Limits
+    LinkageLimits
         Class, range of the rocker and range of the crank.
 
     Raises
@@ -189,7 +189,7 @@ def limits(linkage: FourBar, branch: Branch = "open") -> Limits:
     turns = np.arctan2(np.sin(turns), np.cos(turns))
     rocker = np.concatenate([[low, high], turns[(turns > low) & (turns < high)]])
     crank = servo_angle(linkage, rocker, branch)
-    return Limits(grashof(linkage), (low, high), (float(crank.min()), float(crank.max())))
+    return LinkageLimits(grashof(linkage), (low, high), (float(crank.min()), float(crank.max())))
 
 
 def transmission_angle(linkage: FourBar, theta_s: ArrayLike) -> Floats:

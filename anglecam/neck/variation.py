@@ -23,7 +23,7 @@ NOD = math.radians(25.0)
 
 
 @dataclass(frozen=True)
-class Parameter:
+class NeckQuantity:
     """One quantity that a neck is made of."""
 
     symbol: str
@@ -105,7 +105,7 @@ def nod_range(linkage: FourBar, nod: float = NOD) -> tuple[float, float]:
     return float(ends.min()), float(ends.max())
 
 
-def _of(part: str, attribute: str, symbol: str, name: str, unit: str) -> Parameter:
+def _of(part: str, attribute: str, symbol: str, name: str, unit: str) -> NeckQuantity:
     """Describe an attribute of one of the neck's parts."""
 
     def read(neck: NeckParameters) -> float:
@@ -114,10 +114,10 @@ def _of(part: str, attribute: str, symbol: str, name: str, unit: str) -> Paramet
     def changed(neck: NeckParameters, value: float) -> NeckParameters:
         return replace(neck, **{part: replace(getattr(neck, part), **{attribute: value})})
 
-    return Parameter(symbol, name, unit, read, changed)
+    return NeckQuantity(symbol, name, unit, read, changed)
 
 
-PARAMETERS: dict[str, Parameter] = {
+PARAMETERS: dict[str, NeckQuantity] = {
     p.symbol: p
     for p in (
         _of("servo", "sensor_gain", "h", "sensor gain", "V/rad"),
@@ -132,9 +132,9 @@ PARAMETERS: dict[str, Parameter] = {
         _of("head", "neutral", "theta_0", "neutral angle", "rad"),
         _of("spring", "rate", "K", "spring rate", "N/m"),
         _of("spring", "base", "L_2", "base of the spring", "m"),
-        Parameter("L_6", "link length", "m", lambda neck: neck.linkage.rocker, relinked),
-        Parameter("C", "damping", "N·m·s", lambda neck: neck.damping, lambda neck, v: replace(neck, damping=v)),
-        Parameter("gamma", "linkage slope", "1", lambda neck: neck.gamma, lambda neck, v: replace(neck, gamma=v)),
+        NeckQuantity("L_6", "link length", "m", lambda neck: neck.linkage.rocker, relinked),
+        NeckQuantity("C", "damping", "N·m·s", lambda neck: neck.damping, lambda neck, v: replace(neck, damping=v)),
+        NeckQuantity("gamma", "linkage slope", "1", lambda neck: neck.gamma, lambda neck, v: replace(neck, gamma=v)),
     )
 }
 """By symbol."""

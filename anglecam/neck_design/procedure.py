@@ -17,8 +17,9 @@ import numpy as np
 
 from anglecam.errors import InputError
 from anglecam.identification.export import SECOND_ORDER, read_model, transfer_function
-from anglecam.io.neck_file import Neck
+from anglecam.io.neck_file import DeclaredNeck
 from anglecam.io.responses_json import nod_from_responses
+from anglecam.neck.correlated import CorrelatedQuantities
 from anglecam.neck.design import (
     Relations,
     by_inertia,
@@ -27,7 +28,6 @@ from anglecam.neck.design import (
     explained_neck,
     identified,
 )
-from anglecam.neck.joint import Joint
 from anglecam.neck.large_angle import LargeAngleNeck, acceleration
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.parameters import NeckParameters
@@ -41,9 +41,10 @@ from anglecam.neck.pd import (
     simulate_pd,
     sys2,
 )
-from anglecam.neck.pd_tuning import ADULT, Nod
+from anglecam.neck.pd_tuning import ADULT, NodTarget
 from anglecam.neck.synthesis import Wish
 from anglecam.neck_design.systems import STEP, SYS1
+from anglecam.neck_design.units import Unit
 
 if TYPE_CHECKING:
     import control
@@ -54,7 +55,7 @@ _SETTLINGS = 4.0
 
 def identified_motion(
     abc: Sequence[float | None], sigma: Sequence[float] | None, model: Path | None, command_gain: float
-) -> Joint:
+) -> CorrelatedQuantities:
     """Take a, b, c as given, from a ``model.json``, or the paper's SYS1.
 
     Parameters
@@ -70,7 +71,7 @@ def identified_motion(
 
     Returns
     -------
-    Joint
+    CorrelatedQuantities
         ``a``, ``b`` and ``c`` (rad/(s²·V)).
 
     Raises
@@ -103,7 +104,7 @@ def identified_motion(
     return identified(a, b, c, read.covariance * np.outer(per_volt, per_volt))
 
 
-def routes_of(found: Joint, beforehand: Joint) -> tuple[Relations, ...]:
+def routes_of(found: CorrelatedQuantities, beforehand: CorrelatedQuantities) -> tuple[Relations, ...]:
     """Take every route through Eqs. (34)-(35): `by_inertia`, `by_inertia_and_motor` and `by_motor`."""
     return tuple(route(found, beforehand) for route in (by_inertia, by_inertia_and_motor, by_motor))
 
@@ -154,7 +155,7 @@ def wish_of(
     )
 
 
-def wanted_nod(tune: bool, like: Path | None, rise: float | None, overshoot: float | None) -> Nod | None:
+def wanted_nod(tune: bool, like: Path | None, rise: float | None, overshoot: float | None) -> NodTarget | None:
     """Take the nod to tune to: the paper's adult, a measured one, or as given; ``None`` where none is asked for."""
     if like is not None:
         if rise is not None or overshoot is not None:
@@ -166,15 +167,13 @@ def wanted_nod(tune: bool, like: Path | None, rise: float | None, overshoot: flo
 
 
 @dataclass(frozen=True)
-class Plant:
+class ControlledPlant:
     """What is to be controlled, and the units of its loop."""
 
     transfer: control.TransferFunction
     name: str
-    unit: str
-    """Of its output per step of the input, as a key ends in it."""
-    output: str
-    """The same as it is printed."""
+    output: Unit
+    """Of its output per step of the input."""
     gain_unit: str
     """Of K_p."""
     rate_unit: str
@@ -183,18 +182,20 @@ class Plant:
     """Of what K_p and K_d are the gains, in words."""
 
 
-def chosen_plant(model: Path | None, neck: Neck | None) -> Plant:
+def chosen_plant(model: Path | None, neck: DeclaredNeck | None) -> ControlledPlant:
     """Return what is to be controlled: SYS2, a fitted model or a neck by Eq. (28)."""
     if model is not None:
         read = read_model(model)
         of = "K_p and K_d from angle to command, both of the head"
-        return Plant(transfer_function(read), f"the fitted model ({read.name})", "", "°/°", "°/°", "°·s/°", of)
+        return ControlledPlant(
+            transfer_function(read), f"the fitted model ({read.name})", Unit("", "°/°"), "°/°", "°·s/°", of
+        )
     if neck is not None:
         plant, of = linear_plant(linear_neck(neck.parameters)), "K_p and K_d from the head's angle to the servo's input"
-        return Plant(plant, "the neck by Eq. (28)", "rad_per_V", "rad/V", "V/rad", "V·s/rad", of)
+        return ControlledPlant(plant, "the neck by Eq. (28)", Unit("rad_per_V", "rad/V"), "V/rad", "V·s/rad", of)
     step = math.degrees(STEP)
     of = f"Eq. (37) in the paper's input unit: 1 stands for a command of {step:g}°, so K_p = 0.01 is {0.01 * step:g}°/°"
-    return Plant(sys2(), "SYS2", "deg", "°", "1/°", "s/°", of)
+    return ControlledPlant(sys2(), "SYS2", Unit("deg", "°"), "1/°", "s/°", of)
 
 
 def default_gains(plant: control.TransferFunction) -> tuple[list[float], list[float]]:
@@ -233,8 +234,10 @@ def simulated_loop(neck: LargeAngleNeck, loop: ClosedLoop) -> PdMotion:
     )
 
 
-def _nod(rise: float | None, overshoot: float | None) -> Nod:
-    wanted = Nod(ADULT.rise_time if rise is None else rise, ADULT.overshoot if overshoot is None else overshoot / 100.0)
+def _nod(rise: float | None, overshoot: float | None) -> NodTarget:
+    wanted = NodTarget(
+        ADULT.rise_time if rise is None else rise, ADULT.overshoot if overshoot is None else overshoot / 100.0
+    )
     if not (0.0 < wanted.rise_time < math.inf and 0.0 <= wanted.overshoot < math.inf):
         raise ValueError(
             f"a nod with a rise time of {wanted.rise_time:g} s and an overshoot of {100.0 * wanted.overshoot:g} % "

@@ -47,7 +47,7 @@ _TIME_CONSTANTS = 14.0
 
 
 @dataclass(frozen=True)
-class System:
+class ComparedModel:
     """A model of the neck from command to angle."""
 
     name: str
@@ -115,7 +115,7 @@ class SideBySide:
     """s."""
     command: Command
     """rad."""
-    systems: tuple[System, ...]
+    systems: tuple[ComparedModel, ...]
     angles: tuple[Floats, ...]
     """Of each system, rad."""
     measured: Floats | None
@@ -124,7 +124,7 @@ class SideBySide:
     """Of measured minus each system's angle, rad, by its name; empty without a measurement."""
 
 
-def paper_systems(neck: LargeAngleNeck) -> tuple[System, ...]:
+def paper_systems(neck: LargeAngleNeck) -> tuple[ComparedModel, ...]:
     """Return SYS1, the neck by Eq. (28), SYS2 and the neck by Eq. (31).
 
     Parameters
@@ -134,7 +134,7 @@ def paper_systems(neck: LargeAngleNeck) -> tuple[System, ...]:
 
     Returns
     -------
-    tuple of System
+    tuple of ComparedModel
         In that order.
     """
     linear = linear_neck(neck.parameters)
@@ -144,18 +144,18 @@ def paper_systems(neck: LargeAngleNeck) -> tuple[System, ...]:
     return (
         second_order("SYS1", "Eq. (30), identified", SYS1),
         second_order("small angles", "Eq. (28)", (linear.a, linear.b, gain)),
-        System("SYS2", "Eq. (36)", ThirdOrder(), np.concatenate([below[1:], above]), (above, below)),
-        System("large angles", "Eq. (31)", LargeAngle(neck, free=()), np.empty(0), None),
+        ComparedModel("SYS2", "Eq. (36)", ThirdOrder(), np.concatenate([below[1:], above]), (above, below)),
+        ComparedModel("large angles", "Eq. (31)", LargeAngle(neck, free=()), np.empty(0), None),
     )
 
 
-def second_order(name: str, equation: str, abc: Sequence[float]) -> System:
+def second_order(name: str, equation: str, abc: Sequence[float]) -> ComparedModel:
     """Return a system of Eq. (30) from a (1/s), b (1/s²) and c (1/s²)."""
     a, b, c = abc
-    return System(name, equation, Plant(), np.array([a, b, c]), (np.array([c]), np.array([1.0, a, b])))
+    return ComparedModel(name, equation, Plant(), np.array([a, b, c]), (np.array([c]), np.array([1.0, a, b])))
 
 
-def fitted_system(model: FittedModel) -> System:
+def fitted_system(model: FittedModel) -> ComparedModel:
     """Return the system of a model that ``anglecam identify`` has fitted.
 
     Raises
@@ -167,15 +167,15 @@ def fitted_system(model: FittedModel) -> System:
         raise ValueError("the model was fitted to free swings: it has no input to step")
     kind: Model = Plant() if len(model.denominator) == 3 else ThirdOrder()
     parameters = np.concatenate([model.denominator[1:], model.numerator])
-    return System("fitted", model.name, kind, parameters, (model.numerator, model.denominator))
+    return ComparedModel("fitted", model.name, kind, parameters, (model.numerator, model.denominator))
 
 
-def side_by_side(systems: Sequence[System], record: Record | None = None) -> SideBySide:
+def side_by_side(systems: Sequence[ComparedModel], record: Record | None = None) -> SideBySide:
     """Drive models by `SERIES`, or by the command of a measurement.
 
     Parameters
     ----------
-    systems : sequence of System
+    systems : sequence of ComparedModel
         To drive; they are held as they are.
     record : Record, optional
         With a command. Nothing is fitted: every model begins at rest at the measured start, and a zero that is not
@@ -202,7 +202,7 @@ def side_by_side(systems: Sequence[System], record: Record | None = None) -> Sid
     return SideBySide(record.time, record.command, tuple(systems), angles, record.angle, rmse)
 
 
-def _at_rest(system: System, angle: float, command: float) -> Floats:
+def _at_rest(system: ComparedModel, angle: float, command: float) -> Floats:
     """Return the state of rest at an angle, rad, with a command, rad: of SYS2's form the inner two stand still too."""
     state = np.zeros(system.model.states)
     state[0] = angle

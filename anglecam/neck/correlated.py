@@ -20,7 +20,7 @@ _STEP = 1e-30
 
 
 @dataclass(frozen=True)
-class Quantity:
+class UncertainValue:
     """A number and its standard uncertainty, in one unit."""
 
     value: float
@@ -29,7 +29,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Joint:
+class CorrelatedQuantities:
     """Named quantities with one covariance; each in its own SI unit."""
 
     names: tuple[str, ...]
@@ -38,14 +38,14 @@ class Joint:
     covariance: Floats
     """(n, n)."""
 
-    def __getitem__(self, name: str) -> Quantity:
+    def __getitem__(self, name: str) -> UncertainValue:
         i = self.names.index(name)
-        return Quantity(float(self.values[i]), float(np.sqrt(max(self.covariance[i, i], 0.0))))
+        return UncertainValue(float(self.values[i]), float(np.sqrt(max(self.covariance[i, i], 0.0))))
 
     def __contains__(self, name: object) -> bool:
         return name in self.names
 
-    def __add__(self, other: Joint) -> Joint:
+    def __add__(self, other: CorrelatedQuantities) -> CorrelatedQuantities:
         """Put beside each other what is known independently."""
         shared = set(self.names) & set(other.names)
         if shared:
@@ -53,9 +53,9 @@ class Joint:
         n = len(self.names)
         both = np.zeros((n + len(other.names),) * 2)
         both[:n, :n], both[n:, n:] = self.covariance, other.covariance
-        return Joint(self.names + other.names, np.concatenate([self.values, other.values]), both)
+        return CorrelatedQuantities(self.names + other.names, np.concatenate([self.values, other.values]), both)
 
-    def replaced(self, **quantities: Quantity) -> Joint:
+    def replaced(self, **quantities: UncertainValue) -> CorrelatedQuantities:
         """Return the same with some quantities known otherwise, independently of the rest.
 
         Raises
@@ -72,9 +72,9 @@ class Joint:
             values[i] = quantity.value
             covariance[i, :] = covariance[:, i] = 0.0
             covariance[i, i] = quantity.sigma**2
-        return Joint(self.names, values, covariance)
+        return CorrelatedQuantities(self.names, values, covariance)
 
-    def derived(self, relation: Callable[[Mapping[str, Any]], Mapping[str, Any]]) -> Joint:
+    def derived(self, relation: Callable[[Mapping[str, Any]], Mapping[str, Any]]) -> CorrelatedQuantities:
         """Add what follows from the quantities.
 
         Parameters
@@ -85,7 +85,7 @@ class Joint:
 
         Returns
         -------
-        Joint
+        CorrelatedQuantities
             The quantities, then those that follow.
         """
         told = relation(dict(zip(self.names, self.values.tolist(), strict=True)))
@@ -96,14 +96,14 @@ class Joint:
             answer = relation(dict(zip(self.names, moved.tolist(), strict=True)))
             slopes[:, i] = [np.imag(answer[name]) / _STEP for name in told]
         carried = np.vstack([np.eye(len(self.names)), slopes])
-        return Joint(
+        return CorrelatedQuantities(
             self.names + tuple(told),
             np.concatenate([self.values, np.array([float(np.real(v)) for v in told.values()])]),
             carried @ self.covariance @ carried.T,
         )
 
 
-def joint(values: Mapping[str, float], uncertainty: ArrayLike) -> Joint:
+def correlated(values: Mapping[str, float], uncertainty: ArrayLike) -> CorrelatedQuantities:
     """Put quantities together with what is known of their errors.
 
     Parameters
@@ -115,7 +115,7 @@ def joint(values: Mapping[str, float], uncertainty: ArrayLike) -> Joint:
 
     Returns
     -------
-    Joint
+    CorrelatedQuantities
         In the mapping's order.
 
     Raises
@@ -139,4 +139,4 @@ def joint(values: Mapping[str, float], uncertainty: ArrayLike) -> Joint:
     scaled = covariance / np.outer(np.where(size > 0, size, 1.0), np.where(size > 0, size, 1.0))
     if not np.allclose(scaled, scaled.T, atol=1e-9) or np.linalg.eigvalsh(scaled).min() < -1e-9:
         raise ValueError(f"the covariance of {', '.join(values)} is not symmetric and positive semidefinite")
-    return Joint(tuple(values), centre, covariance)
+    return CorrelatedQuantities(tuple(values), centre, covariance)
