@@ -1,8 +1,8 @@
-"""Quantities that are uncertain together, and what follows from them.
+"""Quantities with a common covariance, and the propagation of that covariance to derived quantities.
 
-A relation y = f(x) carries the covariance of x to y by its slope, Σ_y = D·Σ_x·Dᵀ (JCGM 102, 6.2.1.3), and what follows
-stays correlated with what it follows from: a second relation that uses both loses nothing. The slope is exact, by a
-step along the imaginary axis: ∂f/∂x = Im f(x + i·s)/s with no difference to cancel (Squire & Trapp 1998).
+A relation y = f(x) propagates the covariance of x to y through its Jacobian, Σ_y = D·Σ_x·Dᵀ (JCGM 102, 6.2.1.3).
+Derived quantities stay correlated with those they derive from, so a second relation may use both. The Jacobian is
+exact, by a complex step: ∂f/∂x = Im f(x + i·s)/s, without the cancellation of a difference (Squire & Trapp 1998).
 """
 
 from __future__ import annotations
@@ -17,20 +17,21 @@ from numpy.typing import ArrayLike
 from anglecam.data.typing import Floats
 
 _STEP = 1e-30
+"""s of the complex step: so small that its square vanishes beside 1."""
 
 
 @dataclass(frozen=True)
 class UncertainValue:
-    """A number and its standard uncertainty, in one unit."""
+    """A number and its standard uncertainty, in the same unit."""
 
     value: float
     sigma: float = 0.0
-    """0 where it is taken as exact."""
+    """0 for a value that counts as exact."""
 
 
 @dataclass(frozen=True)
 class CorrelatedQuantities:
-    """Named quantities with one covariance; each in its own SI unit."""
+    """Named quantities with a common covariance, each in SI."""
 
     names: tuple[str, ...]
     values: Floats
@@ -46,17 +47,17 @@ class CorrelatedQuantities:
         return name in self.names
 
     def __add__(self, other: CorrelatedQuantities) -> CorrelatedQuantities:
-        """Put beside each other what is known independently."""
+        """Join two sets of quantities that are independent of each other."""
         shared = set(self.names) & set(other.names)
         if shared:
-            raise ValueError(f"{', '.join(sorted(shared))} stands on both sides")
+            raise ValueError(f"{', '.join(sorted(shared))} is in both sets")
         n = len(self.names)
         both = np.zeros((n + len(other.names),) * 2)
         both[:n, :n], both[n:, n:] = self.covariance, other.covariance
         return CorrelatedQuantities(self.names + other.names, np.concatenate([self.values, other.values]), both)
 
     def replaced(self, **quantities: UncertainValue) -> CorrelatedQuantities:
-        """Return the same with some quantities known otherwise, independently of the rest.
+        """Return a copy in which some quantities have other values, independent of the rest.
 
         Raises
         ------
@@ -75,36 +76,36 @@ class CorrelatedQuantities:
         return CorrelatedQuantities(self.names, values, covariance)
 
     def derived(self, relation: Callable[[Mapping[str, Any]], Mapping[str, Any]]) -> CorrelatedQuantities:
-        """Add what follows from the quantities.
+        """Return the quantities with derived ones appended.
 
         Parameters
         ----------
         relation : callable
-            From a mapping of names to numbers to another one; built of analytic operations only (no ``abs``, no
+            From a mapping of names to numbers to a mapping of derived ones; analytic operations only (no ``abs``, no
             comparison), because it is called with complex numbers.
 
         Returns
         -------
         CorrelatedQuantities
-            The quantities, then those that follow.
+            The quantities, then the derived ones.
         """
-        told = relation(dict(zip(self.names, self.values.tolist(), strict=True)))
-        slopes = np.empty((len(told), len(self.names)))
+        derived = relation(dict(zip(self.names, self.values.tolist(), strict=True)))
+        slopes = np.empty((len(derived), len(self.names)))
         for i in range(len(self.names)):
-            moved = self.values.astype(complex)
-            moved[i] += 1j * _STEP
-            answer = relation(dict(zip(self.names, moved.tolist(), strict=True)))
-            slopes[:, i] = [np.imag(answer[name]) / _STEP for name in told]
-        carried = np.vstack([np.eye(len(self.names)), slopes])
+            shifted = self.values.astype(complex)
+            shifted[i] += 1j * _STEP
+            complex_result = relation(dict(zip(self.names, shifted.tolist(), strict=True)))
+            slopes[:, i] = [np.imag(complex_result[name]) / _STEP for name in derived]
+        jacobian = np.vstack([np.eye(len(self.names)), slopes])
         return CorrelatedQuantities(
-            self.names + tuple(told),
-            np.concatenate([self.values, np.array([float(np.real(v)) for v in told.values()])]),
-            carried @ self.covariance @ carried.T,
+            self.names + tuple(derived),
+            np.concatenate([self.values, np.array([float(np.real(v)) for v in derived.values()])]),
+            jacobian @ self.covariance @ jacobian.T,
         )
 
 
 def correlated(values: Mapping[str, float], uncertainty: ArrayLike) -> CorrelatedQuantities:
-    """Put quantities together with what is known of their errors.
+    """Return quantities with their standard uncertainties or covariance.
 
     Parameters
     ----------
@@ -116,12 +117,12 @@ def correlated(values: Mapping[str, float], uncertainty: ArrayLike) -> Correlate
     Returns
     -------
     CorrelatedQuantities
-        In the mapping's order.
+        In the order of the mapping.
 
     Raises
     ------
     ValueError
-        If a value is not finite, or the covariance is of another size, not symmetric or not positive semidefinite.
+        If a value is not finite, or the covariance has another size, is not symmetric or is not positive semidefinite.
     """
     given = np.asarray(uncertainty, dtype=float)
     n = len(values)

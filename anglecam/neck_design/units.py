@@ -40,7 +40,11 @@ class Column:
     heading: str
     """May hold ``{name}`` placeholders, which `anglecam.neck_design.render.Rows` fills in."""
     cell: int | str | Callable[[Any], str] = ""
-    """Digits after the point, a format specification, or a function of the row."""
+    """Digits after the point, a format specification, or a function of the row.
+
+    The function is named, not a lambda: `typing.get_type_hints` evaluates annotations with the class as globals, where
+    a lambda would not find the module's names.
+    """
 
 
 @dataclass(frozen=True)

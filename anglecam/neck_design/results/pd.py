@@ -35,9 +35,9 @@ from anglecam.neck_design.units import (
 class LoopRow:
     """A closed loop; its gains are in the unit of the plant's input over that of its output."""
 
-    proportional: Annotated[float, Column("K_p, {proportional}", lambda loop: gain(loop.proportional))]
+    proportional: Annotated[float, Column("K_p, {proportional}", _proportional_text)]
     """K_p."""
-    derivative: Annotated[Time, Column("K_d, {derivative_s}", lambda loop: gain(loop.derivative))]
+    derivative: Annotated[Time, Column("K_d, {derivative_s}", _derivative_text)]
     """K_d, s times the unit of K_p."""
     step: Annotated[Step, INLINE]
     steady_state: Annotated[WithUnit, Column("steady state, {output}", 3)]
@@ -49,6 +49,14 @@ class LoopRow:
     delay_margin: Time
     modulus_margin: float
     sensitivity: Annotated[float, Column("M_s", 2)]
+
+
+def _proportional_text(loop: LoopRow) -> str:
+    return gain(loop.proportional)
+
+
+def _derivative_text(loop: LoopRow) -> str:
+    return gain(loop.derivative)
 
 
 @dataclass(frozen=True)

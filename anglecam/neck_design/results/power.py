@@ -18,7 +18,7 @@ from anglecam.neck_design.units import INTERNAL, OHM, VOLT, Ampere, Amperes, Col
 class NodRow:
     """Energy and power of one nod."""
 
-    start: Annotated[Time, Column("nod, s", lambda nod: f"{number(nod.start, 3)} … {number(nod.end, 3)}")]
+    start: Annotated[Time, Column("nod, s", _span_text)]
     end: Time
     energy: Annotated[float, Unit("J"), Column("energy, J", 3)]
     charge: Annotated[float, Unit("A_s")]
@@ -26,6 +26,10 @@ class NodRow:
     peak_power: Annotated[Watt, Column("peak, W", 3)]
     peak_current: Annotated[Ampere, Column("peak, A", 3)]
     lowest_voltage: Annotated[Voltage, Column("lowest, V", 3)]
+
+
+def _span_text(nod: NodRow) -> str:
+    return f"{number(nod.start, 3)} … {number(nod.end, 3)}"
 
 
 @dataclass(frozen=True)

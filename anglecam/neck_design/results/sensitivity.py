@@ -23,12 +23,16 @@ class SensitivityRow:
 
     symbol: Annotated[str, Column("% for 1 % of")]
     name: Annotated[str, Column("")]
-    value: Annotated[float, Column("value", lambda row: quantity(row.value, row.unit))]
+    value: Annotated[float, Column("value", _value_text)]
     unit: str
     rise_time: Annotated[Percentage, Column("rise", 3)]
     overshoot: Annotated[Percentage, Column("overshoot", 3)]
     settling_time: Annotated[Percentage, Column("settling", 3)]
     steady_state: Annotated[Percentage, Column("gain", 3)]
+
+
+def _value_text(row: SensitivityRow) -> str:
+    return quantity(row.value, row.unit)
 
 
 @dataclass(frozen=True)
