@@ -1,8 +1,9 @@
-"""A neck declared in a file: ``NECK.yaml``, every key optional, an unknown key an error, the defaults the paper's.
+"""Read a neck from a file, ``NECK.yaml``: every key is optional, an unknown key is an error, defaults are the paper's.
 
-Keys end in their unit: SI, and degrees where they end in ``_deg``. The paper's design example is not quite its Table 5:
-it weighs 2.319 kg instead of 2.31, rounds J to 0.0058 kg·m² and begins with the damping of the oil film where Table 5
-has what was identified. Where ``head`` or ``damping_N_m_s`` is not declared, the design takes those.
+Keys end in their unit: SI, and degrees where they end in ``_deg``. The paper's design example differs from its Table 5:
+the mass is 2.319 kg instead of 2.31 kg, J is rounded to 0.0058 kg·m², and the damping is that of the oil film where
+Table 5 has the identified value. Where ``head`` or ``damping_N_m_s`` is not declared, the design procedure uses the
+values of that example.
 """
 
 # ruff: noqa: N815 - keys are written with the units of SI
@@ -19,12 +20,12 @@ from pydantic import Field
 from anglecam.errors import RigError
 from anglecam.io.yaml_schema import Declared, Finite, NotNegative, Positive, read_declared
 from anglecam.neck.command_table import TABLE_3, CommandScale
-from anglecam.neck.damping import Film
+from anglecam.neck.correlated import CorrelatedQuantities, UncertainValue
+from anglecam.neck.damping import OilFilm
 from anglecam.neck.design import known
 from anglecam.neck.fourbar import FourBar
-from anglecam.neck.joint import Joint, Quantity
 from anglecam.neck.large_angle import LargeAngleNeck
-from anglecam.neck.parameters import PAPER, Head, NeckParameters, Servo, Spring
+from anglecam.neck.parameters import PAPER, HeadParameters, NeckParameters, ServoParameters, SpringParameters
 from anglecam.neck.turning import TurningMechanism
 from anglecam.neck.variation import nod_slope
 
@@ -32,44 +33,44 @@ Slope = Annotated[float, Field(gt=-10, lt=10, allow_inf_nan=False)]
 Angle = Annotated[float, Field(gt=-180, lt=180, allow_inf_nan=False)]
 
 EXAMPLE_MASS, EXAMPLE_INERTIA = 2.319, 0.0058
-"""Of the paper's design example: M_h, kg, in the weight, and J, kg·m²."""
+"""The paper's design example: M_h, kg, in the weight, and J, kg·m²."""
 
 
 @dataclass(frozen=True)
-class Bearing:
-    """The thrust bearing that the head turns on, Eq. (4)."""
+class ThrustBearing:
+    """The thrust bearing that carries the turning head, Eq. (4)."""
 
     friction: float = 0.001
-    """f, as the paper estimates it."""
+    """f, the paper's estimate."""
     bore: float = 12.7e-3
     """d, m."""
 
 
 @dataclass(frozen=True)
-class Neck:
-    """All that the calculations of a neck are of."""
+class DeclaredNeck:
+    """A neck in SI: the input of every calculation of ``anglecam neck``."""
 
     parameters: NeckParameters
     large_angle: LargeAngleNeck
     scale: CommandScale
-    """From the 8-bit command to the servo."""
+    """From the 8-bit command to the servo angle."""
     turning: TurningMechanism
-    bearing: Bearing
-    film: Film
+    bearing: ThrustBearing
+    film: OilFilm
     example: NeckParameters
-    """What the design procedure is of."""
-    beforehand: Joint
-    """What it takes as known; see `anglecam.neck.design.known`."""
+    """The neck that the design procedure starts from."""
+    known: CorrelatedQuantities
+    """What the design procedure takes as known; see `anglecam.neck.design.known`."""
 
 
-class _Linkage(Declared):
+class _LinkageKeys(Declared):
     ground_m: Positive = PAPER.linkage.ground
     coupler_m: Positive = PAPER.linkage.coupler
     rocker_m: Positive = PAPER.linkage.rocker
     crank_m: Positive = PAPER.linkage.crank
 
 
-class _Servo(Declared):
+class _ServoKeys(Declared):
     motor_constant_N_m_per_A: Positive = PAPER.servo.motor_constant
     amplifier_gain: Positive = PAPER.servo.amplifier_gain
     gear_ratio: Positive = PAPER.servo.gear_ratio
@@ -79,7 +80,7 @@ class _Servo(Declared):
     command_gain_V_per_rad: Positive = PAPER.servo.command_gain
 
 
-class _Head(Declared):
+class _HeadKeys(Declared):
     mass_kg: Positive = PAPER.head.mass
     centre_of_mass_m: Positive = PAPER.head.centre_of_mass
     own_inertia_kg_m2: NotNegative = PAPER.head.own_inertia
@@ -87,42 +88,42 @@ class _Head(Declared):
     gravity_m_per_s2: NotNegative = PAPER.head.gravity
 
 
-class _Spring(Declared):
+class _SpringKeys(Declared):
     rate_N_per_m: Positive = PAPER.spring.rate
     base_m: Positive = PAPER.spring.base
     arm_m: Positive = PAPER.spring.arm
     common_stretch_m: NotNegative | None = None
-    """Of two springs against each other; null for the paper's single one that also pushes."""
+    """Of two springs that oppose each other; null for the paper's single spring, which can also push."""
     pretension_error_N_m: Finite = 0.0
-    """Torque at neutral by which they carry more than the head."""
+    """Torque at neutral by which the springs exceed the head's weight."""
 
 
-class _Turning(Declared):
+class _TurningKeys(Declared):
     crank_m: Positive = TurningMechanism.crank
     distance_m: Positive = TurningMechanism.distance
     offset_m: Finite = TurningMechanism.offset
     travel_deg: Annotated[float, Field(gt=0, le=180)] = math.degrees(TurningMechanism.travel)
 
 
-class _Bearing(Declared):
-    friction: NotNegative = Bearing.friction
-    bore_m: Positive = Bearing.bore
+class _BearingKeys(Declared):
+    friction: NotNegative = ThrustBearing.friction
+    bore_m: Positive = ThrustBearing.bore
 
 
-class _Film(Declared):
-    viscosity_N_s_per_m2: Positive = Film.viscosity
-    diameter_m: Positive = Film.diameter
-    width_m: Positive = Film.width
-    thickness_m: Positive = Film.thickness
+class _FilmKeys(Declared):
+    viscosity_N_s_per_m2: Positive = OilFilm.viscosity
+    diameter_m: Positive = OilFilm.diameter
+    width_m: Positive = OilFilm.width
+    thickness_m: Positive = OilFilm.thickness
 
 
-class _Command(Declared):
+class _CommandKeys(Declared):
     up_deg_per_count: Positive = math.degrees(TABLE_3.up)
     down_deg_per_count: Positive = math.degrees(TABLE_3.down)
 
 
-class _Sigma(Declared):
-    """Standard uncertainties of what is known, in the units of the keys; the rest counts as exact."""
+class _SigmaKeys(Declared):
+    """Standard uncertainties of the known quantities, in the units of the keys; the others count as exact."""
 
     sensor_gain_V_per_rad: NotNegative = 0.0
     motor_constant_N_m_per_A: NotNegative = 0.0
@@ -158,30 +159,30 @@ _SYMBOLS = {
     "damping_N_m_s": "C",
     "gamma": "gamma",
 }
-"""Keys of `_Sigma` by what `anglecam.neck.design.known` calls them."""
+"""Symbol in `anglecam.neck.design.known` of each key of `_SigmaKeys`."""
 
 
 class NeckFile(Declared):
-    """What a neck file may hold."""
+    """The keys of a neck file."""
 
-    linkage: _Linkage = _Linkage()
-    servo: _Servo = _Servo()
-    head: _Head | None = None
-    spring: _Spring = _Spring()
+    linkage: _LinkageKeys = _LinkageKeys()
+    servo: _ServoKeys = _ServoKeys()
+    head: _HeadKeys | None = None
+    spring: _SpringKeys = _SpringKeys()
     damping_N_m_s: NotNegative | None = None
     gamma: Slope | None = None
-    """Slope dθ_f/dθ_s; of declared links the line fitted over the nod, else the paper's −0.36."""
+    """Slope dθ_f/dθ_s. Default: the line fitted over the nod where links are declared, else the paper's −0.36."""
     linkage_slope: Literal["constant", "exact"] = "constant"
-    """Whether Eq. (31) takes γ as constant or follows the four-bar."""
-    turning: _Turning = _Turning()
-    bearing: _Bearing = _Bearing()
-    film: _Film = _Film()
-    command: _Command = _Command()
-    sigma: _Sigma = _Sigma()
+    """Whether γ of Eq. (31) is constant or follows the four-bar."""
+    turning: _TurningKeys = _TurningKeys()
+    bearing: _BearingKeys = _BearingKeys()
+    film: _FilmKeys = _FilmKeys()
+    command: _CommandKeys = _CommandKeys()
+    sigma: _SigmaKeys = _SigmaKeys()
 
 
-def read_neck(path: Path | None) -> Neck:
-    """Read a neck file, or take the paper's neck.
+def read_neck(path: Path | None) -> DeclaredNeck:
+    """Read a neck file; without a path, return the paper's neck.
 
     Parameters
     ----------
@@ -190,32 +191,32 @@ def read_neck(path: Path | None) -> Neck:
 
     Returns
     -------
-    Neck
+    DeclaredNeck
         In SI.
 
     Raises
     ------
     RigError
-        Naming the file, the key and the cause; also where the declared links close nowhere.
+        With the file, the key and the cause; also where the declared links cannot close at any angle.
     """
     if path is None:
         return neck_of(NeckFile())
-    told = read_declared(path, NeckFile)
+    declared = read_declared(path, NeckFile)
     try:
-        return neck_of(told)
+        return neck_of(declared)
     except ValueError as fault:
         raise RigError(f"{path}: {fault}") from fault
 
 
-def neck_of(told: NeckFile) -> Neck:
-    """Put together what a file declares; see `read_neck`."""
-    links, servo, spring, turning = told.linkage, told.servo, told.spring, told.turning
+def neck_of(declared: NeckFile) -> DeclaredNeck:
+    """Return the neck that a file declares, in SI; see `read_neck`."""
+    links, servo, spring, turning = declared.linkage, declared.servo, declared.spring, declared.turning
     linkage = FourBar(links.ground_m, links.coupler_m, links.rocker_m, links.crank_m)
-    gamma = told.gamma
+    gamma = declared.gamma
     if gamma is None:
         gamma = PAPER.gamma if linkage == PAPER.linkage else nod_slope(linkage)
     parameters = NeckParameters(
-        servo=Servo(
+        servo=ServoParameters(
             motor_constant=servo.motor_constant_N_m_per_A,
             amplifier_gain=servo.amplifier_gain,
             gear_ratio=servo.gear_ratio,
@@ -224,53 +225,54 @@ def neck_of(told: NeckFile) -> Neck:
             rotor_inertia=servo.rotor_inertia_kg_m2,
             command_gain=servo.command_gain_V_per_rad,
         ),
-        head=_head(told.head or _Head()),
-        spring=Spring(spring.rate_N_per_m, spring.base_m, spring.arm_m),
+        head=_head(declared.head or _HeadKeys()),
+        spring=SpringParameters(spring.rate_N_per_m, spring.base_m, spring.arm_m),
         linkage=linkage,
-        damping=PAPER.damping if told.damping_N_m_s is None else told.damping_N_m_s,
+        damping=PAPER.damping if declared.damping_N_m_s is None else declared.damping_N_m_s,
         gamma=gamma,
     )
-    film = Film(told.film.viscosity_N_s_per_m2, told.film.diameter_m, told.film.width_m, told.film.thickness_m)
-    example = _example(told, parameters, film)
-    return Neck(
+    oil = declared.film
+    film = OilFilm(oil.viscosity_N_s_per_m2, oil.diameter_m, oil.width_m, oil.thickness_m)
+    example = _example(declared, parameters, film)
+    return DeclaredNeck(
         parameters=parameters,
         large_angle=LargeAngleNeck(
-            parameters, told.linkage_slope, spring.common_stretch_m, spring.pretension_error_N_m
+            parameters, declared.linkage_slope, spring.common_stretch_m, spring.pretension_error_N_m
         ),
         scale=CommandScale(
-            up=math.radians(told.command.up_deg_per_count), down=math.radians(told.command.down_deg_per_count)
+            up=math.radians(declared.command.up_deg_per_count), down=math.radians(declared.command.down_deg_per_count)
         ),
         turning=TurningMechanism(
             turning.crank_m, turning.distance_m, turning.offset_m, math.radians(turning.travel_deg)
         ),
-        bearing=Bearing(told.bearing.friction, told.bearing.bore_m),
+        bearing=ThrustBearing(declared.bearing.friction, declared.bearing.bore_m),
         film=film,
         example=example,
-        beforehand=_beforehand(told, example),
+        known=_known(declared, example),
     )
 
 
-def _head(told: _Head) -> Head:
-    return Head(
-        told.mass_kg,
-        told.centre_of_mass_m,
-        told.own_inertia_kg_m2,
-        math.radians(told.neutral_deg),
-        told.gravity_m_per_s2,
+def _head(keys: _HeadKeys) -> HeadParameters:
+    return HeadParameters(
+        keys.mass_kg,
+        keys.centre_of_mass_m,
+        keys.own_inertia_kg_m2,
+        math.radians(keys.neutral_deg),
+        keys.gravity_m_per_s2,
     )
 
 
-def _example(told: NeckFile, neck: NeckParameters, film: Film) -> NeckParameters:
-    """Put the paper's design example in place of what is not declared."""
-    if told.damping_N_m_s is None:
+def _example(declared: NeckFile, neck: NeckParameters, film: OilFilm) -> NeckParameters:
+    """Replace what is not declared by the paper's design example."""
+    if declared.damping_N_m_s is None:
         neck = replace(neck, damping=film.damping)
-    if told.head is None:
+    if declared.head is None:
         neck = replace(neck, head=replace(neck.head, mass=EXAMPLE_MASS))
     return neck
 
 
-def _beforehand(told: NeckFile, neck: NeckParameters) -> Joint:
-    errors = {_SYMBOLS[key]: value for key, value in told.sigma.model_dump().items()}
+def _known(declared: NeckFile, neck: NeckParameters) -> CorrelatedQuantities:
+    errors = {_SYMBOLS[key]: value for key, value in declared.sigma.model_dump().items()}
     errors["theta_0"] = math.radians(errors["theta_0"])
     taken = known(neck, errors)
-    return taken.replaced(inertia=Quantity(EXAMPLE_INERTIA)) if told.head is None else taken
+    return taken.replaced(inertia=UncertainValue(EXAMPLE_INERTIA)) if declared.head is None else taken

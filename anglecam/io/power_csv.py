@@ -1,4 +1,4 @@
-"""A servo's log of voltage and current."""
+"""Read a servo's log of voltage and current."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ def read_power_log(path: Path) -> PowerLog:
     Parameters
     ----------
     path : Path
-        CSV with ``time_s,voltage_v,current_a``; further columns are left alone.
+        CSV with ``time_s,voltage_v,current_a``; further columns are ignored.
 
     Returns
     -------
     PowerLog
-        As it stands.
+        Unfiltered.
 
     Raises
     ------
     InputError
-        Naming the file, the line and the cause.
+        With the file, the line and the cause.
     """
     table = read_columns(path, required=("time_s", "voltage_v", "current_a"))
     require_increasing(path, table["time_s"])

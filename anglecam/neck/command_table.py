@@ -1,24 +1,24 @@
-"""Table 3: from the 8-bit command to the servo's angle and the head's, and back.
+"""Table 3: convert between the 8-bit command, the servo angle and the head angle.
 
-The paper tells of the command in four places, which do not agree:
+The paper describes the command in four places, which do not agree:
 
-- Table 3 sends an "unsigned 8-bit" 127 for fully up, 0 for neutral and 125 for fully down. No unsigned number does
-  that: up and down would be two counts apart with neutral far from both. Its column "servo status" (maximum, neutral,
-  minimum) is the missing sign: 127 and 125 are counts away from neutral, to either side.
-- The text has the command run over 0-254 with neutral at 0. Over that range neutral is the middle, 127: up is then
-  127 + 127 = 254, the top, and down 127 − 125 = 2. That is what a Pololu controller, Table 2, understands in its Mini
-  SSC II mode, where 255 opens a message and cannot be a position. The 0 again is a count away from neutral.
-- Fig. 13 has 0-255 turn the servo's arm by 180°, 0.71° a count, and steps from 127. Table 3's θ_a are 81° for 127
-  counts and −73° for 125: 0.64° a count upwards and 0.58° downwards. At Fig. 13's rate 125 counts would take the crank
-  to 47°, 11° past its dead centre at 57.5°, where the head has turned back.
-- Table 2 resolves 1 µs, "about 0.1°". Mini SSC II spreads 0-254 over 500-2500 µs, 7.9 µs or about 0.7° a count: Fig. 13
-  again.
+- Table 3 sends an "unsigned 8-bit" 127 for fully up, 0 for neutral and 125 for fully down. Unsigned
+  numbers cannot mean that: up and down would be two counts apart, with neutral far from both. The column "servo status"
+  (maximum, neutral, minimum) supplies the missing sign: 127 and 125 are counts from neutral, to either side.
+- In the text the command runs over 0-254 with neutral at 0. Over that range neutral is the middle, 127: up is then
+  127 + 127 = 254, the top, and down 127 − 125 = 2. A Pololu controller, Table 2, uses this range in its Mini SSC II
+  mode, where 255 opens a message and cannot be a position. The 0 of the text is again a count from neutral.
+- In Fig. 13 the range 0-255 turns the servo's arm by 180°, 0.71° per count, and the step starts at 127. θ_a of Table 3
+  is 81° for 127 counts and −73° for 125: 0.64° per count upwards and 0.58° downwards. At the rate of Fig. 13, 125
+  counts would turn the crank to 47°, 11° past its dead centre at 57.5°, where the head has turned back.
+- Table 2 resolves 1 µs, "about 0.1°". Mini SSC II spreads 0-254 over 500-2500 µs, 7.9 µs or about 0.7° per count,
+  which agrees with Fig. 13.
 
-So a command is a byte from 0 to 254 with neutral in the middle, and a scale says how far a count turns the servo:
-`TABLE_3` follows the table's own rows, with a rate to either side, and is the default; `FIGURE_13` has the one rate of
-the servo's arm. Neither is a calibration of a particular servo; give your own rates where you have measured them.
+Here a command is a byte from 0 to 254 with neutral in the middle, and a scale gives the servo angle per count.
+`TABLE_3`, the default, follows the rows of the table, with one rate for each direction; `FIGURE_13` has the single rate
+of Fig. 13. Neither is a calibration of a particular servo: pass measured rates where they are known.
 
-Neutral is where the crank stands at 135°, θ_f = 46.8°; the paper rounds it to 45° and its extremes to 20° and 70°.
+At neutral the crank is at 135° and θ_f = 46.8°; the paper rounds it to 45° and its extremes to 20° and 70°.
 """
 
 from __future__ import annotations
@@ -40,12 +40,12 @@ MIDDLE = 127
 """Command at neutral."""
 
 STRAIGHT = (math.radians(60.0), math.radians(220.0))
-"""Range of θ_s of the straight line of Fig. 4, rad."""
+"""Range of θ_s over which the straight line of Fig. 4 is fitted, rad."""
 
 
 @dataclass(frozen=True)
 class CommandScale:
-    """How far a command turns the servo; the defaults are Table 3's."""
+    """Servo angle per count of the command; the defaults are those of Table 3."""
 
     neutral: float = NEUTRAL_SERVO
     """θ_s at the middle command, rad."""
@@ -58,18 +58,18 @@ class CommandScale:
 TABLE_3 = CommandScale()
 """127 counts for +81°, 125 counts for −73°."""
 FIGURE_13 = CommandScale(up=math.pi / 255, down=math.pi / 255)
-"""255 counts for 180° of the servo's arm."""
+"""255 counts turn the servo's arm by 180°."""
 
 
 @dataclass(frozen=True)
-class Row:
-    """A row of Table 3, worked out from its command."""
+class NeckPosition:
+    """A row of Table 3, computed from its command."""
 
     position: Literal["upward", "neutral", "down"]
     counts: int
-    """Away from neutral, as printed but with its sign."""
+    """Counts from neutral, as printed but signed."""
     command: int
-    """What is sent, 0 to 254."""
+    """Byte that is sent, 0 to 254."""
     theta_s: float
     """Servo angle, rad."""
     theta_a: float
@@ -85,14 +85,14 @@ class Row:
 
 
 def servo_of_command(command: ArrayLike, scale: CommandScale = TABLE_3) -> Floats:
-    """Servo angle that a command asks for.
+    """Return the servo angle of a command.
 
     Parameters
     ----------
     command : array_like of int
         0 to 254.
     scale : CommandScale
-        How far a count turns the servo.
+        Servo angle per count.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def servo_of_command(command: ArrayLike, scale: CommandScale = TABLE_3) -> Float
     Raises
     ------
     ValueError
-        If a command is no whole number from 0 to 254.
+        If a command is not a whole number from 0 to 254.
     """
     sent = np.asarray(command, dtype=float)
     wrong = ~((sent >= 0) & (sent <= HIGHEST) & (sent == np.round(sent)))
@@ -113,14 +113,14 @@ def servo_of_command(command: ArrayLike, scale: CommandScale = TABLE_3) -> Float
 
 
 def command_of_servo(theta_s: ArrayLike, scale: CommandScale = TABLE_3) -> Integers:
-    """Command that comes nearest to a servo angle.
+    """Return the command nearest to a servo angle.
 
     Parameters
     ----------
     theta_s : array_like
         Servo angle, rad.
     scale : CommandScale
-        How far a count turns the servo.
+        Servo angle per count.
 
     Returns
     -------
@@ -130,7 +130,7 @@ def command_of_servo(theta_s: ArrayLike, scale: CommandScale = TABLE_3) -> Integ
     Raises
     ------
     ValueError
-        If an angle is more than half a count beyond what 0 and 254 ask for.
+        If an angle is more than half a count beyond those of commands 0 and 254.
     """
     servo = np.asarray(theta_s, dtype=float)
     away = servo - scale.neutral
@@ -144,14 +144,14 @@ def command_of_servo(theta_s: ArrayLike, scale: CommandScale = TABLE_3) -> Integ
 
 
 def nod_limits(linkage: FourBar, scale: CommandScale = TABLE_3) -> tuple[float, float]:
-    """Lowest and highest nod that a command can reach without passing a dead centre of the crank.
+    """Return the lowest and highest nod that commands reach without passing a dead centre of the crank.
 
     Parameters
     ----------
     linkage : FourBar
         Link lengths, m.
     scale : CommandScale
-        How far a count turns the servo.
+        Servo angle per count.
 
     Returns
     -------
@@ -176,7 +176,7 @@ def nod_limits(linkage: FourBar, scale: CommandScale = TABLE_3) -> tuple[float, 
 
 
 def nod_of_command(command: ArrayLike, linkage: FourBar, scale: CommandScale = TABLE_3) -> Floats:
-    """Nod that a command leads to, by exact closure of the links.
+    """Return the nod of a command, by exact closure of the links.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def nod_of_command(command: ArrayLike, linkage: FourBar, scale: CommandScale = T
     linkage : FourBar
         Link lengths, m.
     scale : CommandScale
-        How far a count turns the servo.
+        Servo angle per count.
 
     Returns
     -------
@@ -195,13 +195,13 @@ def nod_of_command(command: ArrayLike, linkage: FourBar, scale: CommandScale = T
     Raises
     ------
     ValueError
-        If a command is no whole number from 0 to 254, or the links cannot close there.
+        If a command is not a whole number from 0 to 254, or the links cannot close there.
     """
     return np.asarray(head_angle(linkage, scale.neutral) - head_angle(linkage, servo_of_command(command, scale)))
 
 
 def command_of_nod(nod: ArrayLike, linkage: FourBar, scale: CommandScale = TABLE_3) -> Integers:
-    """Command whose servo angle comes nearest to that of a wanted nod.
+    """Return the command whose servo angle is nearest to that of a wanted nod.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def command_of_nod(nod: ArrayLike, linkage: FourBar, scale: CommandScale = TABLE
     linkage : FourBar
         Link lengths, m.
     scale : CommandScale
-        How far a count turns the servo.
+        Servo angle per count.
 
     Returns
     -------
@@ -220,11 +220,11 @@ def command_of_nod(nod: ArrayLike, linkage: FourBar, scale: CommandScale = TABLE
     Raises
     ------
     ValueError
-        If a nod is beyond `nod_limits`, or they do not exist.
+        If a nod is beyond `nod_limits`, or these do not exist.
     """
     wanted = np.asarray(nod, dtype=float)
     low, high = nod_limits(linkage, scale)
-    slack = 1e-9  # an angle that was written down as the limit is still within it
+    slack = 1e-9  # a limit that was rounded when written down must still be accepted
     beyond = ~((wanted >= low - slack) & (wanted <= high + slack))
     if np.any(beyond):
         raise ValueError(
@@ -236,16 +236,16 @@ def command_of_nod(nod: ArrayLike, linkage: FourBar, scale: CommandScale = TABLE
 
 
 def resolution(command: ArrayLike, linkage: FourBar, scale: CommandScale = TABLE_3) -> Floats:
-    """How far the head turns per count about a command, from the linkage's slope there.
+    """Return the head angle per count around a command, from the slope of the linkage there.
 
     Parameters
     ----------
     command : array_like of int
-        0 to 254. At neutral, where the rate changes, the coarser one counts.
+        0 to 254. At neutral, where the rate changes, the larger rate is used.
     linkage : FourBar
         Link lengths, m.
     scale : CommandScale
-        How far a count turns the servo.
+        Servo angle per count.
 
     Returns
     -------
@@ -255,7 +255,7 @@ def resolution(command: ArrayLike, linkage: FourBar, scale: CommandScale = TABLE
     Raises
     ------
     ValueError
-        If a command is no whole number from 0 to 254, or the links cannot close there.
+        If a command is not a whole number from 0 to 254, or the links cannot close there.
     """
     servo = servo_of_command(command, scale)
     counts = np.asarray(command) - MIDDLE
@@ -263,19 +263,19 @@ def resolution(command: ArrayLike, linkage: FourBar, scale: CommandScale = TABLE
     return np.asarray(np.abs(slope(linkage, servo)) * per_count)
 
 
-def table_3(linkage: FourBar, scale: CommandScale = TABLE_3) -> tuple[Row, Row, Row]:
-    """Work out Table 3: its three commands, exact and by the straight line of Fig. 4.
+def table_3(linkage: FourBar, scale: CommandScale = TABLE_3) -> tuple[NeckPosition, NeckPosition, NeckPosition]:
+    """Compute Table 3: its three commands, by exact closure and by the straight line of Fig. 4.
 
     Parameters
     ----------
     linkage : FourBar
         Link lengths, m.
     scale : CommandScale
-        How far a count turns the servo.
+        Servo angle per count.
 
     Returns
     -------
-    tuple of Row
+    tuple of NeckPosition
         Upward, neutral, down.
 
     Raises
@@ -285,10 +285,10 @@ def table_3(linkage: FourBar, scale: CommandScale = TABLE_3) -> tuple[Row, Row, 
     """
     line = straight_line(linkage, *STRAIGHT)
 
-    def row(position: Literal["upward", "neutral", "down"], counts: int) -> Row:
+    def row(position: Literal["upward", "neutral", "down"], counts: int) -> NeckPosition:
         servo = float(servo_of_command(MIDDLE + counts, scale))
         away = servo - scale.neutral
-        return Row(
+        return NeckPosition(
             position=position,
             counts=counts,
             command=MIDDLE + counts,

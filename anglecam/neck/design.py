@@ -1,15 +1,15 @@
-"""The paper's design procedure: from an identified a, b, c to what the neck is made of, and how sure that is.
+"""The paper's design procedure: from identified a, b, c to the quantities of the neck, with their uncertainty.
 
-Of its seven steps, 1 and 2 choose a mechanism and measure a person, 3 is `identified`, 4 is `known`, 5 is one of three
-routes through
+The procedure has seven steps. Steps 1 and 2 choose a mechanism and measure a person, 3 is `identified`, 4 is `known`, 5
+is one of three routes through
 
     c  = c3/J                                       J stands for J + γ·J_r
     a/c = (C + c3·c4·γ)/c3                          Eq. (34a),  c3 = K_m·G_a/(G_g·R_a),  c4 = K_m/(G_a·G_g)
     b/c = h·γ + (K·L2·L6 − M_h·g·L·cos θ0)/c3       Eq. (34b)
     c3·h·γ + K·L2·L6 − M_h·g·L·cos θ0 > 0           Eq. (35)
 
-and 6 is `explained_neck`, from which `anglecam.neck.synthesis` goes on. Step 7, control, is `anglecam.neck.pd`. γ is
-the slope −0.36 = dθ_f/dθ_s, as in `anglecam.neck.linear`.
+and 6 is `explained_neck`, from which `anglecam.neck.synthesis` starts. Step 7, control, is `anglecam.neck.pd`. γ is the
+slope −0.36 = dθ_f/dθ_s, as in `anglecam.neck.linear`.
 
 ========================  ================================  ============================
 route                     taken as known                    gives
@@ -20,8 +20,8 @@ route                     taken as known                    gives
                           weight
 ========================  ================================  ============================
 
-Every result carries the covariance of a, b, c and of what is known. A constant of nature that comes out negative is
-told as what it is: a known quantity that contradicts the motion.
+The covariance of a, b, c and of the known quantities is propagated to every result. A physical constant that comes out
+negative is reported as a contradiction between a known quantity and the motion.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from anglecam.neck.contradictions import contradictions
-from anglecam.neck.joint import Joint, Quantity, joint
+from anglecam.neck.correlated import CorrelatedQuantities, UncertainValue, correlated
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.parameters import PAPER, NeckParameters
 from anglecam.neck.variation import PARAMETERS
@@ -42,30 +42,30 @@ from anglecam.neck.variation import PARAMETERS
 
 @dataclass(frozen=True)
 class Relations:
-    """What one route through Eqs. (34)-(35) gives; every quantity in SI, with its standard uncertainty."""
+    """Result of one route through Eqs. (34)-(35); every quantity in SI, with its standard uncertainty."""
 
     route: str
-    """Name of the function."""
+    """Name of the function of this module."""
     given: tuple[str, ...]
-    """Names in ``quantities`` that the route starts from."""
+    """Names in ``quantities`` that the route takes as known."""
     found: tuple[str, ...]
-    """Names in ``quantities`` that it ends at."""
-    quantities: Joint
-    """All of them, with their covariance."""
+    """Names in ``quantities`` that the route gives."""
+    quantities: CorrelatedQuantities
+    """All quantities, with their covariance."""
     contradictions: tuple[str, ...]
-    """Where the motion and what is taken as known cannot both be right; empty if nowhere."""
+    """Lines on where the motion contradicts what is taken as known; empty if nowhere."""
 
-    def __getitem__(self, name: str) -> Quantity:
+    def __getitem__(self, name: str) -> UncertainValue:
         return self.quantities[name]
 
     @property
     def stable(self) -> bool:
-        """Whether Eq. (35) holds: the neck comes back to neutral."""
+        """Whether Eq. (35) holds, so that the neck returns to neutral."""
         return self["stiffness"].value > 0.0
 
 
-def identified(a: float, b: float, c: float, uncertainty: ArrayLike = (0.0, 0.0, 0.0)) -> Joint:
-    """Take the identified parameters of Eq. (30) (step 3).
+def identified(a: float, b: float, c: float, uncertainty: ArrayLike = (0.0, 0.0, 0.0)) -> CorrelatedQuantities:
+    """Return the identified parameters of Eq. (30) with their covariance (step 3).
 
     Parameters
     ----------
@@ -76,52 +76,53 @@ def identified(a: float, b: float, c: float, uncertainty: ArrayLike = (0.0, 0.0,
 
     Returns
     -------
-    Joint
+    CorrelatedQuantities
         ``a``, ``b`` and ``c``.
 
     Raises
     ------
     ValueError
-        If c is not positive or the covariance is none.
+        If c is not positive or the covariance is not valid.
     """
     if not c > 0.0:
-        raise ValueError(f"c = {c:g} rad/(s²·V) is not positive: turn the sign of the command or of the angle")
-    return joint({"a": a, "b": b, "c": c}, uncertainty)
+        raise ValueError(f"c = {c:g} rad/(s²·V) is not positive: reverse the sign of the command or of the angle")
+    return correlated({"a": a, "b": b, "c": c}, uncertainty)
 
 
-def known(neck: NeckParameters = PAPER, sigmas: Mapping[str, float] | None = None) -> Joint:
-    """Take what is known of the neck beforehand (step 4).
+def known(neck: NeckParameters = PAPER, sigmas: Mapping[str, float] | None = None) -> CorrelatedQuantities:
+    """Return the quantities of the neck that are known before the design, with their covariance (step 4).
 
     Parameters
     ----------
     neck : NeckParameters
-        Weighed, measured or from data sheets; what the route is to find is not looked at.
+        Weighed, measured or from data sheets; a route ignores the quantities that it finds itself.
     sigmas : mapping, optional
-        Standard uncertainties, SI, by a symbol of `anglecam.neck.variation.PARAMETERS`; the rest is taken as exact.
-        That mass and arm are in inertia and weight alike is carried on as their covariance. L_6 stands for the arm of
-        the spring alone: γ has an uncertainty of its own.
+        Standard uncertainties, SI, by a symbol of `anglecam.neck.variation.PARAMETERS`; the others count as exact. Mass
+        and lever arm enter inertia and weight alike, which gives these two a covariance. L_6 is here the arm of the
+        spring only: γ has a separate uncertainty.
 
     Returns
     -------
-    Joint
+    CorrelatedQuantities
         ``inertia`` J + γ·J_r kg·m², ``gamma``, ``spring`` K·L2·L6 N·m, ``weight`` M_h·g·L·cos θ0 N·m, ``damping`` C
         N·m·s, ``sensor_gain`` h V/rad, ``motor_constant`` N·m/A, ``amplifier_gain``, ``gear_ratio``,
-        ``output_impedance`` Ω. `Joint.replaced` puts in one that is known otherwise.
+        ``output_impedance`` Ω. `CorrelatedQuantities.replaced` exchanges a value that is known
+        from another source.
 
     Raises
     ------
     ValueError
         For an unknown symbol, a negative uncertainty or γ = 0.
     """
-    wanted = dict(sigmas or {})
-    unknown = set(wanted) - set(PARAMETERS)
+    given = dict(sigmas or {})
+    unknown = set(given) - set(PARAMETERS)
     if unknown:
         raise ValueError(f"no quantity {', '.join(sorted(unknown))}; there are {', '.join(PARAMETERS)}")
     if neck.gamma == 0.0:
         raise ValueError("γ is 0: the servo does not move the head")
     head = neck.head
     primitives = {s: p.read(neck) for s, p in PARAMETERS.items()} | {"arm": neck.spring.arm}
-    errors = {s: wanted.get(s, 0.0) for s in PARAMETERS} | {"arm": wanted.get("L_6", 0.0)}
+    errors = {s: given.get(s, 0.0) for s in PARAMETERS} | {"arm": given.get("L_6", 0.0)}
 
     def aggregates(q: Mapping[str, Any]) -> dict[str, Any]:
         return {
@@ -130,7 +131,7 @@ def known(neck: NeckParameters = PAPER, sigmas: Mapping[str, float] | None = Non
             "weight": q["M_h"] * head.gravity * q["L"] * np.cos(q["theta_0"]),
         }
 
-    whole = joint(primitives, [errors[s] for s in primitives]).derived(aggregates)
+    every = correlated(primitives, [errors[s] for s in primitives]).derived(aggregates)
     names = {
         "inertia": "inertia",
         "gamma": "gamma",
@@ -143,19 +144,17 @@ def known(neck: NeckParameters = PAPER, sigmas: Mapping[str, float] | None = Non
         "G_g": "gear_ratio",
         "R_a": "output_impedance",
     }
-    at = [whole.names.index(s) for s in names]
-    return Joint(tuple(names.values()), whole.values[at], whole.covariance[np.ix_(at, at)])
+    at = [every.names.index(s) for s in names]
+    return CorrelatedQuantities(tuple(names.values()), every.values[at], every.covariance[np.ix_(at, at)])
 
 
-def by_inertia(found: Joint, beforehand: Joint) -> Relations:
+def by_inertia(found: CorrelatedQuantities, beforehand: CorrelatedQuantities) -> Relations:
     """Find c3, h and c4 from a known inertia, spring, weight and damping (step 5, the paper's first way).
 
     Parameters
     ----------
-    found : Joint
-        From `identified`.
-    beforehand : Joint
-        From `known`.
+    found, beforehand : CorrelatedQuantities
+        From `identified` and `known`.
 
     Returns
     -------
@@ -182,18 +181,18 @@ def by_inertia(found: Joint, beforehand: Joint) -> Relations:
     return _relations("by_inertia", given, found, beforehand, relation)
 
 
-def by_inertia_and_motor(found: Joint, beforehand: Joint) -> Relations:
+def by_inertia_and_motor(found: CorrelatedQuantities, beforehand: CorrelatedQuantities) -> Relations:
     """Find c3, C and K·L2·L6 from a known inertia and motor (step 5, the paper's second way).
 
     Parameters
     ----------
-    found, beforehand : Joint
+    found, beforehand : CorrelatedQuantities
         From `identified` and `known`.
 
     Returns
     -------
     Relations
-        ``torque_gain`` c3 = c·J N·m/V and beside it ``motor_torque_gain`` K_m·G_a/(G_g·R_a), which should be the same;
+        ``torque_gain`` c3 = c·J N·m/V and ``motor_torque_gain`` K_m·G_a/(G_g·R_a), which should be equal;
         ``back_emf_ratio`` c4 V·s/rad, ``damping`` C N·m·s, ``spring`` K·L2·L6 N·m, ``sensor_gain_bound`` V/rad and
         ``stiffness`` N·m.
     """
@@ -219,12 +218,12 @@ def by_inertia_and_motor(found: Joint, beforehand: Joint) -> Relations:
     return _relations("by_inertia_and_motor", given, found, beforehand, relation)
 
 
-def by_motor(found: Joint, beforehand: Joint) -> Relations:
+def by_motor(found: CorrelatedQuantities, beforehand: CorrelatedQuantities) -> Relations:
     """Find J, h and C from a known motor, spring and weight (step 5, with the motor in place of the inertia).
 
     Parameters
     ----------
-    found, beforehand : Joint
+    found, beforehand : CorrelatedQuantities
         From `identified` and `known`.
 
     Returns
@@ -261,18 +260,18 @@ def explained_neck(relations: Relations, neck: NeckParameters = PAPER) -> NeckPa
     relations : Relations
         Without contradictions.
     neck : NeckParameters
-        The rest: lengths, mass, γ; the same as the route was given.
+        Lengths, mass and γ: the same neck that the route was given.
 
     Returns
     -------
     NeckParameters
-        With C, h and K as found or given. c3 and c4 are met by R_a and G_a, the two that the paper had to estimate, J
-        by the head's own inertia.
+        With C, h and K as found or given. R_a and G_a, the two that the paper had to estimate, are set to give c3 and
+        c4; the inertia of the head about its centre of mass is set to give J.
 
     Raises
     ------
     ValueError
-        Where the relations contradict themselves.
+        If the relations contradict each other.
     """
     if relations.contradictions:
         raise ValueError(relations.contradictions[0])
@@ -283,8 +282,8 @@ def explained_neck(relations: Relations, neck: NeckParameters = PAPER) -> NeckPa
     own = q["inertia"] - q["gamma"] * servo.rotor_inertia - head.mass * head.centre_of_mass**2
     if own < 0.0:
         raise ValueError(
-            f"J = {q['inertia']:.4g} kg·m² is less than M_h·L² = {head.mass * head.centre_of_mass**2:.4g} kg·m² of the "
-            "head's mass alone"
+            f"J = {q['inertia']:.4g} kg·m² is less than the head's M_h·L² = "
+            f"{head.mass * head.centre_of_mass**2:.4g} kg·m²"
         )
     return replace(
         neck,
@@ -306,12 +305,13 @@ def sensor_gain_bound(neck: NeckParameters) -> float:
 def _relations(
     route: str,
     given: tuple[str, ...],
-    found: Joint,
-    beforehand: Joint,
+    found: CorrelatedQuantities,
+    beforehand: CorrelatedQuantities,
     relation: Callable[[Mapping[str, Any]], dict[str, Any]],
 ) -> Relations:
+    """Apply a relation to the motion and the known quantities that it needs."""
     at = [beforehand.names.index(name) for name in given]
-    start = found + Joint(given, beforehand.values[at], beforehand.covariance[np.ix_(at, at)])
+    start = found + CorrelatedQuantities(given, beforehand.values[at], beforehand.covariance[np.ix_(at, at)])
     whole = start.derived(relation)
-    told = whole.names[len(start.names) :]
-    return Relations(route, given, told, whole, contradictions(whole, told))
+    results = whole.names[len(start.names) :]
+    return Relations(route, given, results, whole, contradictions(whole, results))

@@ -5,16 +5,17 @@ the shaft B. θ_s is the angle of the crank at A, from the line A→B; θ_f the 
 B→A. With B to the right of A both joints C and D lie above that line.
 
 Eqs. (1)-(2) as printed take L3 for the ground link and then give 80°, 57° and 26° where Table 3 and Fig. 4 say 70°,
-45° and 20°. The table follows with the ground link L5 = 55 mm and the coupler L3 = 41 mm, which is what stands here.
+45° and 20°. The ground link L5 = 55 mm and the coupler L3 = 41 mm give the table, and are used here.
 
-For one angle of the crank the links close in two ways, one the mirror image of the other on the diagonal BC; for one
-angle of the rocker, on the diagonal AD. Either way "open" is the paper's, Fig. 3, and "crossed" the other:
+For a given crank angle the links close in two ways, which mirror each other in the diagonal BC; for a given rocker
+angle they mirror each other in the diagonal AD. In both cases "open" is the branch of the paper, Fig. 3, and "crossed"
+the other:
 
     θ_f = β ± α            + open: D beyond the line B→C, seen along growing θ_f
     θ_s = ∠BAD ± ∠DAC      + open: C beyond the line A→D, seen along growing θ_s
 
-The two names do not mean one thing. A crank that runs through its dead centre goes on to the crossed position of the
-crank while the rocker stays in its open one; only taking the links apart brings the rocker over.
+The branch of the crank and that of the rocker are independent. A crank that passes its dead centre moves to its crossed
+branch while the rocker stays on its open branch; the rocker changes its branch only if the links are taken apart.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ class FourBar:
 
 
 def head_angle(linkage: FourBar, theta_s: ArrayLike, branch: Branch = "open") -> Floats:
-    """Angle of the rocker for an angle of the crank, Eqs. (1)-(2).
+    """Return the rocker angle for a crank angle, Eqs. (1)-(2).
 
     Parameters
     ----------
@@ -75,13 +76,13 @@ def head_angle(linkage: FourBar, theta_s: ArrayLike, branch: Branch = "open") ->
     servo = np.asarray(theta_s, dtype=float)
     r, L3, L5, L6 = linkage.crank, linkage.coupler, linkage.ground, linkage.rocker
     lam = np.sqrt(r**2 + L5**2 - 2 * r * L5 * np.cos(servo))  # Eq. (1), BC
-    # atan2 in place of Eq. (2)'s arcsine: the same while BC leans towards A, right beyond it.
+    # atan2 instead of the arcsine of Eq. (2): equal while BC leans towards A, and correct beyond.
     beta = np.arctan2(r * np.sin(servo), L5 - r * np.cos(servo))
     return np.asarray(beta + _SIDE[branch] * _corner(lam, L6, L3, "crank", servo))
 
 
 def servo_angle(linkage: FourBar, theta_f: ArrayLike, branch: Branch = "open") -> Floats:
-    """Angle of the crank for an angle of the rocker: Eq. (2) solved the other way, in closed form.
+    """Return the crank angle for a rocker angle: Eq. (2) inverted, in closed form.
 
     Parameters
     ----------
@@ -95,7 +96,7 @@ def servo_angle(linkage: FourBar, theta_f: ArrayLike, branch: Branch = "open") -
     Returns
     -------
     ndarray
-        θ_s, rad; for rocker angles in (0, π) open from 0 to 2π, crossed from −π to π, both without a jump.
+        θ_s, rad; for rocker angles in (0, π) from 0 to 2π if open and from −π to π if crossed, both continuous.
 
     Raises
     ------
@@ -110,7 +111,7 @@ def servo_angle(linkage: FourBar, theta_f: ArrayLike, branch: Branch = "open") -
 
 
 def joints(linkage: FourBar, theta_f: ArrayLike, branch: Branch = "open") -> dict[str, Floats]:
-    """Place the four joints for an angle of the rocker, with the shaft B at the origin.
+    """Return the positions of the four joints for a rocker angle, with the shaft B at the origin.
 
     Parameters
     ----------
@@ -141,7 +142,7 @@ def joints(linkage: FourBar, theta_f: ArrayLike, branch: Branch = "open") -> dic
 
 
 def reach(linkage: FourBar) -> tuple[float, float]:
-    """Smallest and largest rocker angle from the line B→A, to either side of it, at which the links close, rad.
+    """Return the smallest and largest rocker angle from the line B→A, on either side, at which the links close, rad.
 
     Returns
     -------
@@ -151,29 +152,30 @@ def reach(linkage: FourBar) -> tuple[float, float]:
     Raises
     ------
     ValueError
-        If they close at none.
+        If they close at no angle.
     """
     return _spread(linkage.ground, linkage.rocker, linkage.crank, linkage.coupler)
 
 
 def crank_reach(linkage: FourBar) -> tuple[float, float]:
-    """Smallest and largest crank angle from the line A→B, to either side of it, at which the links close, rad.
+    """Return the smallest and largest crank angle from the line A→B, on either side, at which the links close, rad.
 
     Returns
     -------
     tuple of float
-        Between 0 and π. A crank that reaches 0 or π passes through the line there; one that reaches both turns fully.
+        Between 0 and π. A crank that reaches 0 or π passes through the line there; a crank that reaches both turns
+        fully.
 
     Raises
     ------
     ValueError
-        If they close at none.
+        If they close at no angle.
     """
     return _spread(linkage.ground, linkage.crank, linkage.rocker, linkage.coupler)
 
 
 def _spread(ground: float, turning: float, across: float, coupler: float) -> tuple[float, float]:
-    """Bound a turning link's angle from the ground by what the other two links can span, rad."""
+    """Return the range of a link's angle from the ground that the other two links can span, rad."""
 
     def angle_at(diagonal: float) -> float:
         return math.acos(min(1.0, max(-1.0, (ground**2 + turning**2 - diagonal**2) / (2 * ground * turning))))
@@ -185,7 +187,7 @@ def _spread(ground: float, turning: float, across: float, coupler: float) -> tup
 
 
 def _corner(first: Floats, second: float, opposite: float, turned: str, at: Floats) -> Floats:
-    """Angle between two sides of a triangle, by the law of cosines."""
+    """Return the angle between two sides of a triangle, by the law of cosines."""
     cosine = np.asarray((first**2 + second**2 - opposite**2) / (2 * first * second))
     open_at = np.abs(cosine) > 1 + 1e-12
     if np.any(open_at):

@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from anglecam.data.typing import Floats
-from anglecam.neck.parameters import Head
+from anglecam.neck.parameters import HeadParameters
 
 
-def centre_of_mass(head: Head, theta: ArrayLike) -> tuple[Floats, Floats]:
-    """Place the centre of mass, Eq. (14).
+def centre_of_mass(head: HeadParameters, theta: ArrayLike) -> tuple[Floats, Floats]:
+    """Return the position of the centre of mass, Eq. (14).
 
     Parameters
     ----------
-    head : Head
-        Its distance L from the pivot.
+    head : HeadParameters
+        With the distance L of the centre of mass from the pivot.
     theta : array_like
         Angle from upright, rad.
 
@@ -37,14 +37,14 @@ def centre_of_mass(head: Head, theta: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def centre_of_mass_acceleration(
-    head: Head, theta: ArrayLike, omega: ArrayLike, alpha: ArrayLike
+    head: HeadParameters, theta: ArrayLike, omega: ArrayLike, alpha: ArrayLike
 ) -> tuple[Floats, Floats]:
-    """Accelerate the centre of mass, Eq. (15).
+    """Return the acceleration of the centre of mass, Eq. (15).
 
     Parameters
     ----------
-    head : Head
-        Its distance L from the pivot.
+    head : HeadParameters
+        With the distance L of the centre of mass from the pivot.
     theta, omega, alpha : array_like
         Angle from upright (rad), speed (rad/s) and acceleration (rad/s²).
 
@@ -53,21 +53,21 @@ def centre_of_mass_acceleration(
     x, y : ndarray
         ẍ forwards and ÿ downwards, m/s².
     """
-    turned, speed, rate = (np.asarray(value, dtype=float) for value in (theta, omega, alpha))
-    sine, cosine = np.sin(turned), np.cos(turned)
+    angle, speed, rate = (np.asarray(value, dtype=float) for value in (theta, omega, alpha))
+    sine, cosine = np.sin(angle), np.cos(angle)
     along_x = head.centre_of_mass * (rate * cosine - speed**2 * sine)
     along_y = head.centre_of_mass * (rate * sine + speed**2 * cosine)
     return np.asarray(along_x), np.asarray(along_y)
 
 
 def moments_about_pivot(
-    head: Head, theta: ArrayLike, omega: ArrayLike, alpha: ArrayLike, resisting: ArrayLike, torque: ArrayLike
+    head: HeadParameters, theta: ArrayLike, omega: ArrayLike, alpha: ArrayLike, resisting: ArrayLike, torque: ArrayLike
 ) -> Floats:
-    """Sum the moments about the pivot with the body's inertia as a load, Eq. (13).
+    """Return the sum of moments about the pivot, with inertia as a load (D'Alembert), Eq. (13).
 
     Parameters
     ----------
-    head : Head
+    head : HeadParameters
         Mass and inertia.
     theta, omega, alpha : array_like
         Angle from upright (rad), speed (rad/s) and acceleration (rad/s²).
@@ -79,21 +79,21 @@ def moments_about_pivot(
     Returns
     -------
     ndarray
-        What is left over, N·m: zero for a motion that obeys the equation.
+        Residual, N·m: zero for a motion that obeys the equation.
     """
     x, y = centre_of_mass_acceleration(head, theta, omega, alpha)
     forward, down = centre_of_mass(head, theta)
     inertial = head.mass * (x * -down + (y - head.gravity) * forward)
-    own = head.own_inertia * np.asarray(alpha, dtype=float)
-    return np.asarray(inertial + own + np.asarray(resisting, dtype=float) - np.asarray(torque, dtype=float))
+    rotational = head.own_inertia * np.asarray(alpha, dtype=float)
+    return np.asarray(inertial + rotational + np.asarray(resisting, dtype=float) - np.asarray(torque, dtype=float))
 
 
-def head_acceleration(head: Head, theta: ArrayLike, resisting: ArrayLike, torque: ArrayLike) -> Floats:
-    """Accelerate the head, Eq. (16) solved for θ̈.
+def head_acceleration(head: HeadParameters, theta: ArrayLike, resisting: ArrayLike, torque: ArrayLike) -> Floats:
+    """Return the acceleration of the head, Eq. (16) solved for θ̈.
 
     Parameters
     ----------
-    head : Head
+    head : HeadParameters
         Mass and inertia.
     theta : array_like
         Angle from upright, rad.

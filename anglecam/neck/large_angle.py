@@ -1,15 +1,16 @@
-"""The neck at any angle: Eq. (31), and what is left of it near an equilibrium, Eq. (33).
+"""The neck at any angle, Eq. (31), and its linearisation at an equilibrium, Eq. (33).
 
     G = (J + J_r·γ)·θ̈ + (C + K_m²·γ/(G_g²·R_a))·θ̇ + F_s·L_s − M_h·g·L·sin(θ0 + Δθ) + c3·h·γ·Δθ − c3·U_in = 0   (31)
     ψ·Δθ̈ + ϖ·Δθ̇ + η·Δθ + φ·ΔU_in = 0                                                                         (33)
 
-Eq. (31) writes θ for the head's angle from upright and from neutral alike; the servo's is counted from neutral, as in
-Eqs. (12) and (28). F_s·L_s is that of `anglecam.neck.spring`, which says where Eqs. (18b) and (33) disagree in sign and
-rate. The feedback's part of η is printed with a minus, against Eqs. (28) and (31): here it has the plus of Eq. (31).
+Eq. (31) writes θ for the head's angle both from upright and from neutral; the servo angle is from neutral, as in
+Eqs. (12) and (28). F_s·L_s is that of `anglecam.neck.spring`, which explains where Eqs. (18b) and (33) disagree in sign
+and rate. The feedback term of η is printed with a minus, against Eqs. (28) and (31): here it has the plus of Eq. (31).
 
-γ may stay the constant of Eq. (3), or follow the four-bar. Then it is its exact slope γ(Δθ) = dθ_f/dθ_s at every angle,
-and what Eq. (12) calls θ_a = γ·Δθ becomes θ_a = Γ(Δθ) = ∫γ dΔθ, so that θ̇_a = γ·θ̇ and θ̈_a = γ·θ̈ + γ′·θ̇². On the way
-round of γ see `anglecam.neck.linear`. Either way Eq. (28) is what remains at small angles.
+γ is either the constant of Eq. (3) or follows the four-bar. In the second case it is the exact slope
+γ(Δθ) = dθ_f/dθ_s at every angle, and θ_a = γ·Δθ of Eq. (12) becomes θ_a = Γ(Δθ) = ∫γ dΔθ, so that θ̇_a = γ·θ̇ and
+θ̈_a = γ·θ̈ + γ′·θ̇². `anglecam.neck.linear` explains which way round γ is defined. In both cases the equation reduces to
+Eq. (28) at small angles.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ from anglecam.neck.statics import balanced, stable_zero, static_torque
 from anglecam.neck.transmission import bend, slope
 
 WIDEST = math.radians(120.0)
-"""How far from neutral a neck with constant γ is taken at its word, rad: its equations know no end stop."""
+"""Largest angle from neutral at which constant γ is used, rad; the equations themselves have no end stop."""
 KNOTS = 1025
-"""Of the spline for Γ."""
+"""Number of knots of the spline for Γ."""
 
 
 @dataclass(frozen=True)
@@ -46,21 +47,21 @@ class ConstantRatio:
     """Lowest and highest Δθ, rad."""
 
     def travel(self, delta: ArrayLike) -> Floats:
-        """θ_a, rad, at angles Δθ, rad."""
+        """Return θ_a, rad, at angles Δθ, rad."""
         return np.asarray(self.gamma * np.asarray(delta, dtype=float))
 
     def slope(self, delta: ArrayLike) -> Floats:
-        """γ at angles Δθ, rad."""
+        """Return γ at angles Δθ, rad."""
         return np.full(np.shape(delta), self.gamma)
 
     def bend(self, delta: ArrayLike) -> Floats:
-        """dγ/dΔθ, 1/rad: zero."""
+        """Return dγ/dΔθ, 1/rad, which is zero."""
         return np.zeros(np.shape(delta))
 
 
 @dataclass(frozen=True)
 class LinkageRatio:
-    """θ_a = Γ(Δθ) = ∫γ dΔθ from neutral, γ the exact slope of the four-bar; NaN where its links do not close."""
+    """θ_a = Γ(Δθ) = ∫γ dΔθ from neutral, with the exact slope γ of the four-bar; NaN where the links do not close."""
 
     linkage: FourBar
 
@@ -76,18 +77,18 @@ class LinkageRatio:
         return self.neutral_rocker - high, self.neutral_rocker - low
 
     def travel(self, delta: ArrayLike) -> Floats:
-        """Γ, rad, at angles Δθ, rad, to 1e-12 rad."""
+        """Return Γ, rad, at angles Δθ, rad, to 1e-12 rad."""
         low, high = self.reach
         with np.errstate(invalid="ignore"):
             xi = np.arccos((low + high - 2.0 * np.asarray(delta, dtype=float)) / (high - low))
         return np.asarray(self._travel(xi))
 
     def slope(self, delta: ArrayLike) -> Floats:
-        """γ at angles Δθ, rad."""
+        """Return γ at angles Δθ, rad."""
         return slope(self.linkage, self._crank(delta))
 
     def bend(self, delta: ArrayLike) -> Floats:
-        """dγ/dΔθ, 1/rad, at angles Δθ, rad; without bound at the ends of the reach."""
+        """Return dγ/dΔθ, 1/rad, at angles Δθ, rad; unbounded at the ends of the reach."""
         crank = self._crank(delta)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(-bend(self.linkage, crank) / slope(self.linkage, crank))  # dΔθ = −dθ_f = −γ·dθ_s
@@ -100,7 +101,10 @@ class LinkageRatio:
 
     @cached_property
     def _travel(self) -> CubicHermiteSpline:
-        """Γ over ξ, Δθ = middle − half·cos ξ: there it is smooth, where in Δθ γ ends like a square root."""
+        """Γ as a spline over ξ, with Δθ = middle − half·cos ξ.
+
+        Over ξ it is smooth, whereas γ over Δθ ends like a square root.
+        """
         low, high = self.reach
         middle, half = (low + high) / 2.0, (high - low) / 2.0
 
@@ -111,40 +115,39 @@ class LinkageRatio:
         start = math.acos(middle / half)
         nodes, weights = np.polynomial.legendre.leggauss(64)
         span = (xi - start)[:, None] / 2.0
-        gathered = (rate(start + span * (1.0 + nodes)) * weights).sum(axis=-1) * span[:, 0]
-        return CubicHermiteSpline(xi, gathered, rate(xi), extrapolate=False)
+        integral = (rate(start + span * (1.0 + nodes)) * weights).sum(axis=-1) * span[:, 0]
+        return CubicHermiteSpline(xi, integral, rate(xi), extrapolate=False)
 
 
 @lru_cache(maxsize=16)
 def _linkage_ratio(linkage: FourBar) -> LinkageRatio:
-    """Keep what is worked out once for a linkage."""
+    """Return the ratio of a linkage, with its spline computed once."""
     return LinkageRatio(linkage)
 
 
 @dataclass(frozen=True)
 class LargeAngleNeck:
-    """What Eq. (31) is of."""
+    """The neck of Eq. (31)."""
 
     parameters: NeckParameters = PAPER
-    """Servo, head, spring, linkage, damping; ``gamma`` counts where γ is constant."""
+    """Servo, head, spring, linkage, damping; ``gamma`` is used where γ is constant."""
     gamma: Literal["constant", "exact"] = "constant"
-    """Whether γ is the constant of Eq. (3) or the four-bar's slope at every angle."""
+    """Whether γ is the constant of Eq. (3) or the slope of the four-bar at every angle."""
     common_stretch: float | None = None
-    """Stretch at neutral of the less stretched of two springs against each other, m; ``None`` for one that also pushes.
-    """
+    """Stretch at neutral of the less stretched of two opposing springs, m; ``None`` for one that can also push."""
     pretension_error: float = 0.0
-    """Torque at neutral by which the springs carry more than the head, N·m."""
+    """Torque at neutral by which the springs exceed the head's weight, N·m."""
 
     @cached_property
     def ratio(self) -> ConstantRatio | LinkageRatio:
-        """From the head to the servo."""
+        """Relation of head angle to servo angle."""
         if self.gamma == "constant":
             return ConstantRatio(self.parameters.gamma)
         return _linkage_ratio(self.parameters.linkage)
 
     @cached_property
     def preload(self) -> Preload:
-        """Stretch of the springs at neutral that carries the head and the `pretension_error`, Eqs. (23)-(24)."""
+        """Stretch of the springs at neutral that carries the head plus `pretension_error`, Eqs. (23)-(24)."""
         return balanced(self.parameters, common=self.common_stretch, excess=self.pretension_error)
 
 
@@ -178,7 +181,7 @@ class Linearised:
 
 
 def restoring_torque(neck: LargeAngleNeck, delta: ArrayLike) -> Floats:
-    """Work out what brings the head back at rest without a command: F_s·L_s − M_h·g·L·sin(θ0 + Δθ) + c3·h·θ_a, N·m.
+    """Return the restoring torque at rest without a command: F_s·L_s − M_h·g·L·sin(θ0 + Δθ) + c3·h·θ_a, N·m.
 
     Parameters
     ----------
@@ -190,7 +193,7 @@ def restoring_torque(neck: LargeAngleNeck, delta: ArrayLike) -> Floats:
     Returns
     -------
     ndarray
-        N·m, towards neutral where it has the sign of Δθ.
+        N·m; it acts towards neutral where it has the sign of Δθ.
     """
     servo = neck.parameters.servo
     held = servo.torque_gain * servo.sensor_gain * neck.ratio.travel(delta)
@@ -198,7 +201,7 @@ def restoring_torque(neck: LargeAngleNeck, delta: ArrayLike) -> Floats:
 
 
 def restoring_tangent(neck: LargeAngleNeck, delta: ArrayLike) -> Floats:
-    """Differentiate `restoring_torque` by Δθ: η of Eq. (33), N·m."""
+    """Return the derivative of `restoring_torque` by Δθ: η of Eq. (33), N·m."""
     servo, head = neck.parameters.servo, neck.parameters.head
     angle = np.asarray(delta, dtype=float)
     spring = spring_tangent(neck.parameters.spring, neck.preload, angle)
@@ -209,7 +212,7 @@ def restoring_tangent(neck: LargeAngleNeck, delta: ArrayLike) -> Floats:
 def torque_balance(
     neck: LargeAngleNeck, alpha: ArrayLike, omega: ArrayLike, delta: ArrayLike, voltage: ArrayLike
 ) -> Floats:
-    """Evaluate G, the left side of Eq. (31), Eq. (32a).
+    """Return G, the left side of Eq. (31), Eq. (32a).
 
     Parameters
     ----------
@@ -234,7 +237,7 @@ def torque_balance(
 
 
 def acceleration(neck: LargeAngleNeck, delta: ArrayLike, omega: ArrayLike, voltage: ArrayLike) -> Floats:
-    """Solve Eq. (31) for θ̈.
+    """Return θ̈ from Eq. (31).
 
     Parameters
     ----------
@@ -255,7 +258,7 @@ def acceleration(neck: LargeAngleNeck, delta: ArrayLike, omega: ArrayLike, volta
 
 
 def equilibrium(neck: LargeAngleNeck, voltage: float) -> float:
-    """Find where a voltage holds the head, G = 0 of Eq. (31) at rest.
+    """Return the angle at which a voltage holds the head, G = 0 of Eq. (31) at rest.
 
     Parameters
     ----------
@@ -272,14 +275,14 @@ def equilibrium(neck: LargeAngleNeck, voltage: float) -> float:
     Raises
     ------
     ValueError
-        If there is none within the reach.
+        If there is no such angle within the reach.
     """
     driven = neck.parameters.servo.torque_gain * voltage
     return stable_zero(lambda delta: restoring_torque(neck, delta) - driven, *neck.ratio.reach)
 
 
 def holding_voltage(neck: LargeAngleNeck, delta: ArrayLike) -> Floats:
-    """Voltage U_in, V, that holds the head at an angle Δθ, rad: G = 0 of Eq. (31) at rest, solved for U_in."""
+    """Return the voltage U_in, V, that holds the head at an angle Δθ, rad: G = 0 of Eq. (31) at rest."""
     return np.asarray(restoring_torque(neck, delta) / neck.parameters.servo.torque_gain)
 
 
@@ -291,7 +294,7 @@ def linearise(neck: LargeAngleNeck, delta: float = 0.0) -> Linearised:
     neck : LargeAngleNeck
         Springs, head, servo and linkage.
     delta : float
-        Δθ at which a constant voltage holds it (`equilibrium`, `holding_voltage`), rad.
+        Δθ at which a constant voltage holds the head (`equilibrium`, `holding_voltage`), rad.
 
     Returns
     -------

@@ -3,8 +3,9 @@
     (J + γ·J_r)·Δθ̈ + (C + K_m²·γ/(G_g²·R_a))·Δθ̇ + (c3·h·γ + K·L2·L6 − M_h·g·L·cos θ0)·Δθ = c3·U_in      Eq. (28)
     Δθ̈ + a·Δθ̇ + b·Δθ = c·U_in                                                                           Eq. (30)
 
-γ is the slope dθ_f/dθ_s of Fig. 4. Eq. (3) defines it the other way round, and then Eqs. (12), (28), (34) and (35)
-would hold 1/γ; but the paper's own h = 1.39, C = 0.15 and h < 4.26 follow with γ = −0.36 where it is printed.
+γ is the slope dθ_f/dθ_s of Fig. 4. Eq. (3) defines it the other way round, which would put 1/γ into Eqs. (12), (28),
+(34) and (35). But the values that the paper derives, h = 1.39, C = 0.15 and h < 4.26, follow with γ = −0.36 in its
+place.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ class LinearNeck:
     damping: float
     """C + K_m²·γ/(G_g²·R_a), N·m·s."""
     stiffness: float
-    """c3·h·γ + K·L2·L6 − M_h·g·L·cos θ0, N·m: positive in a stable neck, Eq. (35)."""
+    """c3·h·γ + K·L2·L6 − M_h·g·L·cos θ0, N·m; positive if the neck is stable, Eq. (35)."""
     gain: float
     """c3, N·m/V."""
 
@@ -45,17 +46,17 @@ class LinearNeck:
 
 
 def linear_neck(neck: NeckParameters) -> LinearNeck:
-    """Linearise the neck about neutral, Eq. (28).
+    """Return the linear neck at neutral, Eq. (28).
 
     Parameters
     ----------
     neck : NeckParameters
-        What it is made of.
+        Its quantities.
 
     Returns
     -------
     LinearNeck
-        Whether it is stable is not asked.
+        Stable or not.
     """
     servo, head, gamma = neck.servo, neck.head, neck.gamma
     return LinearNeck(
@@ -67,6 +68,6 @@ def linear_neck(neck: NeckParameters) -> LinearNeck:
 
 
 def passive_stiffness(neck: NeckParameters) -> float:
-    """Stiffness of spring and weight without the servo, Eq. (25): K·L2·L6 − M_h·g·L·cos θ0, N·m."""
+    """Return the stiffness of spring and weight without the servo, Eq. (25): K·L2·L6 − M_h·g·L·cos θ0, N·m."""
     spring, head = neck.spring, neck.head
     return spring.rate * spring.base * spring.arm - head.weight_moment * math.cos(head.neutral)

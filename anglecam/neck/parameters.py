@@ -1,4 +1,4 @@
-"""What a nodding neck is made of: the quantities of Table 5 and of the text, in SI."""
+"""The quantities of a nodding neck, from Table 5 and the text of the paper, in SI."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from anglecam.neck.fourbar import FourBar
 
 
 @dataclass(frozen=True)
-class Servo:
+class ServoParameters:
     """An RC servo with potentiometer feedback, Fig. 5."""
 
     motor_constant: float = 3.3e-3
@@ -25,7 +25,7 @@ class Servo:
     rotor_inertia: float = 0.11475e-10
     """J_r, kg·m²."""
     command_gain: float = 1.0
-    """C_i of Eq. (29), V/rad: input voltage for a wanted angle. The paper prints none."""
+    """C_i of Eq. (29), V/rad: input voltage per commanded angle. The paper prints no value."""
 
     @property
     def torque_gain(self) -> float:
@@ -39,7 +39,7 @@ class Servo:
 
 
 @dataclass(frozen=True)
-class Head:
+class HeadParameters:
     """The head as a body on the nodding shaft, Fig. 6 (c)."""
 
     mass: float = 2.31
@@ -47,7 +47,7 @@ class Head:
     centre_of_mass: float = 0.05
     """L, from the pivot, m."""
     own_inertia: float = 0.075e-3
-    """J_cg, kg·m²."""
+    """J_cg about the centre of mass, kg·m²."""
     neutral: float = math.radians(45.0)
     """θ0, of the centre of mass from upright at neutral, rad."""
     gravity: float = 9.81
@@ -65,24 +65,24 @@ class Head:
 
 
 @dataclass(frozen=True)
-class Spring:
-    """The spring that holds the head upright, Fig. 6 (a) and (b)."""
+class SpringParameters:
+    """The spring that holds the head, Fig. 6 (a) and (b)."""
 
     rate: float = 1877.8
     """K, N/m: 10.72 lb/in."""
     base: float = 0.048
-    """L2, m: from the pivot to where the spring is held."""
+    """L2, m: from the pivot to the fixed end of the spring."""
     arm: float = 0.059
-    """L6, m: from the pivot to where it pulls at the head."""
+    """L6, m: from the pivot to the end of the spring on the head."""
 
 
 @dataclass(frozen=True)
 class NeckParameters:
-    """All that the paper's equations of motion hold; the defaults are the paper's prototype, Table 5."""
+    """Every quantity in the paper's equations of motion; the defaults are the paper's prototype, Table 5."""
 
-    servo: Servo = field(default_factory=Servo)
-    head: Head = field(default_factory=Head)
-    spring: Spring = field(default_factory=Spring)
+    servo: ServoParameters = field(default_factory=ServoParameters)
+    head: HeadParameters = field(default_factory=HeadParameters)
+    spring: SpringParameters = field(default_factory=SpringParameters)
     linkage: FourBar = field(default_factory=FourBar)
     damping: float = 0.15
     """C, N·m·s."""
@@ -91,4 +91,4 @@ class NeckParameters:
 
 
 PAPER = NeckParameters()
-"""The prototype as Table 5 has it."""
+"""The prototype of Table 5."""

@@ -1,11 +1,11 @@
-"""PD control about the neck: closed loops of any plant, Eq. (37) and Fig. 16, and how robust they are.
+"""PD control of the neck: closed loops of any plant, Eq. (37) and Fig. 16, and their stability margins.
 
-The controller stands in the feedback path, U = r − K_p·θ − K_d·θ̇, so a loop answers a reference r in the unit of the
-plant's own input. With a plant G the closed loop is G/(1 + G·(K_p + K_d·s)); of the paper's SYS2 that is Eq. (37).
+The controller is in the feedback path, U = r − K_p·θ − K_d·θ̇, so the reference r has the unit of the plant's input.
+With a plant G the closed loop is G/(1 + G·(K_p + K_d·s)); of the paper's SYS2 that is Eq. (37).
 
-SYS2's output is in degrees and its input has no unit: its steady state of 23.58 is that of a step of height 1, which
-stands for the one step that the paper commanded, after which the head rested at 22°. K_p and K_d of Fig. 16 are
-therefore per degree. K_p = 0.01 takes 19 % of the steady state away, 1/(1 + 23.58·K_p); K_d takes none.
+SYS2's output is in degrees and its input has no unit. Its steady state of 23.58 belongs to a step of height 1, which
+stands for the step that the paper commanded, after which the head rested at 22°. K_p and K_d of Fig. 16 are therefore
+per degree. K_p = 0.01 takes 19 % of the steady state away, 1/(1 + 23.58·K_p); K_d takes none.
 """
 
 from __future__ import annotations
@@ -28,55 +28,55 @@ Acceleration = Callable[[float, float, float], float]
 """θ̈ (rad/s²) of θ (rad), θ̇ (rad/s) and U (V)."""
 
 FIG_16_K_P = (0.0, 1e-4, 1e-3, 1e-2)
-"""Per degree; the paper names 0, 10⁻⁴ and 10⁻² and says that the first two lose least."""
+"""Per degree; the paper gives 0, 10⁻⁴ and 10⁻² and finds the least loss with the first two."""
 FIG_16_K_D = (0.0, 1e-3, 5e-3, 1e-2)
-"""s per degree; the paper names 0.5·10⁻² to 10⁻² as those that damp."""
+"""s per degree; the paper finds damping with 0.5·10⁻² to 10⁻²."""
 _STILL = 1e-3
-"""Of the way, within which a motion is at rest."""
+"""Share of the way within which a motion counts as at rest."""
 
 
 @dataclass(frozen=True)
 class PdGains:
-    """U = r − K_p·θ − K_d·θ̇, in units of the plant's input over those of its output."""
+    """Gains of U = r − K_p·θ − K_d·θ̇, in units of the plant's input over those of its output."""
 
     proportional: float = 0.0
     """K_p; V/rad for a plant in volts and radians."""
     derivative: float = 0.0
-    """K_d, times second."""
+    """K_d, s times the unit of K_p."""
 
 
 @dataclass(frozen=True)
 class Margins:
-    """How far a stable loop is from instability; NaN throughout where it is not stable."""
+    """Margins of a stable loop; all NaN for an unstable one."""
 
     gain: float
-    """Factor on the loop's gain that makes it unstable, the one nearest to 1; infinite if there is none."""
+    """Factor on the loop gain that makes the loop unstable, the one nearest to 1; infinite if there is none."""
     phase: float
-    """Least rotation of the locus, to either side, that does, rad; infinite where the loop's gain never is 1."""
+    """Least rotation of the locus in either direction that makes it unstable, rad; infinite if the gain is never 1."""
     delay: float
-    """Added delay that does, s; infinite if none."""
+    """Least added delay that makes it unstable, s; infinite if there is none."""
     modulus: float
     """Least distance of the locus from −1, 1/max|S|."""
     sensitivity: float
-    """M_s = max|S|, how much a disturbance is amplified at worst."""
+    """M_s = max|S|, the largest amplification of a disturbance."""
 
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """A plant with a controller and how it answers a step."""
+    """A plant with a controller, and its step response."""
 
     gains: PdGains
     system: control.TransferFunction
     """From reference to output."""
     figures: StepFigures
-    """Of a step of height 1; `NO_STEP` where the loop is not stable."""
+    """For a step of height 1; `NO_STEP` if the loop is not stable."""
     margins: Margins
     loss: float
-    """Share of the steady state without control that control takes away."""
+    """Share of the uncontrolled steady state by which control reduces it."""
 
     @property
     def reference_gain(self) -> float:
-        """Factor on the reference that makes up for `loss`."""
+        """Factor on the reference that compensates `loss`."""
         return 1.0 / (1.0 - self.loss)
 
 
@@ -91,9 +91,9 @@ class PdMotion:
     rate: Floats
     """rad/s."""
     voltage: Floats
-    """What the controller gives the plant, V."""
+    """Output of the controller, V."""
     figures: StepFigures
-    """From the starting angle to the rest; steady state in rad as it is, not per volt. `NO_STEP` without a rest."""
+    """From the initial angle to rest, with the steady state in rad, not per volt; `NO_STEP` without a rest."""
 
 
 def sys2() -> control.TransferFunction:
@@ -103,7 +103,7 @@ def sys2() -> control.TransferFunction:
 
 
 def eq_37(gains: PdGains) -> control.TransferFunction:
-    """Return the closed loop as Eq. (37) prints it, with its rounded coefficients."""
+    """Return the closed loop of Eq. (37), with the rounded coefficients that the paper prints."""
     g1, a2, a3 = 47.385, 56.8, 980.1
     b2, b3, b4 = 25.5, 311.5, 1969.8
     K_p, K_d = gains.proportional, gains.derivative
@@ -122,7 +122,7 @@ def third_order_plant(parameters: Sequence[float]) -> control.TransferFunction:
 
 
 def close_loop(plant: control.TransferFunction, gains: PdGains) -> ClosedLoop:
-    """Put a PD controller into the feedback path of a linear plant.
+    """Return the closed loop of a linear plant with a PD controller in the feedback path.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def close_loop(plant: control.TransferFunction, gains: PdGains) -> ClosedLoop:
     Returns
     -------
     ClosedLoop
-        Whether it is stable shows in its figures.
+        Stable or not; an unstable loop has no figures.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def close_loop(plant: control.TransferFunction, gains: PdGains) -> ClosedLoop:
 
 
 def loop_response(loop: ClosedLoop, time: Floats, height: float = 1.0) -> Floats:
-    """Return what a loop answers to a step of the reference, (n,) in the plant's unit of output."""
+    """Return the response to a step of the reference, (n,) in the plant's unit of output."""
     return height * linear_step(loop.system.num[0][0], loop.system.den[0][0], time)
 
 
@@ -160,15 +160,15 @@ def gains_table(
     proportional: Sequence[float] = FIG_16_K_P,
     derivative: Sequence[float] = FIG_16_K_D,
 ) -> tuple[ClosedLoop, ...]:
-    """Close the loop with every pair of gains, as in Fig. 16: K_p by K_p, K_d within."""
+    """Return the closed loop for every pair of gains, as in Fig. 16: K_d varies faster than K_p."""
     return tuple(close_loop(plant, PdGains(K_p, K_d)) for K_p in proportional for K_d in derivative)
 
 
 def loop_margins(loop: control.TransferFunction) -> Margins:
     """Return the margins of a stable loop.
 
-    Derivative feedback makes loops whose gain rises through 1 and falls again, and which may be nearer to instability
-    by a lead than by a lag, or by less gain than by more: the nearer one counts.
+    With derivative feedback the loop gain may rise through 1 and fall again, and the loop may be nearer to instability
+    by a lead than by a lag, or by less gain than by more. The nearer one is returned.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def loop_margins(loop: control.TransferFunction) -> Margins:
     lag = np.mod(np.radians(phases), 2.0 * np.pi)
     phase = float(np.minimum(lag, 2.0 * np.pi - lag).min(initial=math.inf))
     delay = float((lag / crossing).min(initial=math.inf))
-    # Turning points of |1 + L| and its two ends, where it need not turn.
+    # Extremes of |1 + L|: its turning points, and its values at zero and infinite frequency.
     above, below = loop.num[0][0], loop.den[0][0]
     ends = [abs(1.0 + rest_gain(loop)), abs(1.0 + (above[0] / below[0] if len(above) == len(below) else 0.0))]
     modulus = float(min([*distances, *ends]))
@@ -220,23 +220,23 @@ def simulate_pd(
     gains : PdGains
         V/rad and V·s/rad.
     reference : float
-        r from time 0 on, V.
+        r from time 0, V.
     duration : float
-        s, long enough to come to rest, within 0.1 % of the way over its last tenth; else there are no figures.
+        s. If the motion is not at rest, within 0.1 % of the way over the last tenth, there are no figures.
     start : (float, float)
         Angle (rad) and rate (rad/s) at time 0.
     points : int
-        Instants of the result.
+        Number of instants of the result.
 
     Returns
     -------
     PdMotion
-        Evenly in time.
+        Evenly spaced in time.
 
     Raises
     ------
     ValueError
-        If the motion cannot be followed to the end: the neck leaves what its linkage reaches.
+        If the integration fails before the end because the neck leaves the reach of its linkage.
     """
 
     def voltage(angle: float, rate: float) -> float:
@@ -244,24 +244,24 @@ def simulate_pd(
 
     def slope(now: float, state: Floats) -> list[float]:
         angle, rate = float(state[0]), float(state[1])
-        answer = float(acceleration(angle, rate, voltage(angle, rate)))
-        if not math.isfinite(answer):
-            raise ValueError(f"the head leaves what it can reach, at {math.degrees(angle):.1f}° after {now:.3f} s")
-        return [rate, answer]
+        alpha = float(acceleration(angle, rate, voltage(angle, rate)))
+        if not math.isfinite(alpha):
+            raise ValueError(f"the head leaves its linkage's reach at {math.degrees(angle):.1f}° after {now:.3f} s")
+        return [rate, alpha]
 
     time = np.linspace(0.0, duration, points)
     run = solve_ivp(slope, (0.0, duration), start, method="DOP853", t_eval=time, rtol=1e-9, atol=1e-11)
     if not run.success:
-        raise ValueError(f"the controlled motion cannot be followed to {duration:g} s: {run.message}")
+        raise ValueError(f"the controlled motion cannot be integrated to {duration:g} s: {run.message}")
     angle, rate = run.y
-    told = reference - gains.proportional * angle - gains.derivative * rate
+    volts = reference - gains.proportional * angle - gains.derivative * rate
     return PdMotion(
-        time, angle, rate, told, _figures(time, angle, lambda q: float(acceleration(q, 0.0, voltage(q, 0.0))))
+        time, angle, rate, volts, _figures(time, angle, lambda q: float(acceleration(q, 0.0, voltage(q, 0.0))))
     )
 
 
 def linearised(acceleration: Acceleration, angle: float, voltage: float) -> control.TransferFunction:
-    """Return the linear plant about a state of rest, rad per V, by central differences.
+    """Return the linear plant at a state of rest, rad per V, by central differences.
 
     Parameters
     ----------
@@ -277,17 +277,20 @@ def linearised(acceleration: Acceleration, angle: float, voltage: float) -> cont
     """
     step = 1e-5
     at = np.array([angle, 0.0, voltage])
-    ways = np.eye(3) * step
-    a_theta, a_omega, a_u = ((acceleration(*(at + w)) - acceleration(*(at - w))) / (2.0 * step) for w in ways)
+    steps = np.eye(3) * step
+    a_theta, a_omega, a_u = ((acceleration(*(at + d)) - acceleration(*(at - d))) / (2.0 * step) for d in steps)
     return control.tf([a_u], [1.0, -a_omega, -a_theta])
 
 
-def _figures(time: Floats, angle: Floats, standing: Callable[[float], float]) -> StepFigures:
-    """Read figures off a motion towards where ``standing``, the acceleration at rest, is zero; else `NO_STEP`."""
+def _figures(time: Floats, angle: Floats, at_rest: Callable[[float], float]) -> StepFigures:
+    """Return the step figures of a motion that ends where ``at_rest``, the acceleration at rest, is zero.
+
+    `NO_STEP` if it ends elsewhere.
+    """
     last, way = float(angle[-1]), float(angle[-1] - angle[0])
     if not way or np.abs(angle[-len(angle) // 10 :] - last).max() > _STILL * abs(way):
         return NO_STEP
-    rest = newton(standing, last, x1=last + _STILL * way, tol=1e-12, disp=False)
+    rest = newton(at_rest, last, x1=last + _STILL * way, tol=1e-12, disp=False)
     if not abs(rest - last) <= _STILL * abs(way):
         return NO_STEP
     share = (angle - angle[0]) / (rest - angle[0])

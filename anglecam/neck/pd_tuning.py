@@ -1,7 +1,7 @@
-"""Gains for a human-like nod: a wanted rise time and overshoot, met with the least control.
+"""PD gains for a human-like nod: the smallest gains with a wanted rise time and overshoot.
 
-The paper's example is an adult whose head turned 70° in 0.3 s with hardly any overshoot (Fig. 10 (b)). Damping by K_d
-slows a neck down without changing where it rests; K_p makes it faster and takes some of the steady state away.
+The paper's example is an adult whose head turned 70° in 0.3 s with hardly any overshoot (Fig. 10 (b)). K_d damps the
+neck, which slows it without changing its steady state; K_p makes it faster and reduces the steady state.
 """
 
 from __future__ import annotations
@@ -16,70 +16,71 @@ from anglecam.neck.constraints import Constraint, least
 from anglecam.neck.pd import ClosedLoop, PdGains, close_loop, rest_gain
 
 _LARGEST_GAIN = 50.0
-"""Of K_p·G(0), and of K_d·G(0) in wanted rise times: far more than any margin allows."""
+"""Upper bound of K_p·G(0), and of K_d·G(0) in wanted rise times: far more than any margin allows."""
 
 
 @dataclass(frozen=True)
-class Nod:
-    """The response that is wanted."""
+class NodTarget:
+    """The wanted response of the head."""
 
     rise_time: float = 0.3
     """From 10 % to 90 % of the way, s."""
     overshoot: float = 0.0
     """Share of the way."""
     rise_tolerance: float = 0.02
-    """Share of the rise time by which it may be missed."""
+    """Allowed deviation, as a share of the rise time."""
     overshoot_tolerance: float = 0.005
-    """By which the overshoot may be larger; it may always be smaller."""
+    """Allowed excess; a smaller overshoot is always allowed."""
 
 
-ADULT = Nod()
+ADULT = NodTarget()
 """The paper's adult: 0.3 s, no overshoot."""
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """A loop that was tuned, and how it stands to what was wanted."""
+    """A tuned loop, compared with the wanted response."""
 
     loop: ClosedLoop
     """With gains, figures and margins."""
-    wanted: Nod
+    wanted: NodTarget
     constraints: tuple[Constraint, ...]
     """Each with value, limit and whether it is active."""
     unmet: tuple[str, ...]
-    """Which cannot be met, in a line each; empty where all are."""
+    """A line for each constraint that cannot be met; empty if all are met."""
 
     @property
     def feasible(self) -> bool:
-        """Whether all that was wanted is met."""
+        """Whether every constraint is met."""
         return all(c.met for c in self.constraints)
 
 
 def tune_pd(
     plant: control.TransferFunction,
-    wanted: Nod = ADULT,
+    wanted: NodTarget = ADULT,
     *,
     largest_loss: float = 0.05,
     largest_sensitivity: float = 2.0,
 ) -> Tuned:
-    """Choose the smallest gains with which a linear plant nods as wanted.
+    """Return the smallest gains with which a linear plant has the wanted response.
 
     Parameters
     ----------
     plant : control.TransferFunction
-        Stable and strictly proper; of a large-angle neck that of `anglecam.neck.pd.linearised`, and
-        `anglecam.neck.pd.simulate_pd` then tells what the gains do to the neck itself.
-    wanted : Nod
+        Stable and strictly proper. For a large-angle neck pass the result of `anglecam.neck.pd.linearised`, then
+        simulate the gains on the neck itself with `anglecam.neck.pd.simulate_pd`.
+    wanted : NodTarget
         Rise and overshoot.
     largest_loss : float
-        Share of the steady state that K_p may take away.
+        Largest share of the steady state that K_p may take away.
     largest_sensitivity : float
-        M_s that is still robust; 2 keeps the locus 0.5 away from −1.
+        Largest M_s; with 2 the locus stays 0.5 away from −1.
 
     Returns
     -------
     Tuned
-        Not negative gains (in the sense of the plant's sign); where the wish cannot be met the nearest miss.
+        Gains that are not negative (relative to the sign of the plant); if the target cannot be met, those with the
+        smallest violation.
 
     Raises
     ------
@@ -88,7 +89,7 @@ def tune_pd(
     """
     rest = rest_gain(plant)
     if not (plant.poles().real < 0.0).all() or rest == 0.0:
-        raise ValueError("gains are tuned for a plant that comes to rest by itself, away from zero")
+        raise ValueError("gains can be tuned only for a stable plant whose steady state is not zero")
 
     def loop(x: Floats) -> ClosedLoop:
         return close_loop(plant, PdGains(float(x[0]) / rest, float(x[1]) * wanted.rise_time / rest))
@@ -106,8 +107,8 @@ def tune_pd(
     return Tuned(loop(best.at), wanted, best.constraints, best.unmet)
 
 
-def nod_constraints(wanted: Nod, rise_time: float, overshoot: float) -> tuple[Constraint, ...]:
-    """Return what a response has to meet: rise from both sides, overshoot from above."""
+def nod_constraints(wanted: NodTarget, rise_time: float, overshoot: float) -> tuple[Constraint, ...]:
+    """Return the constraints on a response: rise time from both sides, overshoot from above."""
     spare = wanted.rise_tolerance * wanted.rise_time
     return (
         Constraint("rise time", "s", rise_time, wanted.rise_time + spare, False, wanted.rise_time),

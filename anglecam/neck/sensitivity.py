@@ -1,9 +1,9 @@
-"""How the neck's response moves with what it is made of: Fig. 9, and the same as numbers.
+"""Sensitivity of the neck's step response to its quantities: Fig. 9, and normalised sensitivities.
 
-Each panel steps the input of Eq. (28) with one quantity changed and the others as Table 5 has them. The text varies h
-by 0.4 V/rad, K_m by 0.7 mN·m/A, R_a by 0.5 Ω and G_a from 5 to 1000, "a five order of magnitude difference" though it
-is 2.3; and L6 with L3 and γ following. Eq. (35) ends before the range of G_a does: with the paper's spring and
-h = 1.4 V/rad the neck is unstable from G_a = 113 on, so that 1000 has a curve that runs away and no figures.
+Each panel steps the input of Eq. (28) with one quantity changed and the others from Table 5. The text varies h by
+0.4 V/rad, K_m by 0.7 mN·m/A, R_a by 0.5 Ω, G_a from 5 to 1000 ("a five order of magnitude difference", though it is
+2.3), and L6 with L3 and γ following. Eq. (35) fails within the range of G_a: with the paper's spring and h = 1.4 V/rad
+the neck is unstable from G_a = 113, so that the curve for 1000 diverges and has no figures.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from anglecam.neck.fourbar import FourBar, crank_reach, head_angle
 from anglecam.neck.linear import LinearNeck, linear_neck
 from anglecam.neck.parameters import PAPER, NeckParameters
 from anglecam.neck.step import linear_step, linear_step_figures
-from anglecam.neck.variation import PARAMETERS, Parameter
+from anglecam.neck.variation import PARAMETERS, NeckQuantity
 
 FIG_9: dict[str, tuple[float, ...]] = {
     "h": (1.0, 1.4, 1.8),
@@ -30,44 +30,46 @@ FIG_9: dict[str, tuple[float, ...]] = {
     "R_a": (0.5, 1.0, 1.5),
     "L_6": (0.053, 0.056, 0.059, 0.062, 0.065),
 }
-"""Values of panels a to e, SI. The text tells the steps; those of L6 are ours."""
+"""Values of panels a to e, SI. The steps are from the text, except those of L6, which the paper does not print."""
 FIGURES = ("rise_time", "overshoot", "settling_time", "steady_state")
+"""Step figures whose sensitivity is computed."""
 _STEP = 1e-4
-"""Of a parameter's logarithm."""
+"""Step of the logarithm of a quantity in central differences."""
 _KINK = 0.01
-"""By which slopes to both sides may differ, of themselves or of 1, before there is none."""
+"""Largest difference of the one-sided slopes, relative to the slope or to 1; beyond it there is no derivative."""
 _SMALL_OVERSHOOT = 1e-9
+"""A figure below this counts as zero and has no logarithm."""
 
 
 @dataclass(frozen=True)
-class Curve:
-    """The step response with one value of the parameter."""
+class StepCurve:
+    """The step response for one value of the quantity."""
 
     value: float
-    """Of the parameter, SI."""
+    """Of the quantity, SI."""
     neck: NeckParameters
     linear: LinearNeck
     angle: Floats
     """(n,) Δθ, rad."""
     figures: StepFigures
-    """BackgroundMotion state in rad/V; NaN where the neck is unstable."""
+    """With the steady state in rad/V; NaN if the neck is unstable."""
 
     @property
     def stable(self) -> bool:
-        """Whether the neck comes to rest: Eq. (35) and a positive damping."""
+        """Whether the neck comes to rest: Eq. (35) holds and the damping is positive."""
         return min(self.linear.stiffness, self.linear.damping) > 0.0
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One parameter varied: a panel of Fig. 9."""
+    """One quantity varied: a panel of Fig. 9."""
 
     symbol: str
     name: str
     unit: str
     time: Floats
     """(n,) s from the step."""
-    curves: tuple[Curve, ...]
+    curves: tuple[StepCurve, ...]
     """In the order of the values."""
 
 
@@ -98,25 +100,25 @@ class Figure9:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """∂ln(figure)/∂ln(parameter): by how many per cent a figure changes when the parameter grows by one."""
+    """∂ln(figure)/∂ln(quantity): change of a figure in per cent when the quantity grows by one per cent."""
 
     symbol: str
     value: float
-    """Of the parameter, SI."""
+    """Of the quantity, SI."""
     rise_time: float
     overshoot: float
     settling_time: float
     steady_state: float
-    """NaN where a figure is zero, or bends at this very point: L6 where the nod meets the end of the links' reach."""
+    """NaN where a figure is zero or has a kink, as for L6 where the nod meets the end of the links' reach."""
 
 
 def figure_9(neck: NeckParameters = PAPER, *, duration: float = 0.6, height: float = 1.0) -> Figure9:
-    """Step the neck as Fig. 9 does.
+    """Return the step responses of Fig. 9.
 
     Parameters
     ----------
     neck : NeckParameters
-        What is varied about.
+        The neck whose quantities are varied.
     duration : float
         s.
     height : float
@@ -138,12 +140,12 @@ def figure_9(neck: NeckParameters = PAPER, *, duration: float = 0.6, height: flo
 
 
 def vary(neck: NeckParameters, symbol: str, values: Sequence[float], time: ArrayLike, height: float = 1.0) -> Panel:
-    """Step the neck with one parameter at several values.
+    """Return the step responses for several values of one quantity.
 
     Parameters
     ----------
     neck : NeckParameters
-        The others.
+        With the values of the other quantities.
     symbol : str
         In `anglecam.neck.variation.PARAMETERS`.
     values : sequence of float
@@ -170,24 +172,24 @@ def vary(neck: NeckParameters, symbol: str, values: Sequence[float], time: Array
         linear = linear_neck(made)
         above, below = [linear.c], [1.0, linear.a, linear.b]
         angle = height * linear_step(above, below, instants)
-        curves.append(Curve(value, made, linear, angle, linear_step_figures(above, below)))
+        curves.append(StepCurve(value, made, linear, angle, linear_step_figures(above, below)))
     return Panel(symbol, parameter.name, parameter.unit, instants, tuple(curves))
 
 
 def sensitivities(neck: NeckParameters = PAPER, symbols: Sequence[str] = tuple(PARAMETERS)) -> tuple[Sensitivity, ...]:
-    """Work out how much each figure depends on each parameter, without units.
+    """Return the normalised sensitivity of each figure to each quantity.
 
     Parameters
     ----------
     neck : NeckParameters
-        About which; stable.
+        A stable neck, at which the derivatives are taken.
     symbols : sequence of str
         In `anglecam.neck.variation.PARAMETERS`.
 
     Returns
     -------
     tuple of Sensitivity
-        In the order of the symbols, by central differences of figures that are exact.
+        In the order of the symbols, by central differences of exact figures.
 
     Raises
     ------
@@ -196,17 +198,18 @@ def sensitivities(neck: NeckParameters = PAPER, symbols: Sequence[str] = tuple(P
     """
     if math.isnan(_figures(neck)[0]):
         raise ValueError("the neck is unstable, Eq. (35): its response has no figures")
-    told = []
+    rows = []
     for symbol in symbols:
         parameter = _parameter(symbol)
         value = parameter.read(neck)
-        # The middle too is made anew: with L6 given as it is, γ becomes the one that fits the links.
+        # the unchanged value goes through `changed` too, because an L6 that is set replaces γ by the fitted one
         low, middle, high = (_figures(parameter.changed(neck, value * math.exp(s))) for s in (-_STEP, 0.0, _STEP))
-        told.append(Sensitivity(symbol, value, *(_slope(*v) for v in zip(low, middle, high, strict=True))))
-    return tuple(told)
+        rows.append(Sensitivity(symbol, value, *(_slope(*v) for v in zip(low, middle, high, strict=True))))
+    return tuple(rows)
 
 
 def _slope(low: float, middle: float, high: float) -> float:
+    """Return the logarithmic derivative; NaN where there is none."""
     if not min(low, middle, high) > _SMALL_OVERSHOOT:
         return math.nan
     before, after = math.log(middle / low) / _STEP, math.log(high / middle) / _STEP
@@ -216,18 +219,18 @@ def _slope(low: float, middle: float, high: float) -> float:
 
 def _figures(neck: NeckParameters) -> tuple[float, ...]:
     linear = linear_neck(neck)
-    told = linear_step_figures([linear.c], [1.0, linear.a, linear.b])
-    return tuple(float(getattr(told, name)) for name in FIGURES)
+    figures = linear_step_figures([linear.c], [1.0, linear.a, linear.b])
+    return tuple(float(getattr(figures, name)) for name in FIGURES)
 
 
-def _parameter(symbol: str) -> Parameter:
+def _parameter(symbol: str) -> NeckQuantity:
     if symbol not in PARAMETERS:
         raise ValueError(f"no parameter {symbol}; there are {', '.join(PARAMETERS)}")
     return PARAMETERS[symbol]
 
 
 def _where_closed(linkage: FourBar, theta_s: Floats) -> Floats:
-    """Return θ_f, NaN where the links do not close."""
+    """Return θ_f; NaN where the links do not close."""
     low, high = crank_reach(linkage)
     from_line = np.abs(np.arctan2(np.sin(theta_s), np.cos(theta_s)))
     closed = (from_line >= low) & (from_line <= high)

@@ -6,10 +6,10 @@
     c3·U_in = J_r·θ̈_a + K_m²/(G_g²·R_a)·θ̇_a + c3·h·θ_a + T,   c3 = K_m·G_a/(G_g·R_a)                     Eq. (11)
     T = c3·U_in − γ·(J_r·Δθ̈ + K_m²/(G_g²·R_a)·Δθ̇ + c3·h·Δθ)                                             Eq. (12)
 
-Eq. (10) says ω_m = θ̇_a, but then the motor's damping in Eq. (11) would hold G_g where it holds G_g². It follows with
-ω_m = θ̇_a/G_g, which is also what a gear without loss does whose torques obey Eq. (9), and so it is here. Eqs. (11) and
-(12) agree in every sign. Eq. (12) puts the gear's torque on the head as it is; a lever 1/γ between the two, as virtual
-work would have it, is not in the paper (see `anglecam.neck.linear` on γ). J_r is added to the gear's side unreflected.
+Eq. (10) states ω_m = θ̇_a, but then the motor's damping in Eq. (11) would contain G_g instead of G_g². Eq. (11) follows
+with ω_m = θ̇_a/G_g, which also holds for a lossless gear whose torques obey Eq. (9), and is used here. Eqs. (11) and
+(12) agree in every sign. Eq. (12) applies the torque of the gear to the head unchanged; the factor 1/γ that virtual
+work gives is not in the paper (see `anglecam.neck.linear` on γ). J_r is added on the gear side without reflection.
 """
 
 from __future__ import annotations
@@ -20,30 +20,30 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from anglecam.data.typing import Floats
-from anglecam.neck.parameters import Servo
+from anglecam.neck.parameters import ServoParameters
 
 
 @dataclass(frozen=True)
 class TorqueSpeed:
-    """The straight line between torque and speed that a servo gives at a constant error, its angle held or not."""
+    """The straight line of torque over speed of a servo at a constant error signal."""
 
     stall_torque: float
     """At standstill, N·m."""
     no_load_speed: float
-    """Of the servo's arm without load, rad/s."""
+    """Speed of the servo's arm without load, rad/s."""
 
     def torque(self, omega_a: ArrayLike) -> Floats:
         """Return the torque, N·m, at a speed of the servo's arm, rad/s."""
         return np.asarray(self.stall_torque * (1.0 - np.asarray(omega_a, dtype=float) / self.no_load_speed))
 
 
-def error_signal(servo: Servo, voltage: ArrayLike, theta_a: ArrayLike) -> Floats:
-    """Compare the input with the potentiometer, Eq. (5).
+def error_signal(servo: ServoParameters, voltage: ArrayLike, theta_a: ArrayLike) -> Floats:
+    """Return the error between input and potentiometer, Eq. (5).
 
     Parameters
     ----------
-    servo : Servo
-        Its sensor gain h.
+    servo : ServoParameters
+        With the sensor gain h.
     voltage : array_like
         U_in, V.
     theta_a : array_like
@@ -57,23 +57,23 @@ def error_signal(servo: Servo, voltage: ArrayLike, theta_a: ArrayLike) -> Floats
     return np.asarray(np.asarray(voltage, dtype=float) - servo.sensor_gain * np.asarray(theta_a, dtype=float))
 
 
-def motor_speed(servo: Servo, omega_a: ArrayLike) -> Floats:
-    """Speed of the motor, rad/s, at a speed of the servo's arm, rad/s: ω_m = θ̇_a/G_g, see the module on Eq. (10)."""
+def motor_speed(servo: ServoParameters, omega_a: ArrayLike) -> Floats:
+    """Return the speed of the motor, rad/s, at a speed of the servo's arm, rad/s: ω_m = θ̇_a/G_g, see Eq. (10) above."""
     return np.asarray(np.asarray(omega_a, dtype=float) / servo.gear_ratio)
 
 
-def back_emf(servo: Servo, omega_m: ArrayLike) -> Floats:
-    """Voltage that the turning motor makes, V, at its speed, rad/s, Eq. (7)."""
+def back_emf(servo: ServoParameters, omega_m: ArrayLike) -> Floats:
+    """Return the back electromotive force of the motor, V, at its speed, rad/s, Eq. (7)."""
     return np.asarray(servo.motor_constant * np.asarray(omega_m, dtype=float))
 
 
-def motor_current(servo: Servo, error: ArrayLike, omega_m: ArrayLike) -> Floats:
-    """Work out the motor's current, Eqs. (6)-(7): I_m = (G_a·e − K_m·ω_m)/R_a.
+def motor_current(servo: ServoParameters, error: ArrayLike, omega_m: ArrayLike) -> Floats:
+    """Return the motor current, Eqs. (6)-(7): I_m = (G_a·e − K_m·ω_m)/R_a.
 
     Parameters
     ----------
-    servo : Servo
-        Motor and amplifier; no inductance and no limit of voltage, as in the paper.
+    servo : ServoParameters
+        Motor and amplifier, without inductance and without a voltage limit, as in the paper.
     error : array_like
         e, V.
     omega_m : array_like
@@ -88,19 +88,19 @@ def motor_current(servo: Servo, error: ArrayLike, omega_m: ArrayLike) -> Floats:
     return np.asarray((amplified - back_emf(servo, omega_m)) / servo.output_impedance)
 
 
-def gear_torque(servo: Servo, current: ArrayLike) -> Floats:
-    """Torque behind the gear, N·m, at a current of the motor, A, Eqs. (8)-(9): T_g = K_m·I_m/G_g."""
+def gear_torque(servo: ServoParameters, current: ArrayLike) -> Floats:
+    """Return the torque after the gear, N·m, at a motor current, A, Eqs. (8)-(9): T_g = K_m·I_m/G_g."""
     return np.asarray(servo.motor_constant * np.asarray(current, dtype=float) / servo.gear_ratio)
 
 
 def servo_torque(
-    servo: Servo, voltage: ArrayLike, theta_a: ArrayLike, omega_a: ArrayLike, alpha_a: ArrayLike = 0.0
+    servo: ServoParameters, voltage: ArrayLike, theta_a: ArrayLike, omega_a: ArrayLike, alpha_a: ArrayLike = 0.0
 ) -> Floats:
-    """Work out the torque that leaves the servo from the motion of its own arm, Eq. (11) solved for T.
+    """Return the torque of the servo from the motion of its arm, Eq. (11) solved for T.
 
     Parameters
     ----------
-    servo : Servo
+    servo : ServoParameters
         Motor, amplifier, gear and sensor.
     voltage : array_like
         U_in, V.
@@ -118,13 +118,13 @@ def servo_torque(
 
 
 def drive_torque(
-    servo: Servo, gamma: float, voltage: ArrayLike, delta: ArrayLike, omega: ArrayLike, alpha: ArrayLike = 0.0
+    servo: ServoParameters, gamma: float, voltage: ArrayLike, delta: ArrayLike, omega: ArrayLike, alpha: ArrayLike = 0.0
 ) -> Floats:
-    """Work out the torque on the head from the head's motion, Eq. (12).
+    """Return the torque on the head from the motion of the head, Eq. (12).
 
     Parameters
     ----------
-    servo : Servo
+    servo : ServoParameters
         Motor, amplifier, gear and sensor.
     gamma : float
         γ of Eq. (3), θ_a = γ·Δθ.
@@ -142,15 +142,15 @@ def drive_torque(
     return servo_torque(servo, voltage, *arm)
 
 
-def torque_speed(servo: Servo, error: float) -> TorqueSpeed:
-    """Draw the torque-speed line at a constant error, Eqs. (6)-(9).
+def torque_speed(servo: ServoParameters, error: float) -> TorqueSpeed:
+    """Return the torque-speed line at a constant error, Eqs. (6)-(9).
 
     Parameters
     ----------
-    servo : Servo
+    servo : ServoParameters
         Motor, amplifier and gear.
     error : float
-        e, V; what reaches the motor is G_a·e, so that a supply of 6 V ends the line at e = 6 V/G_a.
+        e, V. The motor gets G_a·e, so a supply of 6 V corresponds to e = 6 V/G_a.
 
     Returns
     -------

@@ -1,10 +1,10 @@
-"""Where the spring carries the head, and what it fails to carry: Eqs. (23)-(24).
+"""Static balance of spring and weight, and the torque that remains: Eqs. (23)-(24).
 
     F(θ) = F_s·L_s − M_h·g·L·sin θ = 0                                                                   Eq. (23)
     F(θ0) = K·(θ0 − θ_p)·L6·L2 − M_h·g·L·sin θ0 = 0                                                      Eq. (24)
 
-θ_p is the angle at which the spring would be slack if Eq. (18a) held all the way. F is the torque that brings the head
-back where it is positive; a motor has to overcome it off neutral. Angles Δθ = θ − θ0 are from neutral.
+θ_p is the angle at which the spring would be slack if Eq. (18a) held at every angle. F is a restoring torque where it
+is positive; away from neutral the motor has to overcome it. Angles Δθ = θ − θ0 are from neutral.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from scipy.optimize import brentq
 
 from anglecam.data.typing import Floats
 from anglecam.neck.linear import passive_stiffness
-from anglecam.neck.parameters import Head, NeckParameters, Spring
+from anglecam.neck.parameters import HeadParameters, NeckParameters, SpringParameters
 from anglecam.neck.spring import Preload, elongation, spring_torque
 
 SEARCHED = math.radians(90.0)
-"""How far from neutral a balance is looked for, rad."""
+"""Largest angle from neutral at which a balance is searched, rad."""
 STEPS = 720
-"""Into which a range is cut to look for one; two balances within one step are not parted."""
+"""Number of steps into which the range is divided; two balances within one step are not resolved."""
 
 
 @dataclass(frozen=True)
 class StaticCurve:
-    """Spring against weight over the head's angle, arrays of shape (n,)."""
+    """Torques of spring and weight over the head angle, arrays of shape (n,)."""
 
     delta: Floats
     """Δθ, rad."""
@@ -47,13 +47,13 @@ class StaticCurve:
         return self.spring - self.weight
 
 
-def weight_torque(head: Head, delta: ArrayLike) -> Floats:
-    """Torque of the weight away from upright, M_h·g·L·sin(θ0 + Δθ), N·m, at an angle from neutral, rad."""
+def weight_torque(head: HeadParameters, delta: ArrayLike) -> Floats:
+    """Return the torque of the weight away from upright, M_h·g·L·sin(θ0 + Δθ), N·m, at an angle from neutral, rad."""
     return np.asarray(head.weight_moment * np.sin(head.neutral + np.asarray(delta, dtype=float)))
 
 
 def pretension_angle(neck: NeckParameters) -> float:
-    """Find the θ_p that balances the head at neutral, Eq. (24), rad from upright.
+    """Return the θ_p that balances the head at neutral, Eq. (24), rad from upright.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def pretension_angle(neck: NeckParameters) -> float:
 
 
 def neutral_torque(neck: NeckParameters, theta_p: float) -> float:
-    """Return F(θ0) of Eq. (24), N·m, for a pretension angle, rad from upright: zero where the head is balanced."""
+    """Return F(θ0) of Eq. (24), N·m, for a pretension angle, rad from upright: zero if the head is balanced."""
     spring, head = neck.spring, neck.head
     return spring.rate * (head.neutral - theta_p) * spring.arm * spring.base - head.weight_moment * math.sin(
         head.neutral
@@ -79,7 +79,7 @@ def neutral_torque(neck: NeckParameters, theta_p: float) -> float:
 
 
 def pretension(neck: NeckParameters, theta_p: float, *, common: float | None = None) -> Preload:
-    """Stretch the springs as a pretension angle says.
+    """Return the stretch of the springs for a pretension angle.
 
     Parameters
     ----------
@@ -88,8 +88,8 @@ def pretension(neck: NeckParameters, theta_p: float, *, common: float | None = N
     theta_p : float
         Pretension angle of Eq. (24), rad from upright.
     common : float, optional
-        For two springs that stand against each other: stretch at neutral of the one that is stretched less, m. ``None``
-        for the paper's single spring.
+        For two opposing springs: stretch at neutral of the less stretched one, m. ``None`` for the paper's single
+        spring.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def pretension(neck: NeckParameters, theta_p: float, *, common: float | None = N
 
 
 def balanced(neck: NeckParameters, *, common: float | None = None, excess: float = 0.0) -> Preload:
-    """Stretch the springs so that they carry the head at neutral, Eqs. (23)-(24).
+    """Return the stretch of the springs that carries the head at neutral, Eqs. (23)-(24).
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def balanced(neck: NeckParameters, *, common: float | None = None, excess: float
     common : float, optional
         As for `pretension`.
     excess : float
-        Torque by which they carry more than that, N·m.
+        Torque by which the springs exceed the weight, N·m.
 
     Returns
     -------
@@ -124,12 +124,12 @@ def balanced(neck: NeckParameters, *, common: float | None = None, excess: float
     return pretension(neck, pretension_angle(neck) - more, common=common)
 
 
-def slack_limit(spring: Spring, low: float, high: float) -> float:
+def slack_limit(spring: SpringParameters, low: float, high: float) -> float:
     """Return the least common stretch, m, with which neither of two springs goes slack between two angles, rad.
 
     Parameters
     ----------
-    spring : Spring
+    spring : SpringParameters
         Lengths.
     low, high : float
         Range of Δθ, rad.
@@ -137,15 +137,15 @@ def slack_limit(spring: Spring, low: float, high: float) -> float:
     Returns
     -------
     float
-        For the ``common`` of `pretension` where the head's weight adds nothing.
+        For ``common`` of `pretension`, without the stretch that the head's weight adds.
     """
-    # the springs mirror each other, and nothing is shorter than where base and arm lie in one line
+    # the springs mirror each other, and a spring is shortest where base and arm lie in one line
     furthest = max(-low, high, 0.0)
     return -float(elongation(spring, -min(furthest, math.acos(spring.base / spring.arm))))
 
 
 def static_torque(neck: NeckParameters, preload: Preload, delta: ArrayLike) -> Floats:
-    """Work out the torque that a motor has to overcome to hold the head still, F of Eq. (23) at large angles.
+    """Return the torque that a motor has to overcome to hold the head, F of Eq. (23) at large angles.
 
     Parameters
     ----------
@@ -159,13 +159,13 @@ def static_torque(neck: NeckParameters, preload: Preload, delta: ArrayLike) -> F
     Returns
     -------
     ndarray
-        N·m, towards neutral where it has the sign of Δθ.
+        N·m; it acts towards neutral where it has the sign of Δθ.
     """
     return np.asarray(spring_torque(neck.spring, preload, delta) - weight_torque(neck.head, delta))
 
 
 def static_curve(neck: NeckParameters, preload: Preload, delta: ArrayLike) -> StaticCurve:
-    """Draw spring against weight over the head's angle.
+    """Return the torques of spring and weight over the head angle.
 
     Parameters
     ----------
@@ -191,42 +191,42 @@ def static_curve(neck: NeckParameters, preload: Preload, delta: ArrayLike) -> St
 
 
 def neutral_angle(neck: NeckParameters, preload: Preload) -> float:
-    """Find where the head stands by itself with a given pretension, F(θ) = 0 of Eq. (23).
+    """Return where the head rests without a motor with a given pretension, F(θ) = 0 of Eq. (23).
 
     Parameters
     ----------
     neck : NeckParameters
         Spring and head.
     preload : Preload
-        Stretch of the springs at the angle that Δθ is counted from.
+        Stretch of the springs at Δθ = 0.
 
     Returns
     -------
     float
-        The nearest Δθ at which the balance is stable, rad: zero if `balanced`.
+        The stable Δθ nearest to zero, rad; zero for a preload of `balanced`.
 
     Raises
     ------
     ValueError
-        If there is none within 90°.
+        If there is no stable balance within 90°.
     """
     return stable_zero(lambda delta: static_torque(neck, preload, delta), -SEARCHED, SEARCHED)
 
 
 def stable_zero(torque: Callable[[Floats], Floats], low: float, high: float) -> float:
-    """Find the angle nearest to neutral at which a restoring torque vanishes and grows with the angle.
+    """Return the angle nearest to neutral at which a restoring torque vanishes and increases with the angle.
 
     Parameters
     ----------
     torque : callable
-        Angles of shape (n,), rad → torque towards smaller angles, N·m; smooth.
+        From angles of shape (n,), rad, to the torque towards smaller angles, N·m; smooth.
     low, high : float
-        Where to look, rad.
+        Range to search, rad.
 
     Returns
     -------
     float
-        rad, to rounding.
+        rad, to rounding error.
 
     Raises
     ------
@@ -239,7 +239,7 @@ def stable_zero(torque: Callable[[Floats], Floats], low: float, high: float) -> 
     if len(starts) == 0:
         raise ValueError(
             f"nothing balances stably between {math.degrees(low):.1f}° and {math.degrees(high):.1f}° from neutral: the "
-            f"torque back is {values.min():.3g} to {values.max():.3g} N·m"
+            f"restoring torque is {values.min():.3g} to {values.max():.3g} N·m"
         )
     roots = [
         brentq(lambda at: float(torque(np.array([at]))[0]), grid[i], grid[i + 1], xtol=1e-15, rtol=1e-14)

@@ -4,8 +4,8 @@ With θ(s)/U(s) = N(s)/D(s) in controller form ẋ = A·x + B·u, θ = C·x, a u
 
     θ(t) = C·(1 − e^{At})·x∞,   x∞ = −A⁻¹·B,
 
-so levels and turning points are roots of known functions instead of samples of a simulation, and figures vary as
-smoothly with parameters as their definitions do.
+so level crossings and extremes are roots of known functions instead of samples of a simulation, and the figures are as
+smooth in the parameters as their definitions.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from anglecam.data.step_figures import HIGH, LOW, NO_STEP, SETTLED, StepFigures
 from anglecam.data.typing import Floats
 
 _DECAYS = 12.0
-"""Time constants of the slowest pole that are looked at; e⁻¹² is far below the settling band."""
+"""Time constants of the slowest pole that are evaluated; e⁻¹² is far below the settling band."""
 _PER_RADIAN = 10.0
-"""Points a radian of the fastest pole, between which at most one level is crossed."""
+"""Points per radian of the fastest pole, so that at most one level is crossed between two points."""
 _FEWEST, _MOST = 500, 1_000_000
-"""Points; the most resolve a fastest pole 1e5 times the slowest."""
+"""Limits on the number of points; the upper one resolves a fastest pole 1e5 times the slowest."""
 _TERMS = 12
-"""Of a series within a tenth of a radian: the thirteenth is below 1e-20."""
+"""Terms of a Taylor series within a tenth of a radian: the thirteenth is below 1e-20."""
 
 
 def linear_step(numerator: ArrayLike, denominator: ArrayLike, time: ArrayLike) -> Floats:
-    """Return the response to a unit step, of a stable system or an unstable one.
+    """Return the response of a stable or unstable system to a unit step.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def linear_step(numerator: ArrayLike, denominator: ArrayLike, time: ArrayLike) -
     """
     A, B, C = _realise(numerator, denominator)
     order = len(B)
-    # The step as one more state that stands still, which needs no inverse of A: an integrator has none.
+    # The step is one more, constant state. This needs no inverse of A, which an integrator does not have.
     driven = np.zeros((order + 1, order + 1))
     driven[:order, :order], driven[:order, order] = A, B
     instants = np.asarray(time, dtype=float)
@@ -76,7 +76,7 @@ def linear_step_figures(numerator: ArrayLike, denominator: ArrayLike) -> StepFig
     Returns
     -------
     StepFigures
-        All NaN for a system that is not stable or comes to rest at zero.
+        All NaN for a system that is not stable or has the steady state zero.
 
     Raises
     ------
@@ -96,47 +96,47 @@ def linear_step_figures(numerator: ArrayLike, denominator: ArrayLike) -> StepFig
     count = int(np.clip(end * float(np.abs(poles).max()) * _PER_RADIAN, _FEWEST, _MOST))
     width = end / count
     states = _orbit(_exponential(A * width), rest, count + 1)
-    left = C / gain  # of a state: the share of the way still to go
-    speed = left @ A
+    remaining = C / gain  # maps a state to the share of the way that remains
+    speed = remaining @ A
 
     def when(row: Floats, first: int, level: float) -> float:
-        """Instant after point ``first`` at which ``row`` of the state passes a level."""
+        """Return the time after point ``first`` at which ``row`` of the state passes a level."""
         terms = _series(A * width, states[:, first]) @ row
         terms[0] -= level
         highest_first = terms[::-1].tolist()
 
-        def way(share: float) -> float:
-            """Evaluate by Horner's rule; NumPy's `Polynomial` takes ten times as long over a single number."""
+        def difference(share: float) -> float:
+            """Evaluate by Horner's rule; NumPy's `Polynomial` takes ten times as long for a single number."""
             total = 0.0
             for term in highest_first:
                 total = total * share + term
             return total
 
-        if way(0.0) * way(1.0) >= 0.0:  # passed at one of the two points, to the last digit
-            return width * (first + float(abs(way(1.0)) < abs(way(0.0))))
-        return width * (first + float(brentq(way, 0.0, 1.0, xtol=1e-13)))
+        if difference(0.0) * difference(1.0) >= 0.0:  # the level is passed at one of the two points, to the last digit
+            return width * (first + float(abs(difference(1.0)) < abs(difference(0.0))))
+        return width * (first + float(brentq(difference, 0.0, 1.0, xtol=1e-13)))
 
     def reached(share: float) -> float:
-        return when(left, int(np.argmax(left @ states <= 1.0 - share)) - 1, 1.0 - share)
+        return when(remaining, int(np.argmax(remaining @ states <= 1.0 - share)) - 1, 1.0 - share)
 
-    shares, speeds = left @ states, speed @ states
+    shares, speeds = remaining @ states, speed @ states
     lowest = int(np.argmin(shares))
     overshoot = max(0.0, -float(shares[lowest]))
     if overshoot > 0.0:
         before = lowest - 1 if speeds[lowest] > 0.0 else lowest
         crest = when(speed, before, 0.0) - width * before
-        overshoot = max(overshoot, -float(left @ _exponential(A * crest) @ states[:, before]))
+        overshoot = max(overshoot, -float(remaining @ _exponential(A * crest) @ states[:, before]))
     outside = int(np.flatnonzero(np.abs(shares) > SETTLED)[-1])
-    settled = when(left, outside, float(np.copysign(SETTLED, shares[outside])))
+    settled = when(remaining, outside, float(np.copysign(SETTLED, shares[outside])))
     return StepFigures(reached(HIGH) - reached(LOW), overshoot, settled, gain)
 
 
 def _realise(numerator: ArrayLike, denominator: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Return A, B, C of the controller form."""
+    """Return A, B and C of the controller form."""
     above = np.trim_zeros(np.atleast_1d(np.asarray(numerator, dtype=float)), "f")
     below = np.trim_zeros(np.atleast_1d(np.asarray(denominator, dtype=float)), "f")
     if len(above) >= len(below):
-        raise ValueError("a step response is taken of strictly proper systems: the numerator is of too high a degree")
+        raise ValueError("a step response needs a strictly proper system: the degree of the numerator is too high")
     order = len(below) - 1
     B, C = np.zeros(order), np.zeros(order)
     B[0] = 1.0
@@ -145,7 +145,7 @@ def _realise(numerator: ArrayLike, denominator: ArrayLike) -> tuple[Floats, Floa
 
 
 def _orbit(step: Floats, start: Floats, count: int) -> Floats:
-    """Return ``count`` states, each one step after the other, (order, count)."""
+    """Return ``count`` successive states, (order, count)."""
     states, power = start[:, None], step
     while states.shape[1] < count:
         states = np.hstack([states, power @ states])
@@ -154,7 +154,10 @@ def _orbit(step: Floats, start: Floats, count: int) -> Floats:
 
 
 def _exponential(step: Floats) -> Floats:
-    """Return e^step. Not scipy's, whose threads cost a small matrix a thousand times what its arithmetic does."""
+    """Return e^step.
+
+    Not scipy's: for a small matrix its threads cost a thousand times as much as the arithmetic.
+    """
     size = float(np.abs(np.linalg.eigvals(step)).max())
     halvings = max(0, int(np.ceil(np.log2(max(size * _PER_RADIAN, 1.0)))))
     power = _series(step / 2.0**halvings, np.eye(len(step))).sum(axis=0)

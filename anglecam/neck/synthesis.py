@@ -1,12 +1,13 @@
-"""From a wanted response to a neck: spring, link and gains that meet Eqs. (34)-(35) and reach far enough.
+"""Design a neck for a wanted response: spring, link and gains that meet Eqs. (34)-(35) and the wanted range.
 
-The design is the least change of a given neck, the sum of the squared logarithms of its changed quantities, that
-meets every constraint. a, b and c of each candidate follow from Eq. (28), so Eq. (34) holds throughout; Eq. (35) is
-one of the constraints. When L6 changes, the coupler L3 changes so that the chain closes at neutral, and γ follows from
-the links.
+The design is the least change of a given neck that meets every constraint; the change is the sum of the squared
+logarithms of the changed quantities. a, b and c of each candidate follow from Eq. (28), so Eq. (34) always holds;
+Eq. (35) is one of the constraints. When L6 changes, the coupler L3 changes so that the chain closes at neutral, and γ
+follows from the links.
 
-With C and the motor as they are, a is fixed and rise time and overshoot cannot both be chosen: a = 2ζω. What damps is
-the derivative gain K_d, the paper's remedy, or C itself, "improving the viscous damping C"; either can be free.
+With fixed C and motor a is fixed, and rise time and overshoot cannot both be chosen, because a = 2ζω. Damping comes
+from the derivative gain K_d, the paper's remedy, or from C itself, "improving the viscous damping C"; either can be
+free.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from anglecam.neck.fourbar import reach, servo_angle
 from anglecam.neck.linear import LinearNeck, linear_neck, passive_stiffness
 from anglecam.neck.parameters import PAPER, NeckParameters
 from anglecam.neck.pd import PdGains
-from anglecam.neck.pd_tuning import Nod, nod_constraints
+from anglecam.neck.pd_tuning import NodTarget, nod_constraints
 from anglecam.neck.statics import pretension_angle
 from anglecam.neck.step import linear_step_figures
 from anglecam.neck.transmission import worst_transmission_angle
@@ -41,31 +42,31 @@ BOUNDS: dict[str, tuple[float, float]] = {
     "L_2": (0.02, 0.08),
     "K_d": (0.0, 1.0),
 }
-"""What may be free and how far, SI: h and G_a as the text has them; K_d in V·s/rad."""
+"""Quantities that may be free, with their bounds, SI: h and G_a as in the text; K_d in V·s/rad."""
 _DAMPING_GAIN = "K_d"
 _TYPICAL_K_D = 0.05
-"""V·s/rad that costs as much as another parameter's change by a factor e."""
+"""K_d, V·s/rad, that costs as much as a change of another quantity by the factor e."""
 
 
 @dataclass(frozen=True)
 class Wish:
-    """What the neck is to do."""
+    """The wanted response and range of a neck."""
 
-    nod: Nod
-    """Rise and overshoot."""
+    nod: NodTarget
+    """Rise time and overshoot."""
     up: float = math.radians(25.0)
     """Range of the head above neutral, rad."""
     down: float = math.radians(23.5)
-    """Range below neutral, rad: what the paper's links have, whose Table 3 rounds it to 25°."""
+    """Range below neutral, rad: that of the paper's links, which Table 3 rounds to 25°."""
     servo_travel: float = math.radians(180.0)
-    """That the servo arm has, rad: Fig. 13."""
+    """Largest travel of the servo arm, rad: Fig. 13."""
     transmission_angle: float = math.radians(40.0)
-    """Least angle between coupler and rocker, rad, below which a linkage jams easily."""
+    """Least angle between coupler and rocker, rad; below it a linkage jams easily."""
     largest_voltage: float = 6.0
-    """That holds the head at the end of its range, V."""
+    """Largest voltage to hold the head at the end of its range, V."""
     stall_torque: float | None = None
-    """Of the servo at its shaft, N·m, to hold the head there; not asked if ``None``. The paper's own neck needs
-    0.71 N·m by Eq. (25) and its servo has 0.47."""
+    """Stall torque of the servo at its shaft, N·m, that has to hold the head there; no constraint if ``None``. The
+    paper's neck needs 0.71 N·m by Eq. (25) and its servo has 0.47."""
 
 
 @dataclass(frozen=True)
@@ -74,19 +75,19 @@ class Synthesis:
 
     neck: NeckParameters
     gains: PdGains
-    """K_d of the controller in the feedback path, V·s/rad; 0 where it was not free."""
+    """K_d of the controller in the feedback path, V·s/rad; 0 if it was not free."""
     linear: LinearNeck
     """Eq. (28) of the neck without the controller."""
     figures: StepFigures
-    """Of the neck with its controller, for a step of 1 V."""
+    """Step figures of the neck with its controller, for a step of 1 V."""
     command_gain: float
-    """C_i of Eq. (29) with which the head comes to rest where it is commanded, V/rad."""
+    """C_i of Eq. (29) with which the head comes to rest at the commanded angle, V/rad."""
     changes: dict[str, tuple[float, float]]
-    """Of each free quantity, before and after, SI."""
+    """Each free quantity before and after, SI."""
     constraints: tuple[Constraint, ...]
     """Each with value, limit and whether it is active."""
     unmet: tuple[str, ...]
-    """Which cannot be met, in a line each; empty where the design is feasible."""
+    """A line for each constraint that cannot be met; empty if the design is feasible."""
 
     @property
     def feasible(self) -> bool:
@@ -100,44 +101,44 @@ def synthesise(
     free: tuple[str, ...] = ("K", "L_6", "h", "G_a", "K_d"),
     bounds: Mapping[str, tuple[float, float]] | None = None,
 ) -> Synthesis:
-    """Find the neck nearest to a given one that does what is wished.
+    """Return the neck nearest to a given one that meets a wish.
 
     Parameters
     ----------
     wish : Wish
         Response and range.
     neck : NeckParameters
-        Where to start; what is not free stays as it is.
+        The neck to change; quantities that are not free keep their values.
     free : tuple of str
         Names in `BOUNDS`.
     bounds : mapping, optional
-        In place of those in `BOUNDS`, SI.
+        Replace those in `BOUNDS`, SI.
 
     Returns
     -------
     Synthesis
-        Where the wish cannot be granted the nearest miss, which says what stands against it.
+        If the wish cannot be met, the design with the smallest violation, and the constraints that cannot be met.
 
     Raises
     ------
     ValueError
-        For a name that cannot be free, an empty choice or bounds that are none.
+        For a name that cannot be free, an empty choice or invalid bounds.
     """
     limits = {name: _limits(name, bounds) for name in free}
     if not limits:
         raise ValueError("nothing is free to change")
     start = {name: 0.0 if name == _DAMPING_GAIN else PARAMETERS[name].read(neck) for name in free}
-    # Logarithms of what is positive, so that a change by a factor costs the same up and down; K_d begins at 0.
-    lower, upper = (np.array([_inward(name, limits[name][i]) for name in free]) for i in (0, 1))
-    origin = np.array([_inward(name, start[name]) for name in free])
+    # Logarithms of the positive quantities, so that a change by a factor costs the same up and down; K_d starts at 0.
+    lower, upper = (np.array([_to_variable(name, limits[name][i]) for name in free]) for i in (0, 1))
+    origin = np.array([_to_variable(name, start[name]) for name in free])
 
     def candidate(x: Floats) -> tuple[NeckParameters, PdGains]:
         made, derivative = neck, 0.0
-        for name, inside in zip(free, x, strict=True):
+        for name, variable in zip(free, x, strict=True):
             if name == _DAMPING_GAIN:
-                derivative = float(inside) * _TYPICAL_K_D
-            elif inside != origin[free.index(name)]:
-                made = PARAMETERS[name].changed(made, math.exp(inside))
+                derivative = float(variable) * _TYPICAL_K_D
+            elif variable != origin[free.index(name)]:
+                made = PARAMETERS[name].changed(made, math.exp(variable))
         return made, PdGains(0.0, derivative)
 
     def evaluate(x: Floats) -> tuple[float, tuple[Constraint, ...]]:
@@ -160,22 +161,23 @@ def synthesise(
 
 
 def design_constraints(wish: Wish, neck: NeckParameters, gains: PdGains) -> tuple[Constraint, ...]:
-    """Hold a neck against a wish.
+    """Return the constraints of a wish, with the values of a neck.
 
     Parameters
     ----------
     wish : Wish
-        What it is to do.
+        Wanted response and range.
     neck : NeckParameters
-        Whose links close at neutral.
+        Its links close at neutral.
     gains : PdGains
-        Of its controller.
+        Gains of its controller.
 
     Returns
     -------
     tuple of Constraint
-        Always the same ones in the same order: rise (two), overshoot, stability, upright without servo, pretension,
-        range (two), servo travel, transmission angle, voltage and torque, whose limit is infinite if not asked for.
+        Always the same constraints in the same order: rise time (two), overshoot, stability, upright without servo,
+        pretension, range (two), servo travel, transmission angle, voltage and torque, whose limit is infinite if it is
+        not required.
     """
     linear, passive = linear_neck(neck), passive_stiffness(neck)
     figures = _figures(linear, gains)
@@ -196,14 +198,14 @@ def design_constraints(wish: Wish, neck: NeckParameters, gains: PdGains) -> tupl
         Constraint("transmission angle", "rad", min(mu, math.pi - mu), wish.transmission_angle, True, 0.1),
         Constraint("voltage at the end", "V", linear.b / linear.c * farthest, wish.largest_voltage, False, 1.0),
     )
-    # without a wish the row stands for information: a limit of infinity is always met
+    # without a wish for it the torque is only reported: an infinite limit is always met
     torque, most = abs(neck.gamma) * passive * farthest, math.inf if wish.stall_torque is None else wish.stall_torque
     scale = 1.0 if wish.stall_torque is None else wish.stall_torque
     return (*rows, Constraint("servo torque at the end (shaft)", "N·m", torque, most, False, scale))
 
 
 def _figures(linear: LinearNeck, gains: PdGains) -> StepFigures:
-    """Figures of Eq. (30) with −K_p·θ − K_d·θ̇ in its input."""
+    """Return the step figures of Eq. (30) with −K_p·θ − K_d·θ̇ added to the input."""
     damping = linear.a + linear.c * gains.derivative
     return linear_step_figures([linear.c], [1.0, damping, linear.b + linear.c * gains.proportional])
 
@@ -217,6 +219,6 @@ def _limits(name: str, bounds: Mapping[str, tuple[float, float]] | None) -> tupl
     return low, high
 
 
-def _inward(name: str, value: float) -> float:
-    """Return what the optimiser moves."""
+def _to_variable(name: str, value: float) -> float:
+    """Return the optimiser's variable for a quantity."""
     return value / _TYPICAL_K_D if name == _DAMPING_GAIN else math.log(value)

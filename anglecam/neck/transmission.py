@@ -1,13 +1,12 @@
-"""How the four-bar passes motion on: its slope and Eq. (3), its limits, and how well its coupler pulls.
+"""Transmission of the four-bar: its slope and Eq. (3), its limits, and its transmission angle.
 
 The rate of the rocker follows from |CD|² = L3², which holds along the motion. With e = C − D and C', D' the derivatives
-of C and D by the angle of their own link,
+of C and D by the angle of the link that each is on,
 
     γ  = dθ_f/dθ_s   = e·C' / e·D'
     dγ/dθ_s          = (|C' − γD'|² − e·AC + γ²·e·BD) / e·D'
 
-which is exact on every branch. Eq. (3), Δθ_s = γ·Δθ_f, is printed the wrong way round: −0.36 is dθ_f/dθ_s, the slope
-of Fig. 4.
+which is exact on every branch. Eq. (3), Δθ_s = γ·Δθ_f, is printed inverted: −0.36 is dθ_f/dθ_s, the slope of Fig. 4.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from numpy.typing import ArrayLike
 from anglecam.data.typing import Floats
 from anglecam.neck.fourbar import Branch, FourBar, crank_reach, head_angle, reach, servo_angle
 
-Kind = Literal["crank-rocker", "rocker-crank", "double-crank", "double-rocker", "triple-rocker", "change-point"]
+GrashofClass = Literal["crank-rocker", "rocker-crank", "double-crank", "double-rocker", "triple-rocker", "change-point"]
 
 
 @dataclass(frozen=True)
@@ -37,16 +36,16 @@ class StraightLine:
 
 
 @dataclass(frozen=True)
-class Limits:
-    """Between which angles the links move with the rocker open and the crank on one branch."""
+class LinkageLimits:
+    """Ranges of rocker and crank with the rocker open and the crank on one branch."""
 
-    kind: Kind
+    kind: GrashofClass
     """Grashof's class, crank first."""
     rocker: tuple[float, float]
-    """Lowest and highest θ_f, rad. With the rocker crossed the same with the sign turned, and θ_s likewise."""
+    """Lowest and highest θ_f, rad. With the rocker crossed θ_f and θ_s have the opposite sign."""
     crank: tuple[float, float]
-    """Lowest and highest θ_s, rad. Of a crank-rocker these are its dead centres: there crank and coupler lie in one
-    line, the rocker turns back, and the crank goes on to its other branch."""
+    """Lowest and highest θ_s, rad. For a crank-rocker these are the dead centres, where crank and coupler lie in one
+    line, the rocker turns back, and the crank continues on its other branch."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +55,11 @@ class TransmissionAngle:
     theta_s: float
     """rad."""
     mu: float
-    """rad, from 0 to π; at π/2 the coupler's whole force turns the rocker."""
+    """rad, from 0 to π; at π/2 the whole force of the coupler turns the rocker."""
 
 
 def slope(linkage: FourBar, theta_s: ArrayLike, branch: Branch = "open") -> Floats:
-    """Rate of the rocker per rate of the crank, γ = dθ_f/dθ_s, exact.
+    """Return the slope of rocker over crank, γ = dθ_f/dθ_s, exact.
 
     Parameters
     ----------
@@ -69,12 +68,12 @@ def slope(linkage: FourBar, theta_s: ArrayLike, branch: Branch = "open") -> Floa
     theta_s : array_like
         Crank angle, rad.
     branch : {"open", "crossed"}
-        Of the rocker, as in `head_angle`.
+        Branch of the rocker, as in `head_angle`.
 
     Returns
     -------
     ndarray
-        γ, without unit: 0 at a dead centre of the crank, without bound where coupler and rocker lie in one line.
+        γ, without unit: 0 at a dead centre of the crank, unbounded where coupler and rocker lie in one line.
 
     Raises
     ------
@@ -85,7 +84,7 @@ def slope(linkage: FourBar, theta_s: ArrayLike, branch: Branch = "open") -> Floa
 
 
 def bend(linkage: FourBar, theta_s: ArrayLike, branch: Branch = "open") -> Floats:
-    """Change of the slope along the motion, dγ/dθ_s, exact.
+    """Return the change of the slope along the motion, dγ/dθ_s, exact.
 
     Parameters
     ----------
@@ -106,7 +105,7 @@ def bend(linkage: FourBar, theta_s: ArrayLike, branch: Branch = "open") -> Float
 
 
 def straight_line(linkage: FourBar, low: float, high: float) -> StraightLine:
-    """Fit the straight line of Fig. 4 and Eq. (3) to θ_f(θ_s), every tenth of a degree.
+    """Fit the straight line of Fig. 4 and Eq. (3) to θ_f(θ_s), sampled at every tenth of a degree.
 
     Parameters
     ----------
@@ -128,12 +127,12 @@ def straight_line(linkage: FourBar, low: float, high: float) -> StraightLine:
     servo = np.linspace(low, high, 1 + round(math.degrees(high - low) / 0.1))
     head = head_angle(linkage, servo)
     gamma, intercept = np.polyfit(servo, head, 1)
-    left = head - (gamma * servo + intercept)
-    return StraightLine(float(gamma), float(intercept), float(1 - left.var() / head.var()))
+    residuals = head - (gamma * servo + intercept)
+    return StraightLine(float(gamma), float(intercept), float(1 - residuals.var() / head.var()))
 
 
-def grashof(linkage: FourBar) -> Kind:
-    """Class of the linkage after Grashof: which links can turn fully.
+def grashof(linkage: FourBar) -> GrashofClass:
+    """Return the Grashof class of the linkage: which links can turn fully.
 
     Parameters
     ----------
@@ -143,7 +142,7 @@ def grashof(linkage: FourBar) -> Kind:
     Returns
     -------
     str
-        The crank's part first: in a "crank-rocker" the crank turns fully and the rocker swings. A "change-point"
+        The crank is named first: in a "crank-rocker" the crank turns fully and the rocker swings. A "change-point"
         linkage can fold flat, where its branches meet.
     """
     links = asdict(linkage)
@@ -153,7 +152,7 @@ def grashof(linkage: FourBar) -> Kind:
         return "change-point"
     if outer > inner:
         return "triple-rocker"
-    kinds: dict[str, Kind] = {
+    kinds: dict[str, GrashofClass] = {
         "crank": "crank-rocker",
         "rocker": "rocker-crank",
         "ground": "double-crank",
@@ -162,19 +161,19 @@ def grashof(linkage: FourBar) -> Kind:
     return kinds[shortest]
 
 
-def limits(linkage: FourBar, branch: Branch = "open") -> Limits:
-    """Work out how far crank and rocker move between their toggle positions, with the rocker open.
+def limits(linkage: FourBar, branch: Branch = "open") -> LinkageLimits:
+    """Return the ranges of crank and rocker between their toggle positions, with the rocker open.
 
     Parameters
     ----------
     linkage : FourBar
         Link lengths, m.
     branch : {"open", "crossed"}
-        Of the crank, as in `servo_angle`.
+        Branch of the crank, as in `servo_angle`.
 
     Returns
     -------
-    Limits
+    LinkageLimits
         Class, range of the rocker and range of the crank.
 
     Raises
@@ -183,17 +182,17 @@ def limits(linkage: FourBar, branch: Branch = "open") -> Limits:
         If the links close at no angle.
     """
     low, high = reach(linkage)
-    # Where coupler and rocker lie in one line the crank turns back, which may happen within the rocker's range.
+    # where coupler and rocker lie in one line the crank turns back, which may happen within the range of the rocker
     ends = np.array(crank_reach(linkage))
     turns = head_angle(linkage, np.concatenate([ends, -ends]))
     turns = np.arctan2(np.sin(turns), np.cos(turns))
     rocker = np.concatenate([[low, high], turns[(turns > low) & (turns < high)]])
     crank = servo_angle(linkage, rocker, branch)
-    return Limits(grashof(linkage), (low, high), (float(crank.min()), float(crank.max())))
+    return LinkageLimits(grashof(linkage), (low, high), (float(crank.min()), float(crank.max())))
 
 
 def transmission_angle(linkage: FourBar, theta_s: ArrayLike) -> Floats:
-    """Angle between coupler and rocker at D, the same on both branches.
+    """Return the angle between coupler and rocker at D, which is equal on both branches.
 
     Parameters
     ----------
@@ -219,7 +218,7 @@ def transmission_angle(linkage: FourBar, theta_s: ArrayLike) -> Floats:
 
 
 def worst_transmission_angle(linkage: FourBar, low: float, high: float) -> TransmissionAngle:
-    """Find where in a range of the crank the transmission angle is farthest from a right angle.
+    """Return where in a range of the crank the transmission angle is farthest from a right angle.
 
     μ grows with BC, and BC with the crank's angle from the line A→B, so only the ends of the range and the crossings of
     that line can be the worst.
@@ -234,7 +233,7 @@ def worst_transmission_angle(linkage: FourBar, low: float, high: float) -> Trans
     Returns
     -------
     TransmissionAngle
-        Where, and μ there.
+        θ_s, and μ there.
 
     Raises
     ------
@@ -251,7 +250,7 @@ def worst_transmission_angle(linkage: FourBar, low: float, high: float) -> Trans
 
 
 def _rates(linkage: FourBar, theta_s: ArrayLike, branch: Branch) -> tuple[Floats, Floats]:
-    """γ and dγ/dθ_s."""
+    """Return γ and dγ/dθ_s."""
     servo = np.asarray(theta_s, dtype=float)
     e, C, D = _coupler(linkage, servo, head_angle(linkage, servo, branch))
     # the rocker's angle runs clockwise, the crank's counter-clockwise
@@ -264,7 +263,7 @@ def _rates(linkage: FourBar, theta_s: ArrayLike, branch: Branch) -> tuple[Floats
 
 
 def _coupler(linkage: FourBar, servo: Floats, rocker: Floats) -> tuple[Floats, Floats, Floats]:
-    """D→C, A→C and B→D, components first, m."""
+    """Return D→C, A→C and B→D, components first, m."""
     C = linkage.crank * np.stack([np.cos(servo), np.sin(servo)])
     D = linkage.rocker * np.stack([-np.cos(rocker), np.sin(rocker)])
     ground = np.zeros_like(C)

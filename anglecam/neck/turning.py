@@ -1,18 +1,18 @@
-"""Turning of the head: the RPRR mechanism of Fig. 2 (a), (c) and (d), and the thrust bearing it turns on, Eq. (4).
+"""Turning of the head: the RPRR mechanism of Fig. 2 (a), (c) and (d), and its thrust bearing, Eq. (4).
 
-The servo's crank turns about A (R), its pin C turns in a block (R) that slides along a slot (P) in the head's plate,
-and the plate turns on the thrust bearing O (R): an inverted slider-crank, also called a crank and slotted lever. With s
-the servo's angle from neutral, φ the slot's direction, both from the line O→A drawn on past A, and the slot's centre
-line passing O at the distance e,
+The crank of the servo turns about A (R), its pin C turns in a block (R) that slides along a slot (P) in the head's
+plate, and the plate turns on the thrust bearing O (R). This is an inverted slider-crank, also called a crank and
+slotted lever. Let s be the servo angle from neutral and φ the direction of the slot, both from the line O→A extended
+beyond A, and let the centre line of the slot pass O at the distance e. Then
 
     r·sin(s − φ) = e + d·sin φ        d = OA, r = AC
 
-which is what closure leaves once the sliding is taken out. Its derivative is the slope dφ/ds = r·cos(s − φ)/x, where x
+which is the closure with the sliding distance eliminated. Its derivative is the slope dφ/ds = r·cos(s − φ)/x, where x
 is the distance of the block along the slot from the foot of O.
 
-The paper wants ±60° and prints no dimension. The defaults take its 25 mm servo horn for the crank and put the bearing
-14 mm from the servo, inside the crank's circle: there the mechanism has no dead centre, its slope stays within
-0.64-0.76, and the ±90° of a servo's arm (Fig. 13) turn the head by ±60.8°.
+The paper requires ±60° and prints no dimension. The defaults use its 25 mm servo horn as the crank and put the bearing
+14 mm from the servo, inside the circle of the crank. There the mechanism has no dead centre, its slope stays within
+0.64-0.76, and ±90° of the servo arm (Fig. 13) turn the head by ±60.8°.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ KGF_CM = 9.80665e-2
 
 @dataclass(frozen=True)
 class TurningMechanism:
-    """Crank and slotted plate; the paper prints none of these lengths, so the defaults are a choice."""
+    """Crank and slotted plate; the paper prints none of these lengths, so the defaults are chosen here."""
 
     crank: float = 0.025
     """r, from the servo's axis A to the pin C, m: the paper's servo horn."""
     distance: float = 0.014
     """d, from the bearing O to the servo's axis A, m."""
     offset: float = 0.0
-    """e, of the slot's centre line from O, m; positive makes φ negative at neutral."""
+    """e, of the centre line of the slot from O, m; a positive one makes φ negative at neutral."""
     travel: float = math.radians(90.0)
     """The servo's largest angle to either side of neutral, rad."""
 
 
 def turning_angle(mechanism: TurningMechanism, servo: ArrayLike) -> Floats:
-    """Angle of the head for an angle of the servo.
+    """Return the head angle for a servo angle.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def turning_angle(mechanism: TurningMechanism, servo: ArrayLike) -> Floats:
     Returns
     -------
     ndarray
-        φ, rad, continuous in the servo's angle from −π to π.
+        φ, rad, continuous in the servo angle from −π to π.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def turning_angle(mechanism: TurningMechanism, servo: ArrayLike) -> Floats:
 
 
 def slider(mechanism: TurningMechanism, servo: ArrayLike) -> Floats:
-    """Place of the block in the slot, from the foot of the bearing's axis; its range is the slot's least length.
+    """Return the position of the block in the slot, from the foot of O; its range is the least length of the slot.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def slider(mechanism: TurningMechanism, servo: ArrayLike) -> Floats:
 
 
 def turning_servo_angle(mechanism: TurningMechanism, phi: ArrayLike) -> Floats:
-    """Angle of the servo for an angle of the head, between the dead centres about neutral.
+    """Return the servo angle for a head angle, between the dead centres around neutral.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def turning_servo_angle(mechanism: TurningMechanism, phi: ArrayLike) -> Floats:
 
 
 def turning_slope(mechanism: TurningMechanism, servo: ArrayLike) -> Floats:
-    """Rate of the head per rate of the servo, dφ/ds.
+    """Return the slope of head over servo, dφ/ds.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def turning_slope(mechanism: TurningMechanism, servo: ArrayLike) -> Floats:
     Returns
     -------
     ndarray
-        Without unit: 0 at a dead centre, where crank and slot are square to each other.
+        Without unit: 0 at a dead centre, where crank and slot are perpendicular.
 
     Raises
     ------
@@ -152,12 +152,12 @@ def turning_slope(mechanism: TurningMechanism, servo: ArrayLike) -> Floats:
         If the pin is nearer to the bearing than the slot at one of the angles.
     """
     crank = np.asarray(servo, dtype=float)
-    lean = np.cos(crank - turning_angle(mechanism, crank))
-    return np.asarray(mechanism.crank * lean / slider(mechanism, crank))
+    cosine = np.cos(crank - turning_angle(mechanism, crank))
+    return np.asarray(mechanism.crank * cosine / slider(mechanism, crank))
 
 
 def turning_range(mechanism: TurningMechanism) -> tuple[float, float]:
-    """Lowest and highest angle of the head: at the end of the servo's travel or at a dead centre, what comes first.
+    """Return the lowest and highest head angle: at the end of the servo travel or at a dead centre, whichever is first.
 
     Parameters
     ----------
@@ -186,14 +186,14 @@ def turning_range(mechanism: TurningMechanism) -> tuple[float, float]:
 
 
 def bearing_torque(load: float, friction: float, bore: float) -> float:
-    """Friction torque of a rolling bearing by its bore, Eq. (4): F·f·d/2.
+    """Return the friction torque of a rolling bearing by its bore, Eq. (4): F·f·d/2.
 
     Parameters
     ----------
     load : float
         F, axial or radial, N.
     friction : float
-        f, coefficient of friction that belongs to the bore; the paper's thrust bearing 0.001.
+        f, coefficient of friction relative to the bore; 0.001 for the paper's thrust bearing.
     bore : float
         d, diameter of the shaft, m.
 
@@ -206,14 +206,14 @@ def bearing_torque(load: float, friction: float, bore: float) -> float:
 
 
 def bearing_torque_mean(load: float, friction: float, bore: float, outside: float) -> float:
-    """Friction torque of a rolling bearing by its mean diameter, Eq. (4): F·f_m·D_m/2 with D_m = (d + D)/2.
+    """Return the friction torque of a rolling bearing by its mean diameter, Eq. (4): F·f_m·D_m/2 with D_m = (d + D)/2.
 
     Parameters
     ----------
     load : float
         F, axial or radial, N.
     friction : float
-        f_m, coefficient of friction that belongs to the mean diameter.
+        f_m, coefficient of friction relative to the mean diameter.
     bore, outside : float
         d and D, m.
 
@@ -226,14 +226,14 @@ def bearing_torque_mean(load: float, friction: float, bore: float, outside: floa
 
 
 def turning_start_torque(running: float, start: float = 2.0, load: float = 3.0) -> float:
-    """Torque that sets the bearing going.
+    """Return the starting torque of the bearing.
 
     Parameters
     ----------
     running : float
-        Friction torque once it turns, N·m.
+        Friction torque while turning, N·m.
     start : float
-        Starting over running friction; the paper has it "two-fold".
+        Ratio of starting to running friction; "two-fold" in the paper.
     load : float
         Load factor. The paper prints none; its 0.00876 kg·cm from 0.00146 kg·cm needs 3.
 
@@ -246,7 +246,7 @@ def turning_start_torque(running: float, start: float = 2.0, load: float = 3.0) 
 
 
 def _pin(mechanism: TurningMechanism, servo: Floats) -> tuple[Floats, Floats]:
-    """C from O, x along the line O→A, m."""
+    """Return C from O, with x along the line O→A, m."""
     return (
         np.asarray(mechanism.distance + mechanism.crank * np.cos(servo)),
         np.asarray(mechanism.crank * np.sin(servo)),

@@ -1,9 +1,9 @@
-"""The neck with one of its quantities changed, by the paper's symbol.
+"""Change one quantity of a neck, named by the paper's symbol.
 
-L6 is two things in the paper, the rocker of the four-bar and the arm of the spring, and neither changes alone: "as L6
-changes, L3 also changes and therefore the geometric parameter γ is changed accordingly". Here the chain closes at
-neutral, θ_s = 135°, with the head where the given linkage holds it, so the coupler is what then lies between the
-joints C and D; and γ is the slope of the line fitted over the nod, as in Fig. 4.
+In the paper L6 is both the rocker of the four-bar and the arm of the spring, and other quantities follow it: "as L6
+changes, L3 also changes and therefore the geometric parameter γ is changed accordingly". Here the chain still closes at
+neutral, θ_s = 135°, at the head angle of the given linkage, so the coupler is the distance between the joints C and D
+there; γ is the slope of the line fitted over the nod, as in Fig. 4.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from anglecam.neck.parameters import NeckParameters
 from anglecam.neck.transmission import straight_line
 
 NOD = math.radians(25.0)
-"""Of the head to either side of neutral, Table 3."""
+"""Nod to either side of neutral, Table 3, rad."""
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """One quantity that a neck is made of."""
+class NeckQuantity:
+    """One quantity of a neck."""
 
     symbol: str
-    """The paper's."""
+    """The paper's symbol."""
     name: str
     unit: str
     read: Callable[[NeckParameters], float]
     changed: Callable[[NeckParameters, float], NeckParameters]
-    """A neck with another value of it, SI, and all that follows from it."""
+    """Return a neck with another value, SI, and with every quantity that follows from it."""
 
 
 def neutral_head(linkage: FourBar) -> float:
@@ -46,20 +46,20 @@ def relinked(neck: NeckParameters, rocker: float) -> NeckParameters:
     Parameters
     ----------
     neck : NeckParameters
-        What L6 is changed in.
+        The neck to change.
     rocker : float
         L6, m.
 
     Returns
     -------
     NeckParameters
-        With a chain that closes at neutral. γ is the fitted one even where L6 stays as it was: of the paper's links
-        −0.3604, where it prints −0.36.
+        With a chain that closes at neutral. γ is fitted even if L6 is unchanged: −0.3604 for the paper's links, where
+        the paper prints −0.36.
 
     Raises
     ------
     ValueError
-        If the chain closes at neutral alone.
+        If the chain closes only at neutral.
     """
     old = neck.linkage
     linkage = replace(old, rocker=rocker, coupler=closing_coupler(old, rocker))
@@ -75,7 +75,7 @@ def closing_coupler(linkage: FourBar, rocker: float) -> float:
 
 
 def nod_slope(linkage: FourBar, nod: float = NOD) -> float:
-    """Fit γ over a nod to either side of neutral, as far as the links reach.
+    """Return γ fitted over a nod to either side of neutral, as far as the links reach.
 
     Parameters
     ----------
@@ -92,21 +92,21 @@ def nod_slope(linkage: FourBar, nod: float = NOD) -> float:
     Raises
     ------
     ValueError
-        If the links close nowhere.
+        If the links close at no angle.
     """
     return straight_line(linkage, *nod_range(linkage, nod)).slope
 
 
 def nod_range(linkage: FourBar, nod: float = NOD) -> tuple[float, float]:
-    """Return the θ_s between which a nod to either side of neutral, rad, lies as far as the links reach, rad."""
+    """Return the range of θ_s for a nod to either side of neutral, as far as the links reach; all in rad."""
     low, high = reach(linkage)
     middle = neutral_head(linkage)
     ends = servo_angle(linkage, np.clip([middle + nod, middle - nod], low, high))
     return float(ends.min()), float(ends.max())
 
 
-def _of(part: str, attribute: str, symbol: str, name: str, unit: str) -> Parameter:
-    """Describe an attribute of one of the neck's parts."""
+def _of(part: str, attribute: str, symbol: str, name: str, unit: str) -> NeckQuantity:
+    """Return the quantity that is an attribute of a part of the neck."""
 
     def read(neck: NeckParameters) -> float:
         return float(getattr(getattr(neck, part), attribute))
@@ -114,10 +114,10 @@ def _of(part: str, attribute: str, symbol: str, name: str, unit: str) -> Paramet
     def changed(neck: NeckParameters, value: float) -> NeckParameters:
         return replace(neck, **{part: replace(getattr(neck, part), **{attribute: value})})
 
-    return Parameter(symbol, name, unit, read, changed)
+    return NeckQuantity(symbol, name, unit, read, changed)
 
 
-PARAMETERS: dict[str, Parameter] = {
+PARAMETERS: dict[str, NeckQuantity] = {
     p.symbol: p
     for p in (
         _of("servo", "sensor_gain", "h", "sensor gain", "V/rad"),
@@ -132,9 +132,9 @@ PARAMETERS: dict[str, Parameter] = {
         _of("head", "neutral", "theta_0", "neutral angle", "rad"),
         _of("spring", "rate", "K", "spring rate", "N/m"),
         _of("spring", "base", "L_2", "base of the spring", "m"),
-        Parameter("L_6", "link length", "m", lambda neck: neck.linkage.rocker, relinked),
-        Parameter("C", "damping", "N·m·s", lambda neck: neck.damping, lambda neck, v: replace(neck, damping=v)),
-        Parameter("gamma", "linkage slope", "1", lambda neck: neck.gamma, lambda neck, v: replace(neck, gamma=v)),
+        NeckQuantity("L_6", "link length", "m", lambda neck: neck.linkage.rocker, relinked),
+        NeckQuantity("C", "damping", "N·m·s", lambda neck: neck.damping, lambda neck, v: replace(neck, damping=v)),
+        NeckQuantity("gamma", "linkage slope", "1", lambda neck: neck.gamma, lambda neck, v: replace(neck, gamma=v)),
     )
 }
-"""By symbol."""
+"""The quantities by symbol."""

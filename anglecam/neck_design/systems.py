@@ -1,11 +1,12 @@
 """The paper's models side by side, as in Figs. 10, 11, 14 and 15: SYS1, SYS2, Eqs. (28) and (31), and fitted ones.
 
-Command and angle are both of the head. Eqs. (28) and (31) take the command through C_i of Eq. (29). SYS2's input has no
-unit: a step of height 1 is the one step that the paper commanded, after which the head rested at 22°, so that here its
-command of 22° is taken for 1 and the model comes to rest at 23.58°.
+Command and angle are both angles of the head. In Eqs. (28) and (31) the command enters through C_i of Eq. (29). The
+input of SYS2 has no unit: a step of height 1 is the step that the paper commanded, after which the head rested at 22°.
+Here a command of 22° stands for 1, and the model comes to rest at 23.58°.
 
-The paper prints neither its measured curves nor the levels of the step series of Figs. 11 and 15; those of `SERIES` are
-ours: several heights, each from where the one before it ended, within what its links reach.
+The paper prints neither its measured curves nor the levels of the step series of Figs. 11 and 15. The levels of
+`SERIES` are chosen here: several heights within the reach of the links, each step starting where the previous one
+ended.
 """
 
 from __future__ import annotations
@@ -34,65 +35,65 @@ from anglecam.neck.pd import PdGains, simulate_pd, sys2
 from anglecam.neck.step import linear_step_figures
 
 SYS1 = (25.9786, 523.7292, 507.5597)
-"""a (1/s), b (1/s²) and c (1/s²) that the paper identified."""
+"""a (1/s), b (1/s²) and c (1/s²) identified by the paper."""
 STEP = np.radians(22.0)
 """The step of Figs. 10 and 14, rad."""
 SERIES = Command(
     np.array([0.0, 0.5, *(0.5 + 1.5 * np.arange(1, 9))]),
     np.radians([0.0, 22.0, 0.0, 12.0, -8.0, 18.0, 5.0, -15.0, 10.0, 0.0]),
 )
-"""A command in the manner of Figs. 11 and 15."""
+"""A command similar to those of Figs. 11 and 15."""
 _TIME_CONSTANTS = 14.0
-"""For which a neck at large angles is simulated until it rests."""
+"""Time constants for which a neck at large angles is simulated until it rests."""
 
 
 @dataclass(frozen=True)
-class System:
+class ComparedModel:
     """A model of the neck from command to angle."""
 
     name: str
     equation: str
-    """Where it stands in the paper, or what fitted it."""
+    """Its equation in the paper, or the estimator that fitted it."""
     model: Model
     parameters: Floats
     """(p,) SI, in the order of ``model.names``."""
     transfer: tuple[Floats, Floats] | None
-    """Numerator and denominator; ``None`` where it is not linear."""
+    """Numerator and denominator; ``None`` for a model that is not linear."""
 
     def run(self, time: Floats, command: Command) -> Floats:
-        """Run it from rest at neutral.
+        """Simulate the model from rest at neutral.
 
         Parameters
         ----------
         time : (n,) ndarray
-            Instants, s, not before the command begins.
+            Instants, s, from the beginning of the command.
         command : Command
-            Of the head, rad.
+            Commanded head angle, rad.
 
         Returns
         -------
         (n,) ndarray
-            Angle, rad; NaN from where the head leaves what it can reach.
+            Angle, rad; NaN once the head leaves the reach of its linkage.
         """
         return self.model.predict(self.parameters, time, command, np.zeros(self.model.states))
 
     def figures(self, height: float = STEP) -> StepFigures:
-        """Return rise, overshoot, settling and, per command, steady state of a step of a height, rad.
+        """Return rise, overshoot, settling and the steady state per command for a step of a height, rad.
 
-        All NaN where it does not come to rest.
+        All are NaN if the model does not come to rest.
         """
         if self.transfer is not None:
             return linear_step_figures(*self.transfer)
         assert isinstance(self.model, LargeAngle)
         try:
-            told = _large_angle_figures(self.model.neck_at(self.parameters), height)
-        except ValueError:  # nothing balances there, or the head leaves its links
+            figures = _large_angle_figures(self.model.neck_at(self.parameters), height)
+        except ValueError:  # there is no equilibrium, or the head leaves the reach of its linkage
             return NO_STEP
-        return replace(told, steady_state=float(told.steady_state) / height)
+        return replace(figures, steady_state=float(figures.steady_state) / height)
 
 
 def _large_angle_figures(neck: LargeAngleNeck, height: float) -> StepFigures:
-    """Simulate a step until it rests; steady state in rad. Raises `ValueError` where it cannot rest."""
+    """Return the figures of a simulated step, steady state in rad; raise `ValueError` if it cannot come to rest."""
     voltage = neck.parameters.servo.command_gain * height
     near = linearise(neck, equilibrium(neck, voltage))
     slowest = -float(np.roots([1.0, near.a, near.b]).real.max())
@@ -115,7 +116,7 @@ class SideBySide:
     """s."""
     command: Command
     """rad."""
-    systems: tuple[System, ...]
+    systems: tuple[ComparedModel, ...]
     angles: tuple[Floats, ...]
     """Of each system, rad."""
     measured: Floats | None
@@ -124,7 +125,7 @@ class SideBySide:
     """Of measured minus each system's angle, rad, by its name; empty without a measurement."""
 
 
-def paper_systems(neck: LargeAngleNeck) -> tuple[System, ...]:
+def paper_systems(neck: LargeAngleNeck) -> tuple[ComparedModel, ...]:
     """Return SYS1, the neck by Eq. (28), SYS2 and the neck by Eq. (31).
 
     Parameters
@@ -134,7 +135,7 @@ def paper_systems(neck: LargeAngleNeck) -> tuple[System, ...]:
 
     Returns
     -------
-    tuple of System
+    tuple of ComparedModel
         In that order.
     """
     linear = linear_neck(neck.parameters)
@@ -144,47 +145,48 @@ def paper_systems(neck: LargeAngleNeck) -> tuple[System, ...]:
     return (
         second_order("SYS1", "Eq. (30), identified", SYS1),
         second_order("small angles", "Eq. (28)", (linear.a, linear.b, gain)),
-        System("SYS2", "Eq. (36)", ThirdOrder(), np.concatenate([below[1:], above]), (above, below)),
-        System("large angles", "Eq. (31)", LargeAngle(neck, free=()), np.empty(0), None),
+        ComparedModel("SYS2", "Eq. (36)", ThirdOrder(), np.concatenate([below[1:], above]), (above, below)),
+        ComparedModel("large angles", "Eq. (31)", LargeAngle(neck, free=()), np.empty(0), None),
     )
 
 
-def second_order(name: str, equation: str, abc: Sequence[float]) -> System:
-    """Return a system of Eq. (30) from a (1/s), b (1/s²) and c (1/s²)."""
+def second_order(name: str, equation: str, abc: Sequence[float]) -> ComparedModel:
+    """Return the model of Eq. (30) with a (1/s), b (1/s²) and c (1/s²)."""
     a, b, c = abc
-    return System(name, equation, Plant(), np.array([a, b, c]), (np.array([c]), np.array([1.0, a, b])))
+    return ComparedModel(name, equation, Plant(), np.array([a, b, c]), (np.array([c]), np.array([1.0, a, b])))
 
 
-def fitted_system(model: FittedModel) -> System:
-    """Return the system of a model that ``anglecam identify`` has fitted.
+def fitted_system(model: FittedModel) -> ComparedModel:
+    """Return a model that ``anglecam identify`` has fitted.
 
     Raises
     ------
     ValueError
-        Where nothing was commanded, so that nothing is known of the input.
+        If the model was fitted to free swings: it then has no input.
     """
     if not len(model.numerator):
         raise ValueError("the model was fitted to free swings: it has no input to step")
     kind: Model = Plant() if len(model.denominator) == 3 else ThirdOrder()
     parameters = np.concatenate([model.denominator[1:], model.numerator])
-    return System("fitted", model.name, kind, parameters, (model.numerator, model.denominator))
+    return ComparedModel("fitted", model.name, kind, parameters, (model.numerator, model.denominator))
 
 
-def side_by_side(systems: Sequence[System], record: Record | None = None) -> SideBySide:
-    """Drive models by `SERIES`, or by the command of a measurement.
+def side_by_side(systems: Sequence[ComparedModel], record: Record | None = None) -> SideBySide:
+    """Simulate models with the command `SERIES`, or with the command of a measurement.
 
     Parameters
     ----------
-    systems : sequence of System
-        To drive; they are held as they are.
+    systems : sequence of ComparedModel
+        To simulate; nothing is fitted.
     record : Record, optional
-        With a command. Nothing is fitted: every model begins at rest at the measured start, and a zero that is not
-        declared is for all of them the one with which the head rests where it is first commanded: a wrong gain shows.
+        With a command. Every model starts at rest at the measured initial angle. A zero of the angle that is not
+        declared is chosen once for all models, such that the head rests at its first command; a wrong gain of a model
+        then shows as an error.
 
     Returns
     -------
     SideBySide
-        Ready to plot.
+        For the figure and the table.
     """
     if record is None or record.command is None:
         time = np.arange(0.0, float(SERIES.time[-1]) + 1.5, 0.005)
@@ -202,8 +204,8 @@ def side_by_side(systems: Sequence[System], record: Record | None = None) -> Sid
     return SideBySide(record.time, record.command, tuple(systems), angles, record.angle, rmse)
 
 
-def _at_rest(system: System, angle: float, command: float) -> Floats:
-    """Return the state of rest at an angle, rad, with a command, rad: of SYS2's form the inner two stand still too."""
+def _at_rest(system: ComparedModel, angle: float, command: float) -> Floats:
+    """Return the state of rest at an angle, rad, with a command, rad; in the form of SYS2 also its two inner states."""
     state = np.zeros(system.model.states)
     state[0] = angle
     if isinstance(system.model, ThirdOrder):
@@ -213,22 +215,22 @@ def _at_rest(system: System, angle: float, command: float) -> Floats:
 
 
 def driven_record(path: Path) -> Record | None:
-    """Read a measured series whose command stands beside it.
+    """Read a measured series and the command file next to it.
 
     Parameters
     ----------
     path : Path
-        ``NAME.angles.csv``, with ``NAME.command.csv`` and ``rig.yaml`` beside it if there are any.
+        ``NAME.angles.csv``, with ``NAME.command.csv`` and ``rig.yaml`` in the same folder if they exist.
 
     Returns
     -------
     Record or None
-        ``None`` where nothing was commanded.
+        ``None`` if nothing was commanded.
 
     Raises
     ------
     AnglecamError
-        Where a file cannot be used.
+        If a file cannot be used.
     """
     command = command_beside(path)
     if command is None or command.first_change() is None:
@@ -237,17 +239,17 @@ def driven_record(path: Path) -> Record | None:
 
 
 def first_step(path: Path) -> tuple[Floats, Floats]:
-    """Read a measured series without a command, from its first response on if it has one.
+    """Read a measured series without a command, from its first response if it has one.
 
     Returns
     -------
     time, angle : (n,) ndarray
-        s from the start of that response, and rad from where it began; of frames that were measured.
+        s from the start of that response, and rad from its initial angle, for the measured frames.
 
     Raises
     ------
     InputError
-        Where the file cannot be used.
+        If the file cannot be used.
     """
     series = read_series(path)
     found = responses(series.time, series.angle, series.sigma)

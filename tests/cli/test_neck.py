@@ -17,8 +17,9 @@ from anglecam.data.series import AngleSeries
 from anglecam.io.files import write_json
 from anglecam.io.neck_file import read_neck
 from anglecam.io.series_csv import write_series
+from anglecam.neck.correlated import UncertainValue
 from anglecam.neck_design.systems import paper_systems, second_order, side_by_side
-from anglecam.neck_design.tables import with_sigma
+from anglecam.neck_design.text import with_sigma
 from support.motion import Plant
 from support.series import session
 
@@ -142,7 +143,7 @@ def test_a_fitted_model_and_a_measurement_stand_beside_them(numbers, run, model_
     assert (tmp_path / "out" / "step.png").exists()
 
 
-def test_a_wrong_gain_shows_beside_a_measurement():
+def test_a_wrong_gain_shows_in_the_rms_error():
     rig, driven = np.arange(0.0, 4.0, 1 / 30), Command(np.array([0.0, 1.0]), np.radians([5.0, 25.0]))
     truth = second_order("truth", "", (26.0, 524.0, 524.0))
     zero = np.radians(7.0)  # of the camera: not declared
@@ -157,9 +158,9 @@ def test_a_wrong_gain_shows_beside_a_measurement():
     np.testing.assert_allclose(runs.angles[0], 0.0, atol=1e-12)
 
 
-def test_an_uncertainty_of_rounding_counts_as_exact():
-    assert with_sigma({"value": 6.0, "sigma": 1e-14}) == "6"
-    assert with_sigma({"value": 6.0, "sigma": 0.01}) == "6.000 ± 0.010"
+def test_an_uncertainty_of_rounding_size_counts_as_exact():
+    assert with_sigma(UncertainValue(6.0, 1e-14)) == "6"
+    assert with_sigma(UncertainValue(6.0, 0.01)) == "6.000 ± 0.010"
 
 
 def test_design_has_the_papers_constants_and_says_what_contradicts(numbers, run):
@@ -311,7 +312,7 @@ def test_a_wrong_neck_file_is_one_line_that_names_it_and_exit_status_2(run, tmp_
     assert "neck.yaml: the four links cannot close" in err
 
 
-def test_a_neck_that_falls_has_no_figures_and_the_models_beside_it_have(numbers, tmp_path):
+def test_only_an_unstable_neck_lacks_step_figures(numbers, tmp_path):
     (tmp_path / "neck.yaml").write_text("servo: {sensor_gain_V_per_rad: 6}\n")
     models = {m["name"]: m for m in numbers("response", "--neck", tmp_path / "neck.yaml")["models"]}
     for name in ("small angles", "large angles"):
@@ -321,7 +322,7 @@ def test_a_neck_that_falls_has_no_figures_and_the_models_beside_it_have(numbers,
         assert "unstable, Eq. (35)" in numbers(verb, "--neck", tmp_path / "neck.yaml")["notes"][0]
 
 
-def test_the_servo_that_is_too_weak_and_saturates_is_told(numbers, run):
+def test_a_weak_and_a_saturated_servo_are_reported(numbers, run):
     told = numbers("statics")
     demand = told["demand"]
     assert demand["torque_at_shaft_N_m"] == pytest.approx(0.36 * 1.814, abs=1e-3)
@@ -335,7 +336,7 @@ def test_the_servo_that_is_too_weak_and_saturates_is_told(numbers, run):
     assert numbers("response", "--step", "5")["notes"] == []
 
 
-def test_gains_name_what_they_are_of(numbers, run, model_file, tmp_path):
+def test_gains_are_printed_with_units_and_meaning(numbers, run, model_file, tmp_path):
     told = numbers("pd")
     assert told["gain_units"] == {"proportional": "1/°", "derivative_s": "s/°"}
     assert "1 stands for a command of 22°, so K_p = 0.01 is 0.22°/°" in told["gains_of"]
@@ -344,7 +345,7 @@ def test_gains_name_what_they_are_of(numbers, run, model_file, tmp_path):
     assert "steady state, °/°" in " ".join(run("pd", "--model", model_file)[1].split())
 
 
-def test_a_model_at_large_angles_responds_as_at_neutral_and_is_no_design(numbers, run, tmp_path):
+def test_a_large_angle_model_responds_as_at_neutral_and_is_refused_by_design(numbers, run, tmp_path):
     parameters = {"damping_nms": {"value": 0.15, "sigma": 0.01}, "torque_gain_nm_per_v": {"value": 2.9, "sigma": 0.1}}
     transfer = {"numerator": [507.5597], "denominator": [1.0, 25.9786, 523.7292]}
     path = tmp_path / "model.json"
@@ -358,7 +359,7 @@ def test_a_model_at_large_angles_responds_as_at_neutral_and_is_no_design(numbers
     assert run("pd", "--model", path)[0] == 0
 
 
-def test_a_command_past_a_dead_centre_and_the_ranges_of_both_lines_are_told(numbers, run, tmp_path):
+def test_a_command_past_a_dead_centre_and_the_range_of_the_fitted_line_are_reported(numbers, run, tmp_path):
     assert numbers("kinematics")["notes"] == []
     (tmp_path / "neck.yaml").write_text("command: {down_deg_per_count: 0.7059}\n")
     (note,) = numbers("kinematics", "--neck", tmp_path / "neck.yaml")["notes"]
@@ -368,7 +369,7 @@ def test_a_command_past_a_dead_centre_and_the_ranges_of_both_lines_are_told(numb
     assert "over a nod of ±25°" in run("kinematics", "--neck", tmp_path / "neck.yaml")[1]
 
 
-def test_json_has_no_dust_of_the_arithmetic(run):
+def test_json_has_no_rounding_errors_of_the_arithmetic(run):
     out = run("statics", "--json")[1]
     assert '"nod_deg": -15.0,' in out
 
@@ -390,7 +391,7 @@ def test_a_wrong_data_file_is_one_line_and_exit_status_1(run, tmp_path):
         assert Path(arguments[-1]).name in err
 
 
-def test_a_third_order_model_is_no_design(run, tmp_path):
+def test_design_refuses_a_third_order_model(run, tmp_path):
     names = ("d2_per_s", "d1_per_s2", "d0_per_s3", "n2_per_s", "n1_per_s2", "n0_per_s3")
     values = (25.5, 311.5, 1969.8, 2.0, 120.0, 2100.0)
     parameters = {n: {"value": v, "sigma": 0.1} for n, v in zip(names, values, strict=True)}

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from anglecam.errors import RigError
-from anglecam.io.neck_file import Bearing, NeckFile, read_neck
+from anglecam.io.neck_file import NeckFile, ThrustBearing, read_neck
 from anglecam.neck.command_table import TABLE_3
-from anglecam.neck.damping import Film
+from anglecam.neck.damping import OilFilm
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.neck.parameters import PAPER
 from anglecam.neck.turning import TurningMechanism
@@ -29,8 +29,8 @@ def test_the_paper_is_what_is_not_declared(tmp_path):
         assert neck.parameters == PAPER
         assert neck.large_angle == LargeAngleNeck()
         assert (neck.scale, neck.turning) == (TABLE_3, TurningMechanism())
-        assert (neck.bearing, neck.film) == (Bearing(), Film())
-        assert neck.beforehand["inertia"].value == 0.0058
+        assert (neck.bearing, neck.film) == (ThrustBearing(), OilFilm())
+        assert neck.known["inertia"].value == 0.0058
         assert neck.example.head.mass == 2.319
         assert neck.example.damping == pytest.approx(0.0530, abs=5e-5)
 
@@ -63,9 +63,9 @@ def test_declared_keys_are_taken_in_their_units(tmp_path):
     assert neck.large_angle.common_stretch == 0.02
     assert neck.large_angle.gamma == "exact"
     assert neck.parameters == neck.example == replace(neck.parameters, damping=0.2)
-    assert neck.beforehand["inertia"].value == pytest.approx(head.inertia)
-    assert neck.beforehand["inertia"].sigma == pytest.approx(0.01 * 0.05**2)
-    weight = neck.beforehand["weight"]
+    assert neck.known["inertia"].value == pytest.approx(head.inertia)
+    assert neck.known["inertia"].sigma == pytest.approx(0.01 * 0.05**2)
+    weight = neck.known["weight"]
     slopes = weight.value / 1.5 * 0.01, weight.value * math.tan(head.neutral) * math.radians(2.0)
     assert weight.sigma == pytest.approx(math.hypot(*slopes))
 

@@ -3,22 +3,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anglecam.neck import (
+from anglecam.neck.command_table import (
     FIGURE_13,
     TABLE_3,
     CommandScale,
-    FourBar,
-    bend,
     command_of_nod,
     command_of_servo,
-    head_angle,
-    limits,
     nod_limits,
     nod_of_command,
     resolution,
     servo_of_command,
     table_3,
 )
+from anglecam.neck.fourbar import FourBar, head_angle
+from anglecam.neck.transmission import bend, limits
 
 PAPER = FourBar()
 ALL = np.arange(255)

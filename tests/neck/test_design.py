@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anglecam.neck.correlated import CorrelatedQuantities, UncertainValue, correlated
 from anglecam.neck.design import (
     by_inertia,
     by_inertia_and_motor,
@@ -14,19 +15,18 @@ from anglecam.neck.design import (
     known,
     sensor_gain_bound,
 )
-from anglecam.neck.joint import Joint, Quantity, joint
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.parameters import PAPER
 from anglecam.neck.step import linear_step_figures
 
 SYS1 = identified(25.9786, 523.7292, 507.5597)
 TABLE_5 = replace(PAPER, head=replace(PAPER.head, mass=2.319), damping=0.0532)
-BEFOREHAND = known(TABLE_5).replaced(inertia=Quantity(0.0058))
+KNOWN = known(TABLE_5).replaced(inertia=UncertainValue(0.0058))
 """Table 5 with the film's damping and the rounded inertia that the example uses."""
 
 
 def test_first_way_gives_the_papers_c3_h_bound_and_negative_c4():
-    found = by_inertia(SYS1, BEFOREHAND)
+    found = by_inertia(SYS1, KNOWN)
     assert found["torque_gain"].value == pytest.approx(2.944, abs=5e-4)
     assert found["sensor_gain"].value == pytest.approx(1.393, abs=5e-4)
     assert found["sensor_gain_bound"].value == pytest.approx(4.259, abs=5e-4)
@@ -35,7 +35,7 @@ def test_first_way_gives_the_papers_c3_h_bound_and_negative_c4():
 
 
 def test_second_way_gives_the_papers_damping_and_spring():
-    found = by_inertia_and_motor(SYS1, BEFOREHAND.replaced(sensor_gain=Quantity(1.39)))
+    found = by_inertia_and_motor(SYS1, KNOWN.replaced(sensor_gain=UncertainValue(1.39)))
     assert found["damping"].value == pytest.approx(0.152, abs=5e-4)
     assert found["back_emf_ratio"].value == pytest.approx(1.07e-3, abs=5e-6)
     assert found["spring"].value == pytest.approx(5.32, abs=5e-3)
@@ -45,7 +45,7 @@ def test_second_way_gives_the_papers_damping_and_spring():
 def test_table_5_has_a_torque_gain_of_2_930_and_so_c_505():
     assert PAPER.servo.torque_gain == pytest.approx(2.930, abs=5e-4)
     assert PAPER.servo.torque_gain / 0.0058 == pytest.approx(505.0, abs=0.3)
-    found = by_inertia_and_motor(SYS1, BEFOREHAND)
+    found = by_inertia_and_motor(SYS1, KNOWN)
     assert found["torque_gain_gap"].value == pytest.approx(2.9438 - 2.9304, abs=2e-4)
 
 
@@ -59,26 +59,26 @@ def test_sys1_overshoots_by_11_5_per_cent():
 
 def test_contradiction_names_the_constant_the_cause_and_what_it_takes():
     uncertain = identified(25.9786, 523.7292, 507.5597, (0.5, 5.0, 5.0))
-    (told,) = by_inertia(uncertain, BEFOREHAND).contradictions
+    (told,) = by_inertia(uncertain, KNOWN).contradictions
     assert told == (
         "c4 = −0.0920 ± 0.0029 V·s/rad cannot be negative: C = 0.0532 N·m·s is too small to explain "
         "a = 25.98 ± 0.50 1/s; it takes at least 0.1507 ± 0.0029 N·m·s"
     )
-    enough = BEFOREHAND.replaced(damping=Quantity(0.1507 + 0.01))
+    enough = KNOWN.replaced(damping=UncertainValue(0.1507 + 0.01))
     assert by_inertia(uncertain, enough).contradictions == ()
-    nearly = BEFOREHAND.replaced(damping=Quantity(0.150, 0.001))
+    nearly = KNOWN.replaced(damping=UncertainValue(0.150, 0.001))
     (told,) = by_inertia(uncertain, nearly).contradictions
     assert "zero lies within two standard uncertainties" in told
 
 
 def test_other_impossible_constants_are_told_too():
-    slack = BEFOREHAND.replaced(spring=Quantity(1.0), damping=Quantity(0.2))
+    slack = KNOWN.replaced(spring=UncertainValue(1.0), damping=UncertainValue(0.2))
     (told,) = by_inertia(SYS1, slack).contradictions
     assert told.startswith("h = ")
     assert "K·L2·L6 = 1 N·m is too small" in told
-    (falls,) = by_inertia(identified(25.0, -3.0, 500.0), BEFOREHAND.replaced(damping=Quantity(0.2))).contradictions
+    (falls,) = by_inertia(identified(25.0, -3.0, 500.0), KNOWN.replaced(damping=UncertainValue(0.2))).contradictions
     assert "Eq. (35) does not hold" in falls
-    sure = BEFOREHAND.replaced(inertia=Quantity(0.007, 1e-5))
+    sure = KNOWN.replaced(inertia=UncertainValue(0.007, 1e-5))
     (gap,) = by_inertia_and_motor(identified(25.9786, 523.7292, 507.5597, (0.1, 1.0, 1.0)), sure).contradictions
     assert "inertia or motor is not as stated" in gap
     with pytest.raises(ValueError, match="turn the sign"):
@@ -158,14 +158,14 @@ def test_the_explained_neck_moves_as_identified(route):
     linear = linear_neck(neck)
     assert (linear.a, linear.b, linear.c) == pytest.approx((27.0, 531.0, 505.0), rel=1e-12)
     with pytest.raises(ValueError, match="cannot be negative"):
-        explained_neck(by_inertia(SYS1, BEFOREHAND))
+        explained_neck(by_inertia(SYS1, KNOWN))
 
 
 def test_joint_keeps_what_quantities_share():
-    pair = joint({"x": 2.0, "y": 3.0}, (0.1, 0.2)).derived(lambda q: {"sum": q["x"] + q["y"]})
+    pair = correlated({"x": 2.0, "y": 3.0}, (0.1, 0.2)).derived(lambda q: {"sum": q["x"] + q["y"]})
     difference = pair.derived(lambda q: {"rest": q["sum"] - q["x"] - q["y"]})
     assert difference["rest"].sigma == pytest.approx(0.0, abs=1e-12)
     assert pair["sum"].sigma == pytest.approx(np.hypot(0.1, 0.2), rel=1e-12)
-    assert isinstance(pair, Joint)
+    assert isinstance(pair, CorrelatedQuantities)
     with pytest.raises(ValueError, match="both sides"):
         _ = pair + pair

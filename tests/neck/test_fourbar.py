@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from anglecam.neck import FourBar, crank_reach, head_angle, joints, reach, servo_angle
+from anglecam.neck.fourbar import FourBar, crank_reach, head_angle, joints, reach, servo_angle
 
 PAPER = FourBar()
 

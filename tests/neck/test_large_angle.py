@@ -4,8 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anglecam.neck import head_angle, servo_angle
-from anglecam.neck.fourbar import FourBar
+from anglecam.neck.fourbar import FourBar, head_angle, servo_angle
 from anglecam.neck.large_angle import (
     LargeAngleNeck,
     LinkageRatio,

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from anglecam.neck.damping import Film
+from anglecam.neck.damping import OilFilm
 from anglecam.neck.head import head_acceleration
 from anglecam.neck.linear import linear_neck, passive_stiffness
 from anglecam.neck.parameters import PAPER
@@ -18,7 +18,7 @@ def test_k_l2_l6_and_the_weight_leave_a_passive_stiffness_of_4_517():
 def test_start_of_the_papers_filter_follows_from_rounded_figures():
     inertia, damping, stiffness = 0.01, 0.05, 5.31  # as the paper rounds J, C of the oil film and K·L2·L6
     assert (damping / inertia, stiffness / inertia, 1 / inertia) == pytest.approx((5, 531, 100))
-    assert Film().damping == pytest.approx(damping, abs=0.005)
+    assert OilFilm().damping == pytest.approx(damping, abs=0.005)
     assert small_angle_torque(PAPER.spring, 1.0) == pytest.approx(stiffness, abs=0.01)
 
 

@@ -24,7 +24,7 @@ from anglecam.neck.pd import (
     sys2,
     third_order_plant,
 )
-from anglecam.neck.pd_tuning import ADULT, Nod, tune_pd
+from anglecam.neck.pd_tuning import ADULT, NodTarget, tune_pd
 
 NECK = linear_neck(PAPER)
 
@@ -168,7 +168,7 @@ def test_tuning_gives_the_adults_nod(plant):
 
 def test_tuning_speeds_a_slow_neck_up_where_the_loss_is_allowed():
     slow = control.tf([20.0], [1.0, 9.0, 20.0])
-    tuned = tune_pd(slow, Nod(0.2, 0.05), largest_loss=0.9)
+    tuned = tune_pd(slow, NodTarget(0.2, 0.05), largest_loss=0.9)
     assert tuned.feasible
     assert tuned.loop.figures.rise_time == pytest.approx(0.2, rel=0.0201)
     assert tuned.loop.gains.proportional > 0.0
@@ -177,7 +177,7 @@ def test_tuning_speeds_a_slow_neck_up_where_the_loss_is_allowed():
 
 def test_what_cannot_be_met_is_named_with_how_near_it_comes():
     slow = control.tf([20.0], [1.0, 9.0, 20.0])
-    tuned = tune_pd(slow, Nod(0.2, 0.0), largest_loss=0.01)
+    tuned = tune_pd(slow, NodTarget(0.2, 0.0), largest_loss=0.01)
     assert not tuned.feasible
     assert any(line.startswith("rise time ≤ 0.204 s") for line in tuned.unmet)
     with pytest.raises(ValueError, match="comes to rest"):

@@ -5,7 +5,7 @@ import pytest
 
 from anglecam.errors import InputError
 from anglecam.io.power_csv import read_power_log
-from anglecam.neck.power import SERVOS, PowerLog, Source, find_nods, fit_source, nod_power, power_use
+from anglecam.neck.power import SERVOS, PowerLog, VoltageSource, find_nods, fit_source, nod_power, power_use
 
 V0, R = 6.0, 2.5 / 0.6
 NODS = ((1.0, 1.6), (2.5, 3.0), (4.0, 4.8))
@@ -85,7 +85,7 @@ def test_stated_uncertainty_of_the_source_is_its_scatter(sway):
 
 
 def test_a_source_that_does_not_sag_has_no_greatest_power():
-    assert Source(6.0, 0.0, np.zeros((2, 2)), 0.0, (0.0, 1.0)).greatest_power == np.inf
+    assert VoltageSource(6.0, 0.0, np.zeros((2, 2)), 0.0, (0.0, 1.0)).greatest_power == np.inf
 
 
 def test_logs_are_read_and_their_faults_name_file_and_cause(tmp_path):

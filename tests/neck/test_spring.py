@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from anglecam.neck.parameters import PAPER, Spring
+from anglecam.neck.parameters import PAPER, SpringParameters
 from anglecam.neck.spring import (
     Preload,
     elongation,
@@ -88,4 +88,4 @@ def test_equal_springs_against_each_other_pull_evenly_both_ways():
 
 def test_an_arm_shorter_than_the_base_makes_no_right_triangle():
     with pytest.raises(ValueError, match="must be longer than base"):
-        neutral_spring_angle(Spring(base=0.06, arm=0.05))
+        neutral_spring_angle(SpringParameters(base=0.06, arm=0.05))

@@ -11,13 +11,13 @@ from anglecam.neck.fourbar import head_angle, servo_angle
 from anglecam.neck.linear import linear_neck
 from anglecam.neck.parameters import PAPER
 from anglecam.neck.pd import PdGains, close_loop, linear_plant
-from anglecam.neck.pd_tuning import Nod
+from anglecam.neck.pd_tuning import NodTarget
 from anglecam.neck.step import linear_step_figures
 from anglecam.neck.synthesis import Wish, design_constraints, synthesise
 
 
 def test_an_adults_nod_is_met_by_spring_link_and_gains():
-    wish = Wish(Nod())
+    wish = Wish(NodTarget())
     made = synthesise(wish)
     assert made.feasible
     assert made.unmet == ()
@@ -40,7 +40,7 @@ def test_an_adults_nod_is_met_by_spring_link_and_gains():
 
 
 def test_constraints_are_listed_with_value_limit_and_whether_they_bind():
-    made = synthesise(Wish(Nod(0.1, 0.02)))
+    made = synthesise(Wish(NodTarget(0.1, 0.02)))
     by_name = {(c.name, c.at_least): c for c in made.constraints}
     assert by_name["overshoot", False].active
     assert by_name["overshoot", False].value == pytest.approx(0.025, abs=1e-4)
@@ -50,7 +50,7 @@ def test_constraints_are_listed_with_value_limit_and_whether_they_bind():
 
 
 def test_damping_may_take_the_controllers_place():
-    made = synthesise(Wish(Nod(0.1, 0.05)), free=("K", "L_6", "h", "G_a", "C"))
+    made = synthesise(Wish(NodTarget(0.1, 0.05)), free=("K", "L_6", "h", "G_a", "C"))
     assert made.feasible
     assert made.gains == PdGains()
     assert made.changes["C"][1] > 0.15
@@ -61,14 +61,14 @@ def test_damping_may_take_the_controllers_place():
 def test_a_wish_already_granted_changes_nothing():
     linear = linear_neck(PAPER)
     now = linear_step_figures([linear.c], [1.0, linear.a, linear.b])
-    made = synthesise(Wish(Nod(now.rise_time, now.overshoot)))
+    made = synthesise(Wish(NodTarget(now.rise_time, now.overshoot)))
     assert made.feasible
     for before, after in made.changes.values():
         assert after == pytest.approx(before, rel=1e-6, abs=1e-9)
 
 
 def test_a_range_beyond_the_links_is_named():
-    made = synthesise(Wish(Nod(0.1, 0.1), up=0.7), free=("K", "L_6", "K_d"))
+    made = synthesise(Wish(NodTarget(0.1, 0.1), up=0.7), free=("K", "L_6", "K_d"))
     assert not made.feasible
     (line,) = (u for u in made.unmet if u.startswith("range upward"))
     assert "≥ 40.11 °" in line
@@ -79,22 +79,22 @@ def test_a_range_beyond_the_links_is_named():
 
 
 def test_a_rise_faster_than_the_motor_can_is_named():
-    made = synthesise(Wish(Nod(0.02, 0.0)), free=("h", "K_d"))
+    made = synthesise(Wish(NodTarget(0.02, 0.0)), free=("h", "K_d"))
     assert not made.feasible
     assert any(line.startswith("rise time ≤ 0.0204 s") for line in made.unmet)
 
 
 def test_the_papers_servo_cannot_hold_its_head_at_25_degrees():
-    rows = design_constraints(Wish(Nod(), stall_torque=0.47), PAPER, PdGains())
+    rows = design_constraints(Wish(NodTarget(), stall_torque=0.47), PAPER, PdGains())
     assert rows[-1].value == pytest.approx(0.71, abs=5e-3)
     assert not rows[-1].met
-    made = synthesise(Wish(Nod(), stall_torque=0.47))
+    made = synthesise(Wish(NodTarget(), stall_torque=0.47))
     assert made.feasible
     assert made.constraints[-1].active
 
 
 def test_the_torque_at_the_shaft_is_told_where_no_limit_is_asked():
-    row = design_constraints(Wish(Nod()), PAPER, PdGains())[-1]
+    row = design_constraints(Wish(NodTarget()), PAPER, PdGains())[-1]
     assert row.name == "servo torque at the end (shaft)"
     assert row.value == pytest.approx(0.71, abs=5e-3)
     assert row.met
@@ -102,7 +102,7 @@ def test_the_torque_at_the_shaft_is_told_where_no_limit_is_asked():
 
 
 def test_the_papers_links_reach_less_than_25_degrees_down():
-    rows = {c.name: c for c in design_constraints(Wish(Nod()), PAPER, PdGains())}
+    rows = {c.name: c for c in design_constraints(Wish(NodTarget()), PAPER, PdGains())}
     assert math.degrees(rows["range downward"].value) == pytest.approx(23.89, abs=0.01)
     assert math.degrees(rows["range upward"].value) == pytest.approx(31.13, abs=0.01)
     assert math.degrees(rows["pretension angle, Eq. (24)"].value) == pytest.approx(36.4, abs=0.1)
@@ -110,11 +110,11 @@ def test_the_papers_links_reach_less_than_25_degrees_down():
 
 def test_what_may_be_free_is_checked():
     with pytest.raises(ValueError, match="Q cannot be free"):
-        synthesise(Wish(Nod()), free=("Q",))
+        synthesise(Wish(NodTarget()), free=("Q",))
     with pytest.raises(ValueError, match="nothing is free"):
-        synthesise(Wish(Nod()), free=())
+        synthesise(Wish(NodTarget()), free=())
     with pytest.raises(ValueError, match="bounds are positive"):
-        synthesise(Wish(Nod()), bounds={"K": (2.0, 1.0)})
+        synthesise(Wish(NodTarget()), bounds={"K": (2.0, 1.0)})
 
 
 def test_the_optimum_of_a_known_problem_is_found():

@@ -2,16 +2,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from anglecam.neck import (
-    FourBar,
+from anglecam.neck.fourbar import FourBar, crank_reach, head_angle, joints, reach, servo_angle
+from anglecam.neck.transmission import (
     bend,
-    crank_reach,
     grashof,
-    head_angle,
-    joints,
     limits,
-    reach,
-    servo_angle,
     slope,
     straight_line,
     transmission_angle,

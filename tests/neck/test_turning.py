@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
-from anglecam.neck import (
+from anglecam.neck.parameters import HeadParameters
+from anglecam.neck.turning import (
+    KGF_CM,
     TurningMechanism,
     bearing_torque,
     bearing_torque_mean,
@@ -12,8 +14,6 @@ from anglecam.neck import (
     turning_slope,
     turning_start_torque,
 )
-from anglecam.neck.parameters import Head
-from anglecam.neck.turning import KGF_CM
 
 DEFAULT = TurningMechanism()
 SWINGING = TurningMechanism(crank=0.026, distance=0.030, travel=np.radians(175.0))  # bearing outside the crank's circle
@@ -111,6 +111,6 @@ def test_the_total_torque_is_six_times_the_bearings():
 
 
 def test_without_springs_the_nod_needs_7_2_kilogram_centimetres_not_9_9():
-    head = Head(mass=2.31, centre_of_mass=0.031, gravity=9.80665)
+    head = HeadParameters(mass=2.31, centre_of_mass=0.031, gravity=9.80665)
     assert head.weight_moment / KGF_CM == pytest.approx(7.16, abs=0.005)
     assert abs(head.weight_moment / KGF_CM - 9.9) > 2.7

@@ -1,4 +1,4 @@
-"""The figures of `anglecam neck`: they draw what was worked out, name their units, and no legend hides a curve."""
+"""The figures of `anglecam neck`: they draw the results, name their units, and no legend hides a curve."""
 
 import math
 
@@ -7,16 +7,24 @@ import numpy as np
 import pytest
 
 from anglecam.io.neck_file import read_neck
-from anglecam.neck.linear import linear_neck
-from anglecam.neck.parameters import PAPER
-from anglecam.neck.pd import PdGains, close_loop, gains_table, sys2
-from anglecam.neck.pd_tuning import Nod, tune_pd
+from anglecam.neck.pd_tuning import NodTarget
 from anglecam.neck.power import PowerLog, power_use
 from anglecam.neck.sensitivity import figure_9
 from anglecam.neck.synthesis import Wish, synthesise
-from anglecam.neck_design import figures as neck_figures
-from anglecam.neck_design import loop_figures as neck_loop_figures
-from anglecam.neck_design import procedure
+from anglecam.neck_design.figures.design import design_figure, synthesis_figure
+from anglecam.neck_design.figures.mechanism import linkage_figure, statics_figure, turning_figure
+from anglecam.neck_design.figures.pd import pd_figure, tuning_figure
+from anglecam.neck_design.figures.power import power_figure
+from anglecam.neck_design.figures.response import series_figure, step_figure
+from anglecam.neck_design.figures.sensitivity import sensitivity_figure
+from anglecam.neck_design.procedure import chosen_plant, default_gains, identified_motion, routes_of
+from anglecam.neck_design.results.design import design_of
+from anglecam.neck_design.results.kinematics import kinematics_of
+from anglecam.neck_design.results.pd import pd_of
+from anglecam.neck_design.results.power import power_of
+from anglecam.neck_design.results.response import response_of
+from anglecam.neck_design.results.sensitivity import sensitivities_of
+from anglecam.neck_design.results.statics import statics_of
 from anglecam.neck_design.systems import STEP, paper_systems, side_by_side
 
 NECK = read_neck(None)
@@ -32,44 +40,38 @@ def made_log():
 
 def draw_power(path):
     log = made_log()
-    neck_figures.power_figure(log, power_use(log), path)
+    power_figure(power_of(log, power_use(log)), path)
 
 
-def draw_response(path):
-    neck_loop_figures.step_figure(paper_systems(NECK.large_angle), STEP, None, path)
+def response_result():
+    systems = paper_systems(NECK.large_angle)
+    return response_of(systems, STEP, side_by_side(systems))
 
 
-def draw_series(path):
-    neck_loop_figures.series_figure(side_by_side(paper_systems(NECK.large_angle)), path)
+def design_result(synthesis=None):
+    found = identified_motion((26.0, 524.0, 508.0), (1.0, 10.0, 12.0), None, 1.0)
+    return design_of(found, routes_of(found, NECK.known), None, synthesis)
 
 
-def draw_design(path):
-    found = procedure.identified_motion((26.0, 524.0, 508.0), (1.0, 10.0, 12.0), None, 1.0)
-    neck_loop_figures.design_figure(found, procedure.routes_of(found, NECK.beforehand), path)
-
-
-def draw_synthesis(path):
-    made = synthesise(Wish(Nod(0.15, 0.02)), free=("K", "C"))
-    neck_loop_figures.synthesis_figure(made, linear_neck(PAPER), path)
-
-
-def draw_tuned(path):
-    loop = close_loop(sys2(), PdGains())
-    neck_loop_figures.tuning_figure(loop, tune_pd(sys2(), Nod(0.3, 0.0)), None, path)
+def pd_result(target=None):
+    plant = chosen_plant(None, None)
+    return pd_of(plant, *default_gains(plant.transfer), target)
 
 
 DRAWN = {
-    "linkage": lambda path: neck_figures.kinematics_figure(NECK, path),
-    "turning": lambda path: neck_figures.turning_figure(NECK, path),
-    "statics": lambda path: neck_figures.statics_figure(NECK, path),
-    "sensitivity": lambda path: neck_figures.sensitivity_figure(figure_9(), path),
+    "linkage": lambda path: linkage_figure(kinematics_of(NECK), path),
+    "turning": lambda path: turning_figure(kinematics_of(NECK), path),
+    "statics": lambda path: statics_figure(statics_of(NECK), path),
+    "sensitivity": lambda path: sensitivity_figure(sensitivities_of((), figure_9()), path),
     "power": draw_power,
-    "step": draw_response,
-    "series": draw_series,
-    "design": draw_design,
-    "synthesis": draw_synthesis,
-    "pd": lambda path: neck_loop_figures.pd_figure(gains_table(sys2()), procedure.chosen_plant(None, None), path),
-    "tuned": draw_tuned,
+    "step": lambda path: step_figure(response_result(), path),
+    "series": lambda path: series_figure(response_result(), path),
+    "design": lambda path: design_figure(design_result(), path),
+    "synthesis": lambda path: synthesis_figure(
+        design_result(synthesise(Wish(NodTarget(0.15, 0.02)), free=("K", "C"))), path
+    ),
+    "pd": lambda path: pd_figure(pd_result(), path),
+    "tuned": lambda path: tuning_figure(pd_result(NodTarget(0.3, 0.0)), path),
 }
 
 
@@ -90,7 +92,7 @@ def figures(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", DRAWN)
-def test_it_is_wide_enough_and_its_axes_name_their_units(figures, name):
+def test_a_figure_is_wide_enough_and_its_axes_name_their_units(figures, name):
     folder, kept = figures
     height, width = plt.imread(folder / f"{name}.png").shape[:2]
     assert 850 <= width <= 1100
@@ -132,7 +134,7 @@ def test_fig_4_shows_the_links_and_the_line(figures):
     assert 50.0 < mu.get_lines()[0].get_ydata().min() < 55.0
 
 
-def test_the_step_shows_each_model_at_its_rest(figures):
+def test_the_step_figure_shows_each_steady_state(figures):
     (axes,) = figures[1]["step"].axes
     ends = {line.get_label().split(",")[0]: line.get_ydata()[-1] for line in axes.get_lines()[1:]}
     assert ends == pytest.approx({"SYS1": 21.32, "small angles": 21.21, "SYS2": 23.58, "large angles": 23.80}, abs=0.02)
@@ -156,7 +158,7 @@ def test_fig_16_has_a_panel_for_each_k_p_and_a_curve_for_each_k_d(figures):
     assert last[3] == pytest.approx(23.58 * (1.0 - 0.191), abs=0.05)
 
 
-def test_the_tuned_curve_rises_as_was_wanted(figures):
+def test_the_tuned_curve_has_the_wanted_rise_time(figures):
     (axes,) = figures[1]["tuned"].axes
     tuned = axes.get_lines()[-1]
     assert tuned.get_label() == "tuned"
@@ -164,7 +166,7 @@ def test_the_tuned_curve_rises_as_was_wanted(figures):
     assert high - low == pytest.approx(0.3, rel=0.025)
 
 
-def test_an_unstable_curve_is_told(figures):
+def test_the_legend_names_an_unstable_curve(figures):
     texts = [text.get_text() for text in figures[1]["sensitivity"].axes[2].get_legend().get_texts()]
     assert "1000 V/V, unstable" in texts
     assert all(math.isfinite(limit) for limit in figures[1]["sensitivity"].axes[2].get_ylim())
