@@ -18,14 +18,14 @@ from numba import njit
 from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
-from anglecam.models.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, SOURCES, WIDTH, integrate
+from anglecam.models.integrator import COMPILED, SOURCES, integrate
 from anglecam.models.plant import MAX_STEP
 
 SHARED = slice(2, 5)
 """Where a, b, c stand in the state; what stands elsewhere is the recording's own."""
 _STEPS = np.array([0.1, 1.0, 1.0, 10.0, 10.0])
 """Least magnitudes of θ, θ̇, a, b, c, SI, that difference quotients are taken against."""
-_NO_SERVOS, _NO_LOADS, _NO_DRIES = (np.zeros((max(1, len(ids)), WIDTH)) for ids in (SERVO_IDS, LOAD_IDS, DRY_IDS))
+_NO_EFFECTS = COMPILED.table(())
 
 
 @dataclass(frozen=True)
@@ -155,23 +155,23 @@ def _advance(state: Floats, span: Floats, command: Command) -> tuple[Floats, Flo
     reached, F = state.copy(), np.eye(len(state))
     steps = 1e-5 * np.maximum(np.abs(state[:5]), _STEPS)
     knots = np.stack([command.time, command.angle, np.zeros(len(command.time))])
-    reached[:2], F[:2, :5] = _flow(state[:5], span, knots, steps, _NO_SERVOS, _NO_LOADS, _NO_DRIES, MAX_STEP)
+    reached[:2], F[:2, :5] = _flow(state[:5], span, knots, steps, _NO_EFFECTS, MAX_STEP)
     return reached, F
 
 
 def _compile_once(code):  # type: ignore[no-untyped-def]  # compiled
     @njit(cache=True)
-    def _flow(state, span, knots, steps, servos, loads, dries, max_step):  # type: ignore[no-untyped-def]
+    def _flow(state, span, knots, steps, table, max_step):  # type: ignore[no-untyped-def]
         assert len(code) > 0
         slopes = np.empty((2, 5))
         for j in range(5):
             low, high = state.copy(), state.copy()
             low[j] -= steps[j]
             high[j] += steps[j]
-            under = integrate(span, low[0], low[1], knots, 0.0, low[2:], servos, loads, dries, max_step)[1]
-            over = integrate(span, high[0], high[1], knots, 0.0, high[2:], servos, loads, dries, max_step)[1]
+            under = integrate(span, low[0], low[1], knots, 0.0, low[2:], table, max_step)[1]
+            over = integrate(span, high[0], high[1], knots, 0.0, high[2:], table, max_step)[1]
             slopes[:, j] = (over - under) / (high[j] - low[j])
-        return integrate(span, state[0], state[1], knots, 0.0, state[2:], servos, loads, dries, max_step)[1], slopes
+        return integrate(span, state[0], state[1], knots, 0.0, state[2:], table, max_step)[1], slopes
 
     return _flow
 

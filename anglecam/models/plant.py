@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,7 @@ from anglecam.data.camera_evidence import UNKNOWN_VIEW, View
 from anglecam.data.command import Command
 from anglecam.data.typing import Floats
 from anglecam.effects import Effect, Knots
-from anglecam.models.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, WIDTH, integrate
+from anglecam.models.integrator import INTEGRATOR, Integrator
 
 MAX_STEP = 0.006
 """s; at the paper's natural frequency of 23 rad/s a step response errs by less than 5e-5 degrees."""
@@ -30,7 +30,9 @@ class Plant:
 
     effects: tuple[Effect, ...] = ()
     driven: bool = True
-    """Whether any recording has a command; a free swing tells nothing about c."""
+    """Whether any recording has a command; a free swing does not determine c."""
+    integrator: Integrator = field(default=INTEGRATOR, repr=False)
+    """Compiled for a ledger that contains the plant's effects."""
 
     states = 2
     """Unknown initial states of a recording: angle (rad) and rate (rad/s)."""
@@ -75,7 +77,7 @@ class Plant:
 
     def with_effect(self, effect: Effect) -> Plant:
         """Return the plant with one more effect."""
-        return Plant((*self.effects, effect), self.driven)
+        return replace(self, effects=(*self.effects, effect))
 
     def predict(
         self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNKNOWN_VIEW
@@ -118,25 +120,25 @@ class Plant:
         """
         abc = np.zeros(3)
         abc[: self.base_count] = parameters[: self.base_count]
-        tables = [np.zeros((max(1, len(ids)), WIDTH)) for ids in (SERVO_IDS, LOAD_IDS, DRY_IDS)]
-        knots, lag, step = _NO_COMMAND, 0.0, EXACT
+        pairs = self.parameters_by_effect(parameters)
+        knots, lag = _NO_COMMAND, 0.0
         if command is not None:
             knots = Knots(command.time, command.angle, np.zeros(len(command.time)))
-        for effect, own in self.parameters_by_effect(parameters):
+        for effect, values in pairs:
             if effect.command is not None:
-                knots = effect.command(knots, own)
+                knots = effect.command(knots, values)
             if effect.lag is not None:
-                lag += effect.lag(own)
-            for ids, table, port in zip(
-                (SERVO_IDS, LOAD_IDS, DRY_IDS), tables, ("servo", "load", "friction"), strict=True
-            ):
-                if effect.port == port:
-                    table[ids.index(effect.id), : len(own)] = own
-            if effect.port in ("servo", "load", "friction"):
-                step = KINKED_STEP if effect.port == "servo" or step == KINKED_STEP else MAX_STEP
-        rows = np.stack([knots.time, knots.level, knots.slope])
-        servos, loads, dries = tables
-        return integrate(time, state[0], state[1], rows, lag, abc, servos, loads, dries, step)
+                lag += effect.lag(values)
+        rows, table = np.stack([knots.time, knots.level, knots.slope]), self.integrator.effects.table(pairs)
+        return self.integrator.integrate(time, state[0], state[1], rows, lag, abc, table, self._max_step)
+
+    @property
+    def _max_step(self) -> float:
+        """Longest step of the integrator, s."""
+        ports = {e.port for e in self.effects}
+        if ports & {"servo", "dynamics"}:
+            return KINKED_STEP
+        return MAX_STEP if ports & {"load", "friction"} else EXACT
 
     def _at(self, parameters: Floats, time: Floats, happened: Floats, command: Command | None, state: Floats) -> Floats:
         """Return the angle, rad, at instants a little beside the frames, in any order; the state stays at the first."""
