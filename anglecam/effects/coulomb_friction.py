@@ -1,8 +1,8 @@
 """Dry friction: the sleeve bearings oppose motion with a torque that does not depend on speed.
 
     θ̈ = c·u − a·θ̇ − b·θ − F·sgn θ̇                  while sliding, F ± D for the two directions
-    θ̇ = 0      while |c·u − b·θ| ≤ max(F + B, F ± D)      the load sticks until a torque above the sliding level breaks it away
-    F ± D + (B ∓ D)·exp(−(θ̇/ω_s)²)                        in place of F ± D: the Stribeck curve from break-away to sliding
+    θ̇ = 0      while |c·u − b·θ| ≤ max(F + B, F ± D)      the load sticks until a larger torque breaks it away
+    F ± D + (B ∓ D)·exp(−(θ̇/ω_s)²)                        in place of F ± D: Stribeck's curve from break-away
 
 F, D and B are torques divided by the moment of inertia. With ω_s = 0 friction falls to the sliding level at once. The
 paper's damping is a lubricant film alone, Eqs. (19)–(22).

@@ -51,7 +51,7 @@ EFFECT = Effect(
     relaxes="Eq. (3), Fig. 4: γ is constant",
     parameters=(Parameter("share_of_four_bar", "A", null=0.0, lower=-0.5, upper=1.5, starts=(0.3, 1.0)),),
     aliases=("stiffening_spring", "gravity_geometry"),
-    separating_experiment="slow stairs over the whole range: the linkage shows in the angle at which each step comes to rest",
+    separating_experiment="slow stairs over the whole range: the linkage shows in the angle at which each step ends",
     source="the paper, Eqs. (1)-(3); anglecam.neck.transmission",
     rank=-1,
     servo=_servo,

@@ -49,7 +49,7 @@ EFFECT = Effect(
     relaxes="Eq. (6): the amplifier gives any voltage at any speed",
     parameters=(Parameter("rate_deg_per_s", "r", 0.0, 0.0, 20.0, (0.02, 0.1, 0.5), math.degrees(1.0), inverse=True),),
     aliases=("torque_saturation", "actuator_lag"),
-    separating_experiment="steps of two heights, one at least three times the other: a limit prolongs only the larger one",
+    separating_experiment="steps of two heights, one at least three times the other: a limit slows only the larger",
     source="the paper, Fig. 12; HS-225MG data sheet: 0.11 s for 60°",
     rank=1,
     command=_limit,

@@ -35,7 +35,7 @@ class CompiledEffects:
     rates: Any
     """(θ, ω, additional states, v, abc, rows) → θ̈ without dry friction (rad/s²), derivatives of the states."""
     friction: Any
-    """(rows) → (sliding up, sliding down, breaking away, Stribeck speed): rad/s², rad/s² , rad/s², rad/s."""
+    """(rows) → levels sliding up, sliding down and breaking away (rad/s²), and the Stribeck speed (rad/s)."""
     initial: Any
     """(θ, ω, v, abc, rows) → additional states at the first instant."""
     moved: Any

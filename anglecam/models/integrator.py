@@ -5,7 +5,8 @@
 It advances from *stop* to *stop*: frames and knots of the command. Between two stops the command is a straight line,
 and the lag behind it is solved in closed form. Because every knot is a stop, a delay is exact and the prediction is
 differentiable with respect to it. Without an effect inside the equation of motion a stretch between stops is a Taylor
-series, exact to rounding (`anglecam.models.linear_step`); otherwise it is Runge-Kutta steps (`anglecam.models.stepping`).
+series, exact to rounding (`anglecam.models.linear_step`); otherwise it is Runge-Kutta steps
+(`anglecam.models.stepping`).
 """
 
 from __future__ import annotations

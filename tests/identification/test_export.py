@@ -156,7 +156,8 @@ def test_units_are_read_off_names(name, unit):
 
 
 def test_loading_the_exports_does_not_load_python_control():
-    code = "import sys, anglecam.cli.app, anglecam.identification.export, json; print(json.dumps('control' in sys.modules))"
+    modules = "anglecam.cli.app, anglecam.identification.export"
+    code = f"import sys, {modules}, json; print(json.dumps('control' in sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert json.loads(done.stdout) is False
 

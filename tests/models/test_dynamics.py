@@ -1,4 +1,4 @@
-"""Effects with additional states, defined here and in no other file, against SciPy's integration of the same equations."""
+"""Effects with additional states, defined in this file only, against SciPy's integration of the same equations."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def reference(first, friction=0.0):
             def ends(_t, x, u=u, stuck=stuck, direction=direction):
                 return abs(second_mass(x, u, 0.0)[0]) - friction if stuck else direction * x[1]
 
-            ends.terminal, ends.direction = friction > 0.0, 1.0 if stuck else -1.0
+            ends.terminal, ends.direction = friction > 0.0, (1.0 if stuck else -1.0)
             run = solve_ivp(rate, (now, until), state, "DOP853", events=ends, dense_output=True, rtol=1e-10, atol=1e-12)
             inside = (TIME >= now) & (TIME <= run.t[-1])
             angles[inside] = run.sol(TIME[inside])[0]
