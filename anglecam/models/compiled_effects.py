@@ -96,10 +96,10 @@ def compile_effects(ledger: Sequence[Effect]) -> CompiledEffects:
         return servo_rows(table), load_rows(table), friction_rows(table), dynamic_rows(table)
 
     @njit
-    def rates(theta, omega, own, v, abc, rows):  # type: ignore[no-untyped-def]  # compiled
+    def rates(theta, omega, extra, v, abc, rows):  # type: ignore[no-untyped-def]  # compiled
         torque = servo(abc[2] * v - abc[1] * theta, theta, abc, rows[0])
         smooth = torque - abc[0] * omega + load(theta, omega, rows[1])
-        return dynamics(smooth, theta, omega, v, abc, own, rows[3])
+        return dynamics(smooth, theta, omega, v, abc, extra, rows[3])
 
     @njit
     def all_friction(rows):  # type: ignore[no-untyped-def]  # compiled
@@ -167,17 +167,17 @@ def _sum_of_dynamics(entries, width, row=0):  # type: ignore[no-untyped-def]  # 
     An effect that is not in the plant is not evaluated: its states stand still and it adds nothing, not even a zero.
     """
     if row == len(entries):
-        return njit(lambda acceleration, theta, omega, v, abc, own, table: (acceleration, ()))
+        return njit(lambda acceleration, theta, omega, v, abc, extra, table: (acceleration, ()))
     first, others = entries[row].dynamics, _sum_of_dynamics(entries, width, row + 1)
     begin, end, still = _place(entries, row)
 
     @njit
-    def total(acceleration, theta, omega, v, abc, own, table):  # type: ignore[no-untyped-def]  # compiled
+    def total(acceleration, theta, omega, v, abc, extra, table):  # type: ignore[no-untyped-def]  # compiled
         derivatives = still
         if table[row][width] != 0.0:
-            derivatives, added = first(theta, omega, v, abc, own[begin:end], table[row])
+            derivatives, added = first(theta, omega, v, abc, extra[begin:end], table[row])
             acceleration = acceleration + added
-        acceleration, more = others(acceleration, theta, omega, v, abc, own, table)
+        acceleration, more = others(acceleration, theta, omega, v, abc, extra, table)
         return acceleration, derivatives + more
 
     return total

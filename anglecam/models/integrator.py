@@ -48,7 +48,7 @@ def _compile_run(effects: CompiledEffects):  # type: ignore[no-untyped-def]  # c
         segment = np.zeros(3)
         segment[0], segment[1] = line_at(knots, k, now)
         v = segment[0]
-        own = initial(theta, omega, v, plant, rows)
+        extra = initial(theta, omega, v, plant, rows)
         for i in range(1, n):
             while now < time[i]:
                 stop = time[i]
@@ -67,8 +67,8 @@ def _compile_run(effects: CompiledEffects):  # type: ignore[no-untyped-def]  # c
                         steps = int(np.ceil((end - begin) / longest)) if end > begin else 0
                         for step in range(steps):
                             h = (end - begin) / steps
-                            theta, omega, own = advance(
-                                theta, omega, own, begin + step * h, h, segment, lag, plant, rows, friction
+                            theta, omega, extra = advance(
+                                theta, omega, extra, begin + step * h, h, segment, lag, plant, rows, friction
                             )
                 v = drive_at(stop - now, segment, lag)
                 now = stop

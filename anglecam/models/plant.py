@@ -118,7 +118,7 @@ class Plant:
         Returns
         -------
         (n, 2) ndarray
-            Angle, rad, and rate, rad/s; not finite where the plant runs away.
+            Angle, rad, and rate, rad/s; not finite where the plant diverges.
         """
         abc = np.zeros(3)
         abc[: self.base_count] = parameters[: self.base_count]

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from anglecam.data.command import Command
 from anglecam.effects import LEDGER, Effect, Parameter, effect, ledger_of
+from anglecam.models.added_acceleration import added_acceleration
 from anglecam.models.integrator import integrator_of
 from anglecam.models.plant import Plant
 
@@ -94,7 +95,7 @@ def reference(first, friction=0.0):
 
             ends.terminal, ends.direction = friction > 0.0, (1.0 if stuck else -1.0)
             run = solve_ivp(rate, (now, until), state, "DOP853", events=ends, dense_output=True, rtol=1e-10, atol=1e-12)
-            inside = (TIME >= now) & (TIME <= run.t[-1])
+            inside = (now <= TIME) & (run.t[-1] >= TIME)
             angles[inside] = run.sol(TIME[inside])[0]
             now, state = run.t[-1], run.y[:, -1].copy()
             if run.status == 1 and not stuck:
@@ -152,3 +153,15 @@ def test_an_effect_at_its_null_changes_nothing(integrator):
     at_null = plant.predict(np.array([A, B, C, *EFFECT.null]), TIME, COMMAND, np.array([0.1, 0.5]))
     without = Plant((effect("dead_zone"),)).predict(np.array([A, B, C, 0.0]), TIME, COMMAND, np.array([0.1, 0.5]))
     assert at_null == pytest.approx(without, abs=1e-14)  # both in Runge-Kutta steps of one length
+
+
+def test_the_acceleration_added_along_a_motion_is_that_of_the_equation(integrator):
+    time = np.arange(0.0, 2.0, 1e-3)
+    values = np.array([RATIO, FREQUENCY, DAMPING])
+    plant = Plant((EFFECT,), integrator=integrator)
+    motion = plant.run(np.array([A, B, C, *values]), time, COMMAND, np.array([0.1, 0.5]))
+    added = added_acceleration(EFFECT, values, np.array([A, B, C]), time, motion[:, 0], COMMAND)
+    left = np.gradient(motion[:, 1], time) - (C * COMMAND.at(time) - A * motion[:, 1] - B * motion[:, 0])
+    away = np.abs(time - 0.51) > 0.01  # a difference quotient across the step of the command is neither side's
+    away[[0, -1]] = False
+    assert added[away] == pytest.approx(left[away], abs=0.02 * np.max(np.abs(left)))
