@@ -1,4 +1,4 @@
-"""The registry of estimators, and what `identify_records` refuses whichever is chosen."""
+"""The registry of estimators, and the calls that `identify_records` refuses with any of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The compiled integrator against closed forms and against an event-based oracle that shares nothing with it."""
+"""The compiled integrator against closed forms and against an event-based reference that shares no code with it."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_prediction_is_smooth_in_the_dead_time():
     assert np.max(np.abs(fine - coarse)) < 0.02 * np.max(np.abs(fine))
 
 
-def test_every_entry_of_the_ledger_says_what_a_reader_needs():
+def test_every_entry_of_the_ledger_is_complete():
     ids = {e.id for e in LEDGER}
     assert ids >= {"dead_time", "coulomb_friction", "quadratic_drag"}
     for entry in LEDGER:
