@@ -1,1 +1,1 @@
-"""What passes between rooms: plain frozen dataclasses, without file formats and without computation of their own."""
+"""Data that the packages exchange: plain frozen dataclasses, without file formats."""

@@ -1,4 +1,4 @@
-"""What a film shows besides the angle, and how the camera sees the mechanism."""
+"""Evidence of a film besides the angle, and how the camera views the mechanism."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class CameraEvidence:
-    """What a film shows besides the angle: the evidence for effects of the camera and of the clock."""
+    """Evidence of a film besides the angle, for effects of the camera and of the clock."""
 
     picture_px: tuple[int, int] | None = None
     """Width and height of the picture; ``None`` where it is not known."""
@@ -31,22 +31,18 @@ NO_EVIDENCE = CameraEvidence()
 
 @dataclass(frozen=True)
 class View:
-    """How the camera sees the mechanism of a recording, where it is known."""
+    """How the camera views the mechanism of a recording, as far as it is known."""
 
     neutral: float = 0.0
-    """Line from pivot to mouth at the zero of the angle, upward from ahead, rad."""
+    """Direction of the line from pivot to mark at zero angle, upward from straight ahead, rad."""
     lever_px: float | None = None
-    """Pivot to mouth; ``None`` for a series without marks."""
+    """Distance from pivot to mark, px; ``None`` for a series without marks."""
     pivot_px: tuple[float, float] | None = None
-    """From the middle of the picture, to the right and down."""
+    """Pivot from the middle of the picture, to the right and down, px."""
     mirrored: bool = False
-    """Whether the face looks to the left."""
+    """Whether the mechanism faces to the left."""
     only_pivot_differs: bool | None = None
-    """Whether all that the picture shows otherwise than the mechanism moves comes from where the mark is, if known."""
-
-
-UNKNOWN_VIEW = View()
-"""Of a series from elsewhere: the face looks ahead at its zero, and more is not known."""
+    """Whether the measured angle differs from the true angle only by the pivot's position; ``None`` if not known."""
 
 
 UNKNOWN_VIEW = View()

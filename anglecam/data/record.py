@@ -1,4 +1,4 @@
-"""A recording as an estimator sees it: the frames that were measured, and what cannot be motion among them."""
+"""A recording as an estimator uses it: the measured frames, and a measure of noise that no motion causes."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ from anglecam.data.typing import Floats
 from anglecam.errors import InputError
 
 RELEASE_SHARE = 0.02
-"""Share of the whole swing within which the angle counts as not yet released."""
+"""Share of the swing's range within which the angle counts as not yet released."""
 REST_RANGE_STEPS = 10.0
-"""A range below this many median steps from frame to frame is noise about a rest: of white noise it is 5 to 8."""
+"""Range of the angle in median steps from frame to frame, below which it is noise about a rest; white noise has 5 to
+8."""
 LONGEST_INTERVAL = 1.0
-"""s from frame to frame; what moves so slowly is no mechanism that is looked at here, and milliseconds are likelier."""
+"""Longest median frame interval, s. A series with longer intervals shows no mechanism of this kind; its times are more
+likely in milliseconds."""
 MIN_FRAMES = 20
-"""Fewer measured frames than this tell nothing about a model of three parameters and three unknowns of its own."""
+"""Fewest measured frames; fewer do not determine three parameters and three nuisance parameters."""
 
 
 @dataclass(frozen=True)
@@ -35,18 +37,18 @@ class Record:
     command: Command | None
     """``None`` where nothing was commanded or the command never changes: a free swing."""
     zero_known: bool
-    """Whether the zero of the angle is declared; otherwise it is one of the recording's own unknowns."""
+    """Whether the zero of the angle is declared; otherwise it is a nuisance parameter of the recording."""
     sigma: Floats
     """Stated standard uncertainty, rad; NaN where none is stated."""
     lever_scatter: Floats | None = None
-    """Scatter of the mouth's distance from the pivot, divided by that distance, rad: what the camera adds in the
-    direction in which nothing can move; ``None`` for a series without marks."""
+    """Scatter of the mark's distance from the pivot, divided by that distance, rad: the camera's noise in the direction
+    in which nothing can move; ``None`` for a series without marks."""
     view: View = UNKNOWN_VIEW
-    """How the camera sees the mechanism."""
+    """How the camera views the mechanism."""
     clock_sigma: float = 0.0
     """Standard uncertainty of the command's clock against the clip's, s."""
     mass_from_upright: float | None = None
-    """The centre of mass from upright at neutral, rad, where it is declared."""
+    """Angle of the centre of mass from upright at neutral, rad, where it is declared."""
 
     @property
     def interval(self) -> float:
@@ -58,7 +60,7 @@ class Record:
         return self.only((self.time >= start) & (self.time < stop))
 
     def only(self, frames: NDArray[np.bool_]) -> Record:
-        """Return the recording with some of its (n,) frames; the command keeps its whole history."""
+        """Return the recording with the selected of its (n,) frames; the command keeps its whole history."""
         lever_scatter = None if self.lever_scatter is None else self.lever_scatter[frames]
         return replace(
             self,
@@ -72,29 +74,29 @@ class Record:
 def record_from_series(
     series: AngleSeries, command: Command | None, *, zero_known: bool, mass_from_upright: float | None = None
 ) -> Record:
-    """Keep what an estimator can use of a series.
+    """Return the part of a series that an estimator can use.
 
     Parameters
     ----------
     series : AngleSeries
-        Measured or read.
+        Measured, or read from a file.
     command : Command or None
-        On the same clock.
+        The command, on the same clock.
     zero_known : bool
         Whether the rig declares ``neutral`` as a number.
     mass_from_upright : float, optional
-        The centre of mass from upright at neutral, rad, where the rig declares it.
+        Angle of the centre of mass from upright at neutral, rad, where the rig declares it.
 
     Returns
     -------
     Record
-        Of the frames whose status is ``ok``.
+        The frames whose status is ``ok``; without a command, those from the release on.
 
     Raises
     ------
     InputError
-        Where fewer than `MIN_FRAMES` frames are measured, or they follow each other more slowly than `LONGEST_INTERVAL`, or
-        all of them lie before the command's first change.
+        If fewer than `MIN_FRAMES` frames are measured, their interval exceeds `LONGEST_INTERVAL`, all of them lie
+        before the command's first change, or nothing moves without a command.
     """
     ok = series.ok
     if ok.sum() < MIN_FRAMES:
@@ -145,7 +147,7 @@ def _view(series: AngleSeries, ok: NDArray[np.bool_]) -> View:
 
 
 def _from_release(record: Record) -> Record:
-    """Leave out the frames in which something still holds what will swing freely; the model knows no hand."""
+    """Leave out the frames before the release of a free swing: the model does not include the hand that holds it."""
     jitter = float(np.median(np.abs(np.diff(record.angle))))
     if np.ptp(record.angle) < REST_RANGE_STEPS * jitter:
         raise InputError(f"{record.name}: no command, and nothing moves; there is no swing to fit")

@@ -1,4 +1,4 @@
-"""When a response passes what MATLAB's ``stepinfo`` measures it by: shares of the way from rest to rest."""
+"""Figures of a step response as MATLAB's ``stepinfo`` defines them, from shares of the way from rest to rest."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from anglecam.data.typing import Floats
 
 LOW, HIGH, SETTLED = 0.1, 0.9, 0.02
-"""Shares of the way: rise from the first to the second, settling to within the third."""
+"""Shares of the way: the rise goes from the first to the second; settled is within the third of the end."""
 
 
 @dataclass(frozen=True)
@@ -17,20 +17,21 @@ class StepFigures:
     """Figures of a step response; NaN where the model has no steady state."""
 
     rise_time: float
-    """From 10 % to 90 % of the way, s."""
+    """Time from 10 % to 90 % of the way, s."""
     overshoot: float
     """Peak beyond the steady state as a share of it, not below 0."""
     settling_time: float
-    """After which the response stays within 2 % of the steady state, s."""
+    """Time after which the response stays within 2 % of the steady state, s."""
     steady_state: float
-    """Per unit of the command."""
+    """Angle per unit of the command."""
 
 
 NO_STEP = StepFigures(np.nan, np.nan, np.nan, np.nan)
+"""For a model without a steady state, or without a command."""
 
 
 def first_crossing(time: Floats, share: Floats, level: float) -> float:
-    """Return when a response first reaches a level.
+    """Return the time at which a response first reaches a level.
 
     Parameters
     ----------
@@ -44,7 +45,7 @@ def first_crossing(time: Floats, share: Floats, level: float) -> float:
     Returns
     -------
     float
-        s, interpolated; the last time where it never does.
+        s, interpolated; the last time if it never reaches the level.
     """
     i = int(np.argmax(share >= level))
     if i == 0:
@@ -53,7 +54,7 @@ def first_crossing(time: Floats, share: Floats, level: float) -> float:
 
 
 def last_rise(time: Floats, value: Floats) -> float:
-    """Return when a value rises through zero for the last time.
+    """Return the time at which a value rises through zero for the last time.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def last_rise(time: Floats, value: Floats) -> float:
     Returns
     -------
     float
-        s, interpolated; the first time where it is never below, the last where it is so at the end.
+        s, interpolated; the first time if the value is never below zero, the last if it is below zero at the end.
     """
     below = np.flatnonzero(value < 0.0)
     if not len(below):
@@ -77,13 +78,13 @@ def last_rise(time: Floats, value: Floats) -> float:
 
 
 def settling(time: Floats, share: Floats) -> float:
-    """Return from when on a response stays within `SETTLED` of where it goes, s.
+    """Return the time, s, from which a response stays within `SETTLED` of its end.
 
     Parameters
     ----------
     time : ndarray
         (n,) s.
     share : ndarray
-        (n,) of the way.
+        (n,) of the way, 0 before and 1 after.
     """
     return last_rise(time, SETTLED - np.abs(share - 1.0))

@@ -1,4 +1,4 @@
-"""Names for the arrays that pass between rooms."""
+"""Names of the array types that the packages exchange."""
 
 from __future__ import annotations
 
@@ -11,4 +11,4 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 Image = NDArray[Any]
-"""Bytes, (height, width, channels); OpenCV's type hints do not know ``uint8`` arrays."""
+"""8-bit picture, (height, width, channels); OpenCV's type hints have no ``uint8`` arrays."""

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+from collections.abc import Iterable
 
 from anglecam.effects.effect import Effect, Knots, Parameter
 
-__all__ = ["LEDGER", "Effect", "Knots", "Parameter", "effect"]
+__all__ = ["LEDGER", "Effect", "Knots", "Parameter", "effect", "ledger_of"]
 
 
-def _collect() -> tuple[Effect, ...]:
-    modules = (importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__))
+def ledger_of(modules: Iterable[object]) -> tuple[Effect, ...]:
+    """Return the effects that some modules define as ``EFFECT``, in the order of their ids."""
     return tuple(sorted((m.EFFECT for m in modules if hasattr(m, "EFFECT")), key=lambda e: e.id))
 
 
-LEDGER: tuple[Effect, ...] = _collect()
-"""All effects in the order of their ids."""
+LEDGER: tuple[Effect, ...] = ledger_of(
+    importlib.import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__)
+)
+"""All effects of this package, in the order of their ids."""
 
 
 def effect(effect_id: str) -> Effect:

@@ -1,4 +1,4 @@
-"""Angle drift: the measured angle creeps linearly, as where the camera sags on its stand.
+"""Angle drift: the measured angle drifts linearly, for example because the camera sags on its stand.
 
     y = θ + d·(t − t_1)
 
@@ -21,12 +21,12 @@ def _observe(time: Floats, angle: Floats, parameters: Floats, view: View) -> Flo
 EFFECT = Effect(
     id="angle_drift",
     station="camera",
-    summary="The measured angle creeps at a steady rate that no torque explains.",
+    summary="The measured angle drifts at a steady rate that no torque explains.",
     equation="y = θ + d·t",
     relaxes="Fig. 7: the camera stands still",
     parameters=(Parameter("drift_deg_per_s", "d", 0.0, -0.1, 0.1, (0.002, -0.002), math.degrees(1.0)),),
     aliases=("constant_torque",),
-    separating_experiment="a minute of rest, with something in the picture that is fixed to the ground",
+    separating_experiment="a minute of rest, with an object in the picture that is fixed to the ground",
     source="JCGM 100:2008, F.2.4",
     observation=_observe,
 )

@@ -1,8 +1,8 @@
-"""Backlash: play between command and load; the load is moved by contact with one flank or the other.
+"""Backlash: play between command and load. Contact with one flank or the other moves the load.
 
-    v follows u as a shaft follows a key that is 2·w narrower than its way
+    v = P_w[u]: |u − v| ≤ w, and v moves only where u pushes it      (play operator of half-width w)
 
-The paper's gears and joints are exact; its bearings take 5° of misalignment, and its linkage has four joints.
+The paper takes gears and joints for exact. Its bearings accept 5° of misalignment, and its linkage has four joints.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Knots, Parameter
 
 
-def _play(asked: Knots, parameters: Floats) -> Knots:
-    """Follow with play, beginning in its middle; the instants of contact are exact."""
+def _play(given: Knots, parameters: Floats) -> Knots:
+    """Follow the command with play, starting in the middle of it; the instants of contact are exact."""
     width = parameters[0]
-    return asked if width <= 0.0 else Knots(*_follow(asked.time, asked.level, asked.slope, width))
+    return given if width <= 0.0 else Knots(*_follow(given.time, given.level, given.slope, width))
 
 
 @njit(nogil=True)
@@ -44,7 +44,7 @@ def _follow(time: Floats, level: Floats, slope: Floats, width: float) -> tuple[F
 EFFECT = Effect(
     id="backlash",
     station="actuator",
-    summary="Between servo and head there is play, so that the head stays behind whenever the command turns round.",
+    summary="There is play between servo and body, so that the body lags behind whenever the command reverses.",
     equation="θ̈ = c·P_w[u] − a·θ̇ − b·θ with the play operator P_w",
     relaxes="Eqs. (3), (9): gears and joints are exact",
     parameters=(
@@ -52,8 +52,8 @@ EFFECT = Effect(
     ),
     aliases=("dead_zone", "coulomb_friction"),
     separating_experiment=(
-        "a slow triangle, then steps up only and steps down only to the same levels: with play the head stands at two"
-        " places for one command, by the way it came"
+        "a slow triangle, then steps up only and steps down only to the same levels: with play the body rests at two"
+        " angles for one command, depending on the direction it came from"
     ),
     source="Nordin, Gutman, Automatica 38(10), 2002",
     rank=2,

@@ -1,10 +1,10 @@
-"""Camera tilt: the plane of motion is seen at a slant.
+"""Camera tilt: the camera sees the plane of motion at a slant.
 
     arm = (cos(λ − α), sin(λ − α)·cos φ − h·sin φ),   y = α + ∠arm − the same at θ = 0,   λ = λ0 + θ
 
-The camera is turned by φ about an axis at α: what lies across it is shortened, and a mark that stands before the plane
-of motion, by h lever arms, is shifted across it against the mouth. The paper's camera is square to the plane, Fig. 7.
-What perspective adds is smaller by the lever over the distance.
+The camera is turned by φ about an axis at α. Lengths across that axis are shortened, and a shaft mark that lies h lever
+arms before the plane of motion is displaced across it against the mark on the body. The paper's camera is square to the
+plane, Fig. 7. Perspective adds less, by the ratio of lever arm to distance.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ def _observe(time: Floats, angle: Floats, parameters: Floats, view: View) -> Flo
     tilt, axis, height = parameters
 
     def off(line: Floats) -> Floats:
-        """Turn of the seen line against the true one; it has no step where the line turns over."""
+        """Return the turn of the seen line against the true line; it has no jump where the line turns over."""
         along, across = np.cos(line - axis), np.sin(line - axis)
         seen = across * math.cos(tilt) - height * math.sin(tilt)
         return np.arctan2(along * seen - across * along, along * along + across * seen)
@@ -37,7 +37,7 @@ def _needs(view: View) -> bool:
 EFFECT = Effect(
     id="camera_tilt",
     station="camera",
-    summary="The camera looks at the plane of motion from the side, which makes some angles seem smaller than others.",
+    summary="The camera looks at the plane of motion at a slant, which makes some angles appear smaller than others.",
     equation="tan(y − α) = tan(λ − α)·cos φ − h·sin φ/cos(λ − α)",
     relaxes="Fig. 7: the camera is square to the plane of motion",
     parameters=(

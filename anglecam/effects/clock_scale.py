@@ -2,8 +2,8 @@
 
     u arrives at (1 + ε)·t on the clip's clock
 
-The paper takes frame number over frame rate for time; a camera's nominal rate may be off by parts in a thousand, and
-counts of dropped frames by more. What the clip's own clock makes of a, b and c is in a, b and c.
+The paper takes frame number over frame rate for time. A camera's nominal rate may be wrong by parts in a thousand, and
+counts of frames, where some were dropped, by more. The scale of the clip's clock itself is contained in a, b and c.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Knots, Parameter
 
 
-def _stretch(asked: Knots, parameters: Floats) -> Knots:
+def _stretch(given: Knots, parameters: Floats) -> Knots:
     scale = 1.0 + parameters[0]
-    return Knots(asked.time * scale, asked.level, asked.slope / scale)
+    return Knots(given.time * scale, given.level, given.slope / scale)
 
 
 EFFECT = Effect(

@@ -1,10 +1,10 @@
-"""Constant torque: the spring does not quite carry the head.
+"""Constant torque: the spring does not balance the weight exactly.
 
     θ̈ = c·u − a·θ̇ − b·θ + T
 
 The paper's spring balances gravity exactly at neutral, Eqs. (23) and (24), though its steady states were "off by about
-4°". Where b > 0 the same is done by a wrong zero of the angle, which every recording has of its own unless neutral is
-declared: only then, or without stiffness, can it be told.
+4°". If b > 0, a wrong zero of the angle has the same effect, and the zero is a nuisance parameter of every recording
+unless neutral is declared. The torque can be determined only if neutral is declared or there is no stiffness.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def _load(theta: float, omega: float, parameters: Values) -> float:
 EFFECT = Effect(
     id="constant_torque",
     station="load",
-    summary="A steady torque pulls the head away from where it should rest.",
+    summary="A constant torque holds the body away from the angle at which it should rest.",
     equation="θ̈ = c·u − a·θ̇ − b·θ + T",
     relaxes="Eqs. (23), (24): the spring balances gravity exactly at neutral",
     parameters=(
@@ -40,7 +40,7 @@ EFFECT = Effect(
         ),
     ),
     aliases=("coulomb_friction",),
-    separating_experiment="a rest without power, where only spring and weight hold the head",
+    separating_experiment="a rest without power, where only spring and weight hold the body",
     source="the paper, Remarks on Fig. 14",
     load=_load,
 )

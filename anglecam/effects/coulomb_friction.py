@@ -1,10 +1,10 @@
 """Dry friction: the sleeve bearings oppose motion with a torque that does not depend on speed.
 
     θ̈ = c·u − a·θ̇ − b·θ − F·sgn θ̇                  while sliding, F ± D for the two directions
-    θ̇ = 0      while |c·u − b·θ| ≤ max(F + B, F ± D)      the head sticks, and more than sliding takes breaks it away
-    F ± D + (B ∓ D)·exp(−(θ̇/ω_s)²)                        in place of F ± D: Stribeck's curve from one to the other
+    θ̇ = 0      while |c·u − b·θ| ≤ max(F + B, F ± D)      the load sticks until a larger torque breaks it away
+    F ± D + (B ∓ D)·exp(−(θ̇/ω_s)²)                        in place of F ± D: Stribeck's curve from break-away
 
-F, D and B are torques divided by the moment of inertia; with ω_s = 0 friction falls at once. The
+F, D and B are torques divided by the moment of inertia. With ω_s = 0 friction falls to the sliding level at once. The
 paper's damping is a lubricant film alone, Eqs. (19)–(22).
 """
 
@@ -29,7 +29,7 @@ def _friction(parameters: Values) -> tuple[float, float, float, float]:
 EFFECT = Effect(
     id="coulomb_friction",
     station="load",
-    summary="Dry friction opposes motion with a torque that does not depend on speed, and holds the head near rest.",
+    summary="Dry friction opposes motion with a torque that does not depend on speed, and holds the body near rest.",
     equation=(
         "θ̈ = c·u − a·θ̇ − b·θ − (F ± D)·sgn θ̇, F + B below speeds of about ω_s; "
         "θ̇ = 0 while |c·u − b·θ| ≤ max(F + B, F ± D)"

@@ -1,4 +1,4 @@
-"""Damping asymmetry: moving one way the bearings resist a little more than moving the other way, the faster the more.
+"""Damping asymmetry: the bearings resist motion in one direction more than in the other, in proportion to speed.
 
     θ̈ = c·u − a·θ̇ − b·θ − e·|θ̇|,   that is a + e upward and a − e downward
 
@@ -20,7 +20,7 @@ def _load(theta: float, omega: float, parameters: Values) -> float:
 EFFECT = Effect(
     id="damping_asymmetry",
     station="load",
-    summary="Moving one way the bearings resist more than moving the other way, the faster the more.",
+    summary="The bearings resist motion in one direction more than in the other, in proportion to speed.",
     equation="θ̈ = c·u − a·θ̇ − b·θ − e·|θ̇|",
     relaxes="Eq. (22): damping is the same in both directions",
     parameters=(Parameter("difference_per_s", "e", 0.0, -100.0, 100.0, (0.2, -0.2, 2.0, -2.0)),),

@@ -2,8 +2,8 @@
 
     c·dz(u − (b/c)·θ) in place of c·u − b·θ,   dz(e) = sgn(e)·max(|e| − w, 0)
 
-The paper's controller resolves 8 bits, Table 2, and its servo every error, Eq. (5). All of b is taken for the servo's
-position feedback here.
+The paper's controller resolves 8 bits, Table 2, and its servo resolves every error, Eq. (5). Here all of b is
+attributed to the servo's position feedback.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ EFFECT = Effect(
     relaxes="Eq. (5), Table 2: the servo resolves every command",
     parameters=(Parameter("threshold_deg", "w", 0.0, 0.0, math.radians(15.0), (0.003, 0.01, 0.03), math.degrees(1.0)),),
     aliases=("backlash", "coulomb_friction"),
-    separating_experiment="small steps about one level, from above and below: in a dead zone the head stands anywhere",
+    separating_experiment="small steps around one level, from both sides: in a dead zone the body rests at any angle",
     source="Tao, Kokotović, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, 1996",
     servo=_servo,
 )

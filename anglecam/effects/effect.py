@@ -1,15 +1,16 @@
-"""What an entry of the ledger says: one effect that a model of the form θ̈ = c·u − a·θ̇ − b·θ can lack.
+"""The form of an entry of the ledger: one effect that a model of the form θ̈ = c·u − a·θ̇ − b·θ can lack.
 
-An effect belongs to one station of the signal's path, command → actuator → load → camera, and changes one thing
-there through one *port*. Its parameters at their null leave the model exactly as it was.
+An effect belongs to one station of the signal's path, command → actuator → load → camera, and changes one thing there
+through one *port*. With its parameters at their null values the model is exactly the model without the effect.
 
-    command   what arrives:          u(t) → v(t), straight lines in, straight lines out
-    lag       how late it arrives:   τ·v̇ = u − v
-    servo     what torque comes of it:   c·v − b·θ → another torque
-    load      what the head's motion adds
-    dry       what holds it
-    when      when the camera saw what it shows
-    seen      what the camera makes of the angle
+    command       the command that arrives: u(t) → v(t), piecewise linear in and out
+    lag           first-order delay of the drive: τ·v̇ = u − v
+    servo         torque of servo and springs: c·v − b·θ → another torque
+    load          acceleration added, a function of angle and rate
+    friction      levels of dry friction
+    dynamics      acceleration added by something with additional states, and the derivatives of those states
+    timing        the instant at which the camera recorded what a frame shows
+    observation   the angle that the camera measures, a function of the true angle
 """
 
 from __future__ import annotations
@@ -26,21 +27,23 @@ from anglecam.data.camera_evidence import View
 from anglecam.data.typing import Floats
 
 Values = tuple[float, ...]
-"""Parameters as compiled functions take them: arrays would cost them more than what they work out."""
+"""Parameters as compiled functions take them. Reading them from an array would cost more than the evaluation."""
 
-PORTS = ("command", "lag", "servo", "load", "friction", "timing", "observation")
+PORTS = ("command", "lag", "servo", "load", "friction", "dynamics", "timing", "observation")
+UNIT_WORDS = ("deg", "rad", "s", "s2", "px", "per")
+"""Words that the unit at the end of a parameter's name is made of."""
 
 
 @dataclass(frozen=True)
 class Knots:
-    """An angle made of straight lines; arrays of length m. Before the first knot its level holds."""
+    """A piecewise linear angle; arrays of length m. Before the first knot its level holds."""
 
     time: Floats
     """s, ascending."""
     level: Floats
-    """At each knot, rad."""
+    """Angle at each knot, rad."""
     slope: Floats
-    """From there to the next, rad/s."""
+    """Slope from each knot to the next, rad/s."""
 
 
 @dataclass(frozen=True)
@@ -48,30 +51,41 @@ class Parameter:
     """One number of an effect."""
 
     name: str
-    """As in result files, with its unit there (``tau_s``)."""
+    """Name in result files; it ends in the unit used there (``tau_s``)."""
     symbol: str
-    """As in the effect's equation."""
+    """Symbol in the effect's equation."""
     null: float
     """The value at which the effect is absent, SI."""
     lower: float
+    """Lower bound, SI."""
     upper: float
+    """Upper bound, SI."""
     starts: tuple[float, ...]
-    """Values to start a fit from, SI; more than one where the fit may have several valleys."""
+    """Starting values of a fit, SI; several where the cost may have several minima."""
     to_file: float = 1.0
     """Factor from SI to the unit in ``name``."""
     inverse: bool = False
-    """Whether files state its reciprocal: of a limit, which is absent at 0."""
+    """Whether files state the reciprocal: for a limit, which is absent at 0."""
     circular: bool = False
     """Whether it is a direction, which files state between −180° and 180°."""
     staged: bool = False
-    """Whether it is left out, which must be the same as 0, until the data ask for it; such parameters come last."""
+    """Whether it is fitted only if the data justify it after the other parameters. Omitting it must be the same as 0;
+    staged parameters come last."""
     mimics_zero_offset: bool = False
-    """Whether it moves the head as a wrong zero of the angle does, so that it can be told only where zero is known."""
+    """Whether it moves the body as a wrong zero of the angle does, so that it is determined only if zero is known."""
     is_speed: bool = False
-    """Whether it is a speed of the head, which recordings that are much slower cannot tell."""
+    """Whether it is a speed of the body, which much slower recordings cannot determine."""
+
+    @property
+    def unit(self) -> str:
+        """Unit in files, parsed from the name: ``friction_deg_per_s2`` → ``deg/s2``; empty for a pure number."""
+        words = self.name.split("_")
+        first = next(i for i in range(1, len(words) + 1) if all(word in UNIT_WORDS for word in words[i:]))
+        unit = ["1", *words[first:]] if words[first:][:1] == ["per"] else words[first:]
+        return " ".join(unit).replace(" per ", "/")
 
     def in_file_unit(self, value: float, sigma: float = 0.0) -> tuple[float, float]:
-        """Return value and standard uncertainty in the unit in ``name``; infinite for a limit that is absent."""
+        """Convert a value and its standard uncertainty from SI to the unit in files; an absent limit is infinite."""
         if self.circular:
             value = math.remainder(value, math.tau)
         if not self.inverse:
@@ -86,62 +100,76 @@ class Effect:
     """One entry of the ledger. Exactly one of the ports is filled."""
 
     id: str
+    """Identifier in files."""
     station: str
-    """Where on the signal's path: ``command``, ``actuator``, ``load`` or ``camera``."""
+    """Place on the signal's path: ``command``, ``actuator``, ``load`` or ``camera``."""
     summary: str
     """What happens, in a sentence that a student understands."""
     equation: str
+    """The equation with the effect, in the symbols of its parameters."""
     relaxes: str
-    """Which assumption of the paper it lifts, and where the paper makes it."""
+    """The assumption of the paper that the effect relaxes, and where the paper makes it."""
     parameters: tuple[Parameter, ...]
     """The first is the effect's size; the others shape it."""
     aliases: tuple[str, ...]
-    """Whom it can be mistaken for."""
+    """Ids of the effects that it can be mistaken for."""
     separating_experiment: str
-    """What to record next to tell it from its aliases."""
+    """The recording to make next to distinguish it from its aliases."""
     source: str
+    """Literature."""
     fixed: tuple[tuple[int, float], ...] = ()
-    """Places, ascending, and values, SI, of parameters that are not fitted: they are known, or cannot be."""
+    """Positions, ascending, and values, SI, of parameters that are not fitted: known, or not identifiable."""
     rank: int = 0
-    """Place among the effects of the same port, on the signal's way."""
+    """Position among the effects of the same port, along the signal's path."""
+    states: int = 0
+    """Number of states that the effect adds to angle and rate. Only the ports ``lag`` (one state, solved in closed
+    form) and ``dynamics`` add any."""
     command: Callable[[Knots, Floats], Knots] | None = field(default=None, repr=False)
-    """What is asked for, and parameters → what arrives."""
+    """(command given, parameters) → command that arrives."""
     lag: Callable[[Floats], float] | None = field(default=None, repr=False)
     """Parameters → τ, s."""
     servo: Any = field(default=None, repr=False)
-    """Compiled (torque, θ, abc, parameters) → torque of servo and springs, rad/s²; given c·v − b·θ or what another
-    effect has made of it."""
+    """Compiled (torque, θ, abc, parameters) → torque of servo and springs, rad/s². Its first argument is c·v − b·θ, or
+    the result of the servo effect before it."""
     load: Any = field(default=None, repr=False)
     """Compiled (θ, ω, parameters) → angular acceleration added, rad/s²."""
     friction: Any = field(default=None, repr=False)
-    """Compiled (parameters) → (sliding up, sliding down, breaking away if more, Stribeck's speed): rad/s² and rad/s;
-    opposes motion."""
+    """Compiled (parameters) → levels while sliding up and sliding down, break-away level if higher (rad/s²), Stribeck
+    speed (rad/s); opposes motion."""
+    dynamics: Any = field(default=None, repr=False)
+    """Compiled (θ, ω, v, abc, states, parameters) → (derivatives of the states, angular acceleration added in rad/s²).
+    v is the command at the drive, rad, and abc is a, b, c. ``states`` and the derivatives are tuples of `states`
+    numbers. The integrator steps by at most 2 ms, so rates of the states must stay below 1000/s, and it does not call
+    the function of an effect that is not in the plant."""
+    initial: Any = field(default=None, repr=False)
+    """Compiled (θ, ω, v, abc, parameters) → tuple of the states at a recording's first frame, for ``dynamics``; zeros
+    where it is ``None``."""
     timing: Callable[[Floats, Floats, Floats, View], Floats] | None = field(default=None, repr=False)
-    """(stamps s, angle rad, parameters, view) → when what the frames show happened, s."""
+    """(frame times s, angle rad, parameters, view) → instants at which what the frames show happened, s."""
     observation: Callable[[Floats, Floats, Floats, View], Floats] | None = field(default=None, repr=False)
-    """(stamps s, angle rad, parameters, view) → the angle that is measured, rad."""
+    """(frame times s, angle rad, parameters, view) → the angle that is measured, rad."""
     needs: Callable[[View], bool] = field(default=lambda view: True, repr=False)
-    """Whether a view tells what the effect is reckoned from."""
+    """Whether a view contains what the effect is computed from."""
 
     def with_fixed(self, values: Mapping[str, float]) -> Effect:
-        """Return the effect with some parameters fixed: ``values`` by name, SI; itself where none is its own."""
-        own = tuple((i, values[p.name]) for i, p in enumerate(self.parameters) if p.name in values)
-        if not own:
+        """Return the effect with some parameters fixed: ``values`` by name, SI; itself if none of them is named."""
+        fixed = tuple((i, values[p.name]) for i, p in enumerate(self.parameters) if p.name in values)
+        if not fixed:
             return self
-        return replace(self, parameters=tuple(p for p in self.parameters if p.name not in values), fixed=own)
+        return replace(self, parameters=tuple(p for p in self.parameters if p.name not in values), fixed=fixed)
 
-    def complete(self, own: Floats) -> Floats:
-        """Put the parameters that are `fixed` among the (k,) fitted ones."""
+    def complete(self, fitted: Floats) -> Floats:
+        """Insert the `fixed` parameters among the (k,) fitted parameters."""
         for place, value in self.fixed:
-            own = np.insert(own, place, value)
-        return own
+            fitted = np.insert(fitted, place, value)
+        return fitted
 
     @property
     def null(self) -> Floats:
-        """Parameter values at which the effect is absent."""
+        """Parameter values at which the effect is absent, SI."""
         return np.array([p.null for p in self.parameters])
 
     @cached_property
     def port(self) -> str:
-        """The one that is filled."""
+        """Name of the port that is filled."""
         return next(f.name for f in fields(self) if f.name in PORTS and getattr(self, f.name) is not None)

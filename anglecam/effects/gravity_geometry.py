@@ -1,9 +1,9 @@
-"""Gravity's geometry: the weight's moment goes with the sine of the angle, not with the angle.
+"""Gravity's geometry: the moment of the weight is proportional to the sine of the angle, not to the angle.
 
     θ̈ = c·u − a·θ̇ − b·θ + G·(sin(θ0 + θ) − sin θ0 − θ·cos θ0),   G = M_h·g·L/J
 
-The paper expands the sine about neutral and keeps the first term, Eq. (25). θ0 is the centre of mass from upright at
-neutral; with θ0 near 0 or 180° this is a cubic, which a spring can be as well.
+The paper expands the sine about neutral and keeps the first term, Eq. (25). θ0 is the angle of the centre of mass from
+upright at neutral. With θ0 near 0 or 180° the effect is a cubic torque, which a spring can have as well.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ def _load(theta: float, omega: float, parameters: Values) -> float:
 EFFECT = Effect(
     id="gravity_geometry",
     station="load",
-    summary="The weight pulls with the sine of the angle, which at large angles is not the angle.",
+    summary="The moment of the weight follows the sine of the angle, which at large angles differs from the angle.",
     equation="θ̈ = c·u − a·θ̇ − b·θ + G·(sin(θ0 + θ) − sin θ0 − θ·cos θ0)",
     relaxes="Eq. (25): small angles about neutral",
     parameters=(
-        # a weight pulls down: G below zero at θ0 would be G above zero at θ0 + 180°
+        # weight acts downwards: G < 0 at θ0 would be G > 0 at θ0 + 180°
         Parameter("gravity_deg_per_s2", "G", 0.0, 0.0, 2000.0, (30.0, 150.0), math.degrees(1.0)),
         Parameter(
             "gravity_deg",

@@ -1,9 +1,9 @@
-"""Lens distortion: the picture is drawn out or in towards its edges.
+"""Lens distortion: the scale of the picture grows or shrinks towards its edges.
 
     p′ = m + (p − m)·(1 + κ·|p − m|²/R²)
 
-m is the middle of the picture and κ = k1·(R/f)². The paper names "image distortion, and optical aberration" as errors
-and leaves them out.
+m is the middle of the picture, R the lever arm and κ = k1·(R/f)². The paper names "image distortion, and optical
+aberration" as errors and neglects them.
 """
 
 from __future__ import annotations
@@ -17,36 +17,36 @@ from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter
 
 ROUNDS = 8
-"""Steps in which the picture is undone; each leaves a share of the error that is as large as the distortion itself."""
-LEAST = 0.3
-"""A lens does not draw a picture in by more."""
+"""Fixed-point iterations that invert the distortion; each multiplies the error by the size of the distortion."""
+MIN_SCALE = 0.3
+"""Smallest local scale that a lens produces; it keeps the iteration finite."""
 
 
 def _observe(time: Floats, angle: Floats, parameters: Floats, view: View) -> Floats:
     lever, pivot = view.lever_px or 1.0, view.pivot_px or (0.0, 0.0)
-    # ahead and up from the middle of the picture, in lever arms
+    # pivot from the middle of the picture, ahead and up, in lever arms
     side = -1.0 if view.mirrored else 1.0
     shown = np.array([side * pivot[0], -pivot[1]]) / lever
-    centre, neutral = _undone(shown, view.neutral, parameters[0])
+    centre, neutral = _undistorted(shown, view.neutral, parameters[0])
 
-    def filmed(place: Floats) -> Floats:
+    def distorted(place: Floats) -> Floats:
         return place * (1.0 + parameters[0] * (place**2).sum(axis=-1, keepdims=True))
 
     def line(turned: Floats) -> Floats:
         arm = np.stack([np.cos(turned), np.sin(turned)], axis=-1)
-        seen = filmed(centre + arm) - filmed(centre)
+        seen = distorted(centre + arm) - distorted(centre)
         cross, dot = arm[..., 0] * seen[..., 1] - arm[..., 1] * seen[..., 0], (arm * seen).sum(axis=-1)
         return np.arctan2(cross, dot)
 
     return angle + line(neutral + angle) - line(np.asarray(neutral))
 
 
-def _undone(shown: Floats, neutral: float, kappa: float) -> tuple[Floats, float]:
-    """Return where the pivot is, in true lever arms, and the true neutral, of what the picture shows of both."""
+def _undistorted(shown: Floats, neutral: float, kappa: float) -> tuple[Floats, float]:
+    """Return the true pivot, in true lever arms, and the true neutral direction, from those in the picture."""
     places = np.stack([shown, shown + [math.cos(neutral), math.sin(neutral)]])
     true, lever = places, 1.0
     for _ in range(ROUNDS):
-        true = places / np.maximum(1.0 + kappa * (true**2).sum(axis=1, keepdims=True) / lever**2, LEAST)
+        true = places / np.maximum(1.0 + kappa * (true**2).sum(axis=1, keepdims=True) / lever**2, MIN_SCALE)
         arm = true[1] - true[0]
         lever = math.hypot(*arm)
     return true[0] / lever, math.atan2(arm[1], arm[0])
@@ -59,7 +59,7 @@ def _needs(view: View) -> bool:
 EFFECT = Effect(
     id="lens_distortion",
     station="camera",
-    summary="The lens draws the picture out or in towards its edges, and angles with it.",
+    summary="The lens stretches or compresses the picture towards its edges, and with it the angles.",
     equation="p′ = p·(1 + κ·|p|²/R²) about the middle of the picture, κ = k1·(R/f)²",
     relaxes='"image distortion, and optical aberration" are left out',
     parameters=(Parameter("distortion_at_lever", "κ", null=0.0, lower=-0.3, upper=0.3, starts=(0.01, -0.01)),),

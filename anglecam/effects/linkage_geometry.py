@@ -1,10 +1,10 @@
-"""Linkage geometry: the four-bar's own ratio between servo and head in place of a constant.
+"""Linkage geometry: the four-bar's angle-dependent ratio between servo and head in place of a constant.
 
     θ̈ = φ′(θ)·(c·u − b·φ(θ)) − a·θ̇,   φ = θ + A·(φ4(θ) − θ)
 
-φ4 is the crank's angle as the head angle that it would mean if γ were constant, φ4(0) = 0 and φ4′(0) = 1, and by
-virtual work the servo's torque reaches the head with the lever φ′. A is 1 for the paper's links, 0 for the constant γ
-of Eq. (3). All of b is taken for the servo's position feedback.
+φ4(θ) is the crank's angle, divided by the ratio at neutral: the head angle that it would mean if γ were constant, with
+φ4(0) = 0 and φ4′(0) = 1. By virtual work the servo's torque reaches the head with the lever φ′. A is 1 for the paper's
+links and 0 for the constant γ of Eq. (3). All of b is attributed to the servo's position feedback.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def _servo(torque: float, theta: float, abc: Values, parameters: Values) -> floa
     amount = parameters[0]
     if amount == 0.0:
         return torque
-    # beyond the reach of the links the last ratio holds: a trial of the fit may go there
+    # beyond the reach of the links the last ratio holds: a trial step of the fit may go there
     inside = min(max(theta, _GRID[0]), _GRID[-1])
     place = (inside - _GRID[0]) / _SPACING
     i = min(int(place), len(_GRID) - 2)
@@ -46,12 +46,12 @@ def _servo(torque: float, theta: float, abc: Values, parameters: Values) -> floa
 EFFECT = Effect(
     id="linkage_geometry",
     station="load",
-    summary="The linkage turns the servo's motion into the head's with a ratio that changes with the angle.",
+    summary="The linkage transmits the servo's motion to the body with a ratio that changes with the angle.",
     equation="θ̈ = φ′(θ)·(c·u − b·φ(θ)) − a·θ̇, φ = θ + A·(φ4(θ) − θ) with the four-bar's φ4",
     relaxes="Eq. (3), Fig. 4: γ is constant",
     parameters=(Parameter("share_of_four_bar", "A", null=0.0, lower=-0.5, upper=1.5, starts=(0.3, 1.0)),),
     aliases=("stiffening_spring", "gravity_geometry"),
-    separating_experiment="slow stairs over the whole range: at rest the linkage shows in where each step ends",
+    separating_experiment="slow stairs over the whole range: the linkage shows in the angle at which each step ends",
     source="the paper, Eqs. (1)-(3); anglecam.neck.transmission",
     rank=-1,
     servo=_servo,

@@ -1,4 +1,4 @@
-"""Quadratic drag: a resistance that grows with the square of speed, as of air on a large light head.
+"""Quadratic drag: a resistance that grows with the square of speed, for example of air on a large, light body.
 
     θ̈ = c·u − a·θ̇ − b·θ − q·θ̇·|θ̇|
 

@@ -1,8 +1,8 @@
-"""Rate limit: the effective command moves no faster than the servo lets it.
+"""Rate limit: the effective command moves no faster than the servo can follow.
 
-    |v̇| ≤ r, v → u as fast as that
+    |v̇| ≤ r;   v moves towards u at the rate r until it reaches u
 
-The paper's amplifier gives any voltage at any speed, Eq. (6); Fig. 12 has 6 V sag to 3.5 V.
+The paper's amplifier gives any voltage at any speed, Eq. (6); Fig. 12 shows 6 V sagging to 3.5 V.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Knots, Parameter
 
 
-def _limit(asked: Knots, parameters: Floats) -> Knots:
-    """Follow a staircase by ramps; a command that is no staircase is taken at its knots."""
-    return asked if parameters[0] <= 0.0 else Knots(*_follow(asked.time, asked.level, 1.0 / parameters[0]))
+def _limit(given: Knots, parameters: Floats) -> Knots:
+    """Follow a piecewise constant command by ramps; any other command is sampled at its knots."""
+    return given if parameters[0] <= 0.0 else Knots(*_follow(given.time, given.level, 1.0 / parameters[0]))
 
 
 @njit(nogil=True)
@@ -44,12 +44,12 @@ def _follow(time: Floats, level: Floats, rate: float) -> tuple[Floats, Floats, F
 EFFECT = Effect(
     id="rate_limit",
     station="command",
-    summary="The servo turns no faster than so many degrees a second, however far it is asked to go.",
+    summary="The servo turns no faster than a fixed number of degrees a second, however large the command.",
     equation="|v̇| ≤ r in θ̈ = c·v − a·θ̇ − b·θ",
     relaxes="Eq. (6): the amplifier gives any voltage at any speed",
     parameters=(Parameter("rate_deg_per_s", "r", 0.0, 0.0, 20.0, (0.02, 0.1, 0.5), math.degrees(1.0), inverse=True),),
     aliases=("torque_saturation", "actuator_lag"),
-    separating_experiment="steps of two heights, one at least three times the other: a limit stretches the larger only",
+    separating_experiment="steps of two heights, one at least three times the other: a limit slows only the larger",
     source="the paper, Fig. 12; HS-225MG data sheet: 0.11 s for 60°",
     rank=1,
     command=_limit,

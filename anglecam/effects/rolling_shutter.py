@@ -1,8 +1,8 @@
-"""Rolling shutter: the time of a row depends on its height, and so does the time at which the mouth was seen.
+"""Rolling shutter: each row of a frame has its own time, so the time of the mark depends on its height in the picture.
 
-    seen at t + s·(row − middle row),   row = row of the pivot − R·sin λ
+    recorded at t + s·(row − middle row),   row of the mark = row of the pivot − R·sin λ
 
-The paper takes the whole frame at one instant.
+The paper takes a whole frame for one instant.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def _needs(view: View) -> bool:
 EFFECT = Effect(
     id="rolling_shutter",
     station="camera",
-    summary="Each row of the picture is taken later than the one above, so that a mouth farther down is seen later.",
+    summary="Each row of the picture is exposed later than the row above, so that a mark lower down is recorded later.",
     equation="y(t) = θ(t + s·(row − middle))",
     relaxes="a frame is one instant",
     parameters=(Parameter("row_time_s", "s", null=0.0, lower=-2e-4, upper=2e-4, starts=(1e-5, -1e-5, 6e-5)),),

@@ -1,8 +1,8 @@
-"""Stiffening spring: its torque grows faster than the angle, or slower.
+"""Stiffening spring: the torque grows faster, or more slowly, than in proportion to the angle.
 
     θ̈ = c·u − a·θ̇ − b·θ − k3·θ³          k3 < 0 softens
 
-The paper takes the spring for linear in the angle, Eqs. (18a) and (25); its own Eqs. (17) and (18b) are not.
+The paper takes the spring for linear in the angle, Eqs. (18a) and (25); its Eqs. (17) and (18b) are not linear.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ def _load(theta: float, omega: float, parameters: Values) -> float:
 EFFECT = Effect(
     id="stiffening_spring",
     station="load",
-    summary="The spring becomes stiffer, or softer, the farther it is turned.",
+    summary="The spring becomes stiffer, or softer, with increasing angle.",
     equation="θ̈ = c·u − a·θ̇ − b·θ − k3·θ³",
     relaxes="Eqs. (18a), (25): the spring's torque is linear in the angle",
     parameters=(Parameter("k3_per_s2", "k3", null=0.0, lower=-1e5, upper=1e5, starts=(200.0, -200.0)),),

@@ -1,8 +1,8 @@
-"""Torque saturation: the servo's part of the torque has a limit.
+"""Torque saturation: the servo's share of the torque has a limit.
 
-    c·u − s·b·θ stays within ±T,   a share s of b being the servo's own and the rest a spring on the head
+    c·u − s·b·θ stays within ±T,   s being the servo's share of b and the rest a spring on the load
 
-The paper's amplifier is ideal, Eq. (6); Fig. 12 has 6 V sag to 3.5 V under load.
+The paper's amplifier is ideal, Eq. (6); Fig. 12 shows 6 V sagging to 3.5 V under load.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def _servo(torque: float, theta: float, abc: Values, parameters: Values) -> floa
 EFFECT = Effect(
     id="torque_saturation",
     station="actuator",
-    summary="The servo has a largest torque: what is asked beyond it is not given.",
+    summary="The servo has a maximum torque: demand beyond it is not met.",
     equation="|c·u − s·b·θ| ≤ T",
     relaxes="Eq. (6), Fig. 12: an ideal amplifier gives any voltage",
     parameters=(
@@ -34,7 +34,7 @@ EFFECT = Effect(
         Parameter("servo_share", "s", 1.0, 0.0, 1.0, (0.3,)),
     ),
     aliases=("rate_limit", "quadratic_drag"),
-    separating_experiment="steps of two heights, one at least three times the other: a limit slows the larger only",
+    separating_experiment="steps of two heights, one at least three times the other: a limit slows only the larger one",
     source="the paper, Fig. 12; HS-225MG data sheet: stall torque 0.47 N·m",
     rank=1,
     servo=_servo,

@@ -1,1 +1,1 @@
-"""From an angle series and its command to a model's parameters with their uncertainty."""
+"""Identification: from angle series and commands to a model's parameters with their uncertainty."""

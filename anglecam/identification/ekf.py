@@ -1,13 +1,13 @@
 """The paper's estimator: an extended Kalman filter on the state (θ, θ̇, a, b, c), iterated.
 
-One pass linearises about a running estimate that is still wrong, and what it took in then it never mends: from starts
-up to 80 % off its variance is two to eight times the Cramér–Rao bound (benchmarks/estimators.py). So the recordings are
-passed through again, and from then on the filter is linearised about a whole trajectory, that of the parameters and the
-smoothed initial states which the last pass ended with: the iterated extended Kalman smoother (Bell, SIAM J. Optim. 4,
-1994). Every pass begins with the initial variances anew, around what the last one ended with. So no measurement counts
-twice: the initial variance holds a pass back from leaping, as Levenberg and Marquardt do (Särkkä and Svensson, ICASSP
-2020), and where the passes settle it pulls nowhere. What they settle at is the minimum of output error with white
-noise.
+A single pass linearises about a running estimate that is still wrong, and it never corrects the errors of that
+linearisation: from starts up to 80 % off, its variance is two to eight times the Cramér–Rao bound
+(benchmarks/estimators.py). The filter is therefore passed through the recordings again. From the second pass on it is
+linearised about a whole trajectory, computed from the parameters and the smoothed initial states at the end of the pass
+before: the iterated extended Kalman smoother (Bell, SIAM J. Optim. 4, 1994). Every pass begins with the initial
+variances, centred on the result of the pass before, so no measurement counts twice. The initial variance limits the
+step of a pass, as the damping of Levenberg and Marquardt does (Särkkä and Svensson, ICASSP 2020), and it exerts no pull
+where the passes converge. They converge to the minimum of output error with white noise.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from anglecam.models.plant import Plant
 
 SETTLED = 1e-3
 """Passes end when no parameter moves by more than this share of its standard uncertainty."""
-HELD_BACK = 0.1
-"""Share to which the initial deviations of the parameters shrink when a pass ends with a worse fit."""
-WIDEST = 100.0
-"""Times their initial deviations that the parameters are given at last: what is stated of them is then the data's."""
+SHRINKAGE = 0.1
+"""Factor by which the initial standard deviations of the parameters shrink after a pass that ends with a worse fit."""
+FINAL_SPREAD = 100.0
+"""Multiple of the initial standard deviations in the last pass, so that the stated covariance comes from the data."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class EkfSettings:
     measurement_variance: float
     """r, rad²."""
     passes: int
-    """Times that the recordings are passed through at most."""
+    """Most passes through the recordings."""
     zero_variance: float = 0.0
-    """Of a recording's zero where it is not declared, rad²; 0 leaves the paper's five states."""
+    """Variance of a recording's zero where it is not declared, rad²; 0 keeps the paper's five states."""
 
 
 PAPER = EkfSettings((1000.0,) * 5, 0.001, 0.0001, 1)
@@ -53,18 +53,18 @@ PAPER = EkfSettings((1000.0,) * 5, 0.001, 0.0001, 1)
 
 @dataclass(frozen=True)
 class EkfEstimate:
-    """What the filter ends with."""
+    """Result of the filter."""
 
     parameters: Floats
     """(3,) a (1/s), b (1/s²), c (1/s²)."""
     covariance: Floats
     """(3, 3), SI."""
     filtered: tuple[Filtered, ...]
-    """The last pass, recording by recording; `anglecam.identification.smoothing.smooth` takes it."""
+    """The last pass, recording by recording; input of `anglecam.identification.smoothing.smooth`."""
     passes: int
     """Passes made."""
     settled: bool
-    """Whether the last of several moved nothing; also True where only one was asked for."""
+    """Whether the last of several passes changed nothing; also True if only one pass was requested."""
 
     @property
     def innovations(self) -> tuple[Floats, ...]:
@@ -73,12 +73,12 @@ class EkfEstimate:
 
     @property
     def normalised(self) -> tuple[Floats, ...]:
-        """The same divided by the filter's own standard deviation of it."""
+        """The innovations divided by the standard deviation that the filter predicts for them."""
         return tuple(one.normalised for one in self.filtered)
 
     @property
     def fitted(self) -> int:
-        """Unknowns that were fitted to the very data that the innovations are of: none in a single pass."""
+        """Number of unknowns fitted to the data that the innovations come from; 0 after a single pass."""
         if self.passes == 1:
             return 0
         nuisance = sum(int(np.sum(np.diag(one.covariance[0]) > 0.0)) - self.shared for one in self.filtered)
@@ -86,17 +86,17 @@ class EkfEstimate:
 
     @property
     def shared(self) -> int:
-        """Parameters with an uncertainty: 3, or 2 where nothing is driven."""
+        """Number of parameters with an uncertainty: 3, or 2 where no recording is driven."""
         return int(np.sum(np.diag(self.covariance) > 0.0))
 
 
 def settings_for(records: Sequence[Record], start: Floats, sigma: float) -> EkfSettings:
-    """Choose the tuning for recordings of noise ``sigma`` (rad): constant parameters, a start that may be far off.
+    """Return the tuning for constant parameters and a start that may be far off.
 
     Parameters
     ----------
     records : sequence of Record
-        What will be filtered.
+        Recordings to filter.
     start : (3,) ndarray
         a, b, c to start from.
     sigma : float
@@ -105,7 +105,7 @@ def settings_for(records: Sequence[Record], start: Floats, sigma: float) -> EkfS
     Returns
     -------
     EkfSettings
-        With Q = 0: the parameters do not drift, and what is stated of them is then a standard uncertainty.
+        With Q = 0: the parameters are constant, and their stated covariance is that of an estimate.
     """
     swing = max(float(np.ptp(r.angle)) for r in records)
     rate = swing * float(np.sqrt(abs(start[1])))
@@ -133,7 +133,7 @@ def fit_ekf(records: Sequence[Record], start: Floats, settings: EkfSettings) -> 
     Raises
     ------
     ValueError
-        Where more than one pass is asked for with process noise: the trajectory to linearise about is then no free run.
+        If several passes are requested with process noise: the trajectory to linearise about is then no free run.
     """
     if settings.passes > 1 and settings.process_variance > 0.0:
         raise ValueError("passes beyond the first need a process variance of 0")
@@ -142,7 +142,9 @@ def fit_ekf(records: Sequence[Record], start: Floats, settings: EkfSettings) -> 
     if not any(r.command is not None for r in records):
         parameters[2] = variance[4] = 0.0
     nuisance = [_first_state(record, settings) for record in records]
-    with np.errstate(over="ignore", invalid="ignore"):  # a pass may run away; its fit is then not finite and refused
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # a pass may diverge; its cost is then not finite and the pass is rejected
         passed = _pass(records, parameters, nuisance, variance, settings)
         if settings.passes == 1:
             return EkfEstimate(*_ended(passed), passed, 1, True)
@@ -157,20 +159,20 @@ def _iterated(
     settings: EkfSettings,
     passed: tuple[Filtered, ...],
 ) -> EkfEstimate:
-    """Pass again, each time about the trajectory of the best end so far, until nothing moves."""
+    """Repeat the pass, each time about the trajectory of the best result so far, until the parameters settle."""
     cost, trust, count = _cost(records, parameters, nuisance), 1.0, 1
     best, covariance = passed, np.diag(variance[SHARED])
     while True:
         ended, ended_covariance = _ended(passed)
-        ended_own = [np.delete(state, SHARED) for state in smooth_first_states(passed)]
-        ended_cost = _cost(records, ended, ended_own)
+        ended_nuisance = [np.delete(state, SHARED) for state in smooth_first_states(passed)]
+        ended_cost = _cost(records, ended, ended_nuisance)
         moved = np.abs(ended - parameters)
-        settled = trust == WIDEST and bool(np.all(moved <= SETTLED * np.sqrt(np.diag(ended_covariance))))
+        settled = trust == FINAL_SPREAD and bool(np.all(moved <= SETTLED * np.sqrt(np.diag(ended_covariance))))
         if settled or ended_cost <= cost:
-            best, parameters, covariance, nuisance, cost = passed, ended, ended_covariance, ended_own, ended_cost
-            trust = min(WIDEST, trust / HELD_BACK)
+            best, parameters, covariance, nuisance, cost = passed, ended, ended_covariance, ended_nuisance, ended_cost
+            trust = min(FINAL_SPREAD, trust / SHRINKAGE)
         else:
-            trust *= HELD_BACK
+            trust *= SHRINKAGE
         if settled or count == settings.passes:
             return EkfEstimate(parameters, covariance, best, count, settled)
         held = np.concatenate([variance[:2], trust**2 * variance[SHARED]])
@@ -187,7 +189,7 @@ def _pass(
     settings: EkfSettings,
     about: Sequence[Floats] | None = None,
 ) -> tuple[Filtered, ...]:
-    """Pass once through all recordings; each begins with the parameters that the one before ended with."""
+    """Pass once through all recordings; each begins with the parameters at the end of the recording before."""
     passed: list[Filtered] = []
     mean, covariance = parameters, np.diag(variance[SHARED])
     for i, record in enumerate(records):
@@ -219,7 +221,7 @@ def _free_run(record: Record, parameters: Floats, nuisance: Floats) -> Floats:
 
 
 def _cost(records: Sequence[Record], parameters: Floats, nuisance: Sequence[Floats]) -> float:
-    """Return the free run's sum of squared errors, rad²; infinite where it runs away."""
+    """Return the free run's sum of squared errors, rad²; infinite if it diverges."""
     total = 0.0
     for record, o in zip(records, nuisance, strict=True):
         run = _free_run(record, parameters, o)
@@ -228,7 +230,7 @@ def _cost(records: Sequence[Record], parameters: Floats, nuisance: Sequence[Floa
 
 
 def _first_state(record: Record, settings: EkfSettings) -> Floats:
-    """Begin a recording at its first angle: at rest if a command holds it there, at the first frames' rate if not."""
+    """Return a recording's first state: its first angle, at rest if it has a command, else the first frames' rate."""
     few = min(3, len(record.time))
     rate = 0.0 if record.command else np.polyfit(record.time[:few], record.angle[:few], 1)[0]
     nuisance = np.array([record.angle[0], rate])

@@ -2,9 +2,9 @@
 
     θ(s)/U(s) = num(s)/den(s),   highest power of s first
 
-Command U and angle θ are both of the head and in one unit, degrees in files, so the numbers are the same in radians.
-Parameters are those of the estimator, in the units that their names end in, with their whole covariance. A model at
-large angles goes out as its linearisation at neutral, Eq. (33), beside its physical parameters.
+Command U and angle θ refer to the same axis and have one unit, degrees in files, so the numbers also hold in radians.
+The parameters are those of the estimator, in the units that their names end in, with their full covariance. A model at
+large angles is exported as its linearisation at neutral, Eq. (33), together with its physical parameters.
 """
 
 from __future__ import annotations
@@ -30,29 +30,31 @@ if TYPE_CHECKING:
 
 
 SECOND_ORDER = ("a_per_s", "b_per_s2", "c_per_s2")
+"""Parameters of the second-order model, in the order of the transfer function's coefficients."""
 THIRD_ORDER = ("d2_per_s", "d1_per_s2", "d0_per_s3", "n2_per_s", "n1_per_s2", "n0_per_s3")
+"""Parameters of the third-order model, likewise."""
 
 
 @dataclass(frozen=True)
 class FittedModel:
-    """A model as it leaves anglecam."""
+    """A fitted model in the form in which it is exported."""
 
     name: str
-    """The estimator's, or what the model is called."""
+    """Id of the estimator, or another name of the model."""
     names: tuple[str, ...]
-    """Of the parameters; each ends in its unit."""
+    """Names of the parameters; each ends in its unit."""
     values: Floats
-    """(p,) in those units."""
+    """(p,) in the units of ``names``."""
     covariance: Floats
-    """(p, p) in their products; NaN where it is not known."""
+    """(p, p) in the products of those units; NaN where it is not known."""
     numerator: Floats
-    """Angle per command; highest power of s first, empty where nothing was commanded."""
+    """Numerator of angle per command, highest power of s first; empty where nothing was commanded."""
     denominator: Floats
-    """Likewise, its first coefficient 1."""
+    """Denominator, highest power of s first; its first coefficient is 1."""
 
     @property
     def linearised(self) -> bool:
-        """Whether the parameters are those of a model at large angles and the transfer function what is left of it."""
+        """Whether the parameters are those of a model at large angles, and the transfer function its linearisation."""
         return self.names[0] not in (SECOND_ORDER[0], THIRD_ORDER[0])
 
     @property
@@ -67,12 +69,12 @@ class FittedModel:
 
 
 def fitted_model(model: Identified) -> FittedModel:
-    """Take the model that `anglecam.identification.identify_records.identify_records` found.
+    """Return the exported form of an identified model.
 
     Parameters
     ----------
     model : Identified
-        Of second or third order, or of the neck at large angles.
+        From `anglecam.identification.identify_records.identify_records`, with any estimator.
 
     Returns
     -------
@@ -86,12 +88,12 @@ def fitted_model(model: Identified) -> FittedModel:
 
 
 def fitted_large_angle(model: LargeAngle, parameters: Floats, covariance: Floats) -> FittedModel:
-    """Take a model at large angles that output error has fitted.
+    """Return the exported form of a model at large angles that output error has fitted.
 
     Parameters
     ----------
     model : LargeAngle
-        What was fitted.
+        The fitted model.
     parameters : (p,) ndarray
         SI, in the order of ``model.names``.
     covariance : (p, p) ndarray
@@ -100,7 +102,7 @@ def fitted_large_angle(model: LargeAngle, parameters: Floats, covariance: Floats
     Returns
     -------
     FittedModel
-        With the transfer function that is left of it at neutral.
+        With the transfer function of its linearisation at neutral.
     """
     neck = model.neck_at(parameters)
     near = linearise(neck)
@@ -122,7 +124,7 @@ def read_model(path: Path) -> FittedModel:
     Parameters
     ----------
     path : Path
-        The file; one without ``covariance`` gives standard uncertainties without correlation.
+        The file. Without ``covariance`` in it, the parameters count as uncorrelated.
 
     Returns
     -------
@@ -132,18 +134,18 @@ def read_model(path: Path) -> FittedModel:
     Raises
     ------
     InputError
-        Naming the file and what is wrong with it.
+        Naming the file and the cause.
     """
     try:
-        told = read_json(path)
-        parameters = told["parameters"]
+        content = read_json(path)
+        parameters = content["parameters"]
         large = {q.name for q in QUANTITIES} >= set(parameters)
         order = tuple(parameters) if large else THIRD_ORDER if "d0_per_s3" in parameters else SECOND_ORDER
         names = tuple(name for name in order if parameters.get(name, {}).get("value") is not None)
         values = np.array([float(parameters[name]["value"]) for name in names])
-        covariance = _covariance(told.get("covariance"), parameters, names)
-        name = str(told.get("estimator", "model"))
-        transfer = told["transfer_function"] if large and names else None
+        covariance = _covariance(content.get("covariance"), parameters, names)
+        name = str(content.get("estimator", "model"))
+        transfer = content["transfer_function"] if large and names else None
         sides = transfer and [np.asarray(transfer[side], dtype=float) for side in ("numerator", "denominator")]
     except OSError as fault:
         raise InputError(f"{path}: cannot be read ({fault.strerror or fault})") from fault
@@ -152,17 +154,17 @@ def read_model(path: Path) -> FittedModel:
     if sides and np.isfinite(values).all():
         return FittedModel(f"{name} at neutral", names, values, covariance, *sides)
     if len(names) < 2 or not np.isfinite(values).all():
-        raise InputError(f"{path}: not a model.json of anglecam identify: no a_per_s and b_per_s2 in it")
+        raise InputError(f"{path}: not a model.json of anglecam identify: a_per_s and b_per_s2 are missing")
     return _by_names(name, names, values, covariance)
 
 
 def transfer_function(model: FittedModel) -> control.TransferFunction:
-    """Return a model as python-control has it.
+    """Return a model as a transfer function of python-control.
 
     Raises
     ------
     ValueError
-        Where nothing was commanded, so that nothing is known of the input.
+        If nothing was commanded, so that the input is unknown.
     """
     import control
 
@@ -170,14 +172,14 @@ def transfer_function(model: FittedModel) -> control.TransferFunction:
 
 
 def scipy_system(model: FittedModel) -> signal.TransferFunction:
-    """Return a model as scipy.signal has it; raises `ValueError` where nothing was commanded."""
+    """Return a model as a transfer function of scipy.signal; raises `ValueError` if nothing was commanded."""
     from scipy import signal
 
     return signal.TransferFunction(*_driven(model))
 
 
 def model_as_dict(model: FittedModel) -> dict[str, Any]:
-    """Return a model with its covariance, its transfer function and their units, for a JSON file."""
+    """Return a model with covariance, transfer function and units as the content of a JSON file."""
     parameters = zip(model.names, model.values, model.sigmas, strict=True)
     return {
         "model": model.name,
@@ -188,7 +190,7 @@ def model_as_dict(model: FittedModel) -> dict[str, Any]:
 
 
 def transfer_as_dict(model: FittedModel) -> dict[str, Any]:
-    """Return a model's transfer function for a JSON file; the numerator is empty where nothing was commanded."""
+    """Return a transfer function as the content of a JSON file; the numerator is empty if nothing was commanded."""
     return {
         "numerator": model.numerator,
         "denominator": model.denominator,
@@ -204,9 +206,9 @@ def write_mat(model: FittedModel, path: Path) -> None:
     Parameters
     ----------
     model : FittedModel
-        To write.
+        Model to write.
     path : Path
-        A ``.mat`` file, version 5; replaced if it is there.
+        A ``.mat`` file, version 5; an existing file is replaced.
     """
 
     def cells(texts: tuple[str, ...]) -> NDArray[np.object_]:
@@ -247,17 +249,17 @@ def unit_of(name: str) -> str:
 
 
 def _by_names(name: str, names: tuple[str, ...], values: Floats, covariance: Floats) -> FittedModel:
-    """Build the transfer function that the parameters' names tell of."""
+    """Return a model whose parameters' names determine the form of its transfer function."""
     half = 3 if names[0] == THIRD_ORDER[0] else 2
     return FittedModel(name, names, values, covariance, values[half:], np.array([1.0, *values[:half]]))
 
 
-def _covariance(told: dict[str, Any] | None, parameters: dict[str, Any], names: tuple[str, ...]) -> Floats:
-    """Return (p, p) in the order of ``names``, from the file's covariance or else its standard uncertainties."""
-    if told is None:
+def _covariance(stated: dict[str, Any] | None, parameters: dict[str, Any], names: tuple[str, ...]) -> Floats:
+    """Return (p, p) in the order of ``names``, from the file's covariance, else from its standard uncertainties."""
+    if stated is None:
         return np.diag([_number(parameters[name]["sigma"]) ** 2 for name in names])
-    at = [told["names"].index(name) for name in names]
-    whole = np.array([[_number(cell) for cell in row] for row in told["matrix"]]).reshape(len(told["names"]), -1)
+    at = [stated["names"].index(name) for name in names]
+    whole = np.array([[_number(cell) for cell in row] for row in stated["matrix"]]).reshape(len(stated["names"]), -1)
     return np.asarray(whole[np.ix_(at, at)], dtype=float)
 
 

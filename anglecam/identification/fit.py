@@ -1,6 +1,6 @@
-"""A fitted model: its parameters, what it leaves over, and how sure its parameters are.
+"""A fitted model: its parameters, its residuals, and the uncertainty of its parameters.
 
-What is left over is whitened as first-order autoregressive noise, so that a coloured residual does not count as so many
+Residuals are whitened as first-order autoregressive noise, so that correlated residuals do not count as as many
 independent observations. Ljung, System Identification, 2nd ed., 1999, sec. 9.4.
 """
 
@@ -20,9 +20,10 @@ from anglecam.identification.noise import autoregression
 from anglecam.models.model import Model
 
 CLUSTER_FRAMES = 15
-"""Frames; errors further apart than this count as independent."""
+"""Frames in a cluster of the cluster-robust covariance; errors further apart count as independent."""
 FARTHEST_BEYOND_BOUND = 100.0
-"""Standard deviations; a parameter that would lie further beyond its bound is as good as known to be on it."""
+"""Standard deviations. The mean of a parameter that would lie further beyond its bound is moved to this distance, at
+which the parameter is practically known to be on the bound."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +34,14 @@ class Fit:
     parameters: Floats
     """(p,) shared parameters, SI, in the order of ``model.names``."""
     nuisance: tuple[Floats, ...] = field(repr=False)
-    """Each recording's own unknowns: initial states, then the zero (rad) unless declared."""
+    """Nuisance parameters of each recording: initial states, then the zero (rad) unless it is declared."""
     residuals: tuple[Floats, ...] = field(repr=False)
     """Measured minus predicted angle of each recording, rad."""
     jacobian: Floats = field(repr=False)
-    """(N, p + Σ own) derivative of the whitened predictions, 1/σ left out."""
+    """(N, p + q) derivatives of the whitened predictions, not divided by σ, with respect to the p shared and all q
+    nuisance parameters."""
     phi: float
-    """Autocorrelation of the noise from frame to frame that the fit was whitened with."""
+    """AR(1) coefficient, frame to frame, of the noise model that the fit was whitened with."""
     white: Floats = field(repr=False)
     """(N,) whitened residuals of all recordings, rad."""
 
@@ -60,25 +62,25 @@ class Fit:
 
     @cached_property
     def sigma(self) -> Floats:
-        """(p,) standard uncertainties of ``parameters``, SI; NaN for one that a bound holds or that moves nothing.
+        """(p,) standard uncertainties of ``parameters``, SI; NaN at a bound and for a parameter without effect.
 
-        The larger of what noise that the whitening made white would give, and of what is left over itself gives if it
-        may hang together within `CLUSTER_FRAMES` frames: a measurement's errors follow the motion, and so does what a model's
-        equations round off (Liang and Zeger, Biometrika 73, 1986). What a bound holds is not known to be there: the
-        others are as unsure as it may be off the bound.
+        The larger of two estimates. The first takes the whitened residuals for white noise. The second is
+        cluster-robust: residuals may be correlated within `CLUSTER_FRAMES` frames, because errors of a measurement and
+        of a simplified model follow the motion (Liang and Zeger, Biometrika 73, 1986). A parameter at a bound is not
+        known to be there: the uncertainties of the others include its possible distance from the bound.
         """
         variance = np.maximum(np.diag(self.covariance), np.diag(self._covariance(self._clustered)))
         return np.sqrt(np.where(variance >= 0.0, variance, np.nan))
 
     @cached_property
     def covariance(self) -> Floats:
-        """(p, p) covariance of ``parameters``, SI, likewise; NaN for a parameter that cannot be told."""
+        """(p, p) covariance of ``parameters`` for white residuals, SI; NaN for a parameter not determined."""
         return self._covariance(lambda jacobian: jacobian)
 
     def autoregressive_covariance(self, records: Sequence[Record], phi: float) -> Floats:
-        """Return `covariance` for a fit without whitening whose noise is nevertheless AR(1) with φ = ``phi``.
+        """Return `covariance` for a fit without whitening whose noise is AR(1) with coefficient φ = ``phi``.
 
-        The covariance is the sandwich (JᵀJ)⁻¹ JᵀRJ (JᵀJ)⁻¹, R the correlation of the noise.
+        The covariance is the sandwich (JᵀJ)⁻¹ JᵀRJ (JᵀJ)⁻¹, where R is the correlation matrix of the noise.
         """
 
         def correlate(jacobian: Floats) -> Floats:
@@ -89,7 +91,7 @@ class Fit:
         return self._covariance(correlate)
 
     def _clustered(self, jacobian: Floats) -> Floats:
-        """Multiply (N, k) values by the errors' covariance as clusters of the residuals tell it, in variances."""
+        """Multiply (N, k) values by the residuals' covariance within clusters, in units of their variance."""
         edges = np.cumsum([0, *(len(e) for e in self.residuals)])
         parts = [
             slice(i, min(i + CLUSTER_FRAMES, stop))
@@ -101,61 +103,78 @@ class Fit:
         return np.concatenate(product) / variance * len(parts) / max(1, len(parts) - 1)
 
     def parameter_shift(self, records: Sequence[Record], errors: Sequence[Floats]) -> Floats:
-        """Return (p,) by how much each parameter changes, SI, with errors of the angles (rad, one array a recording).
+        """Return the (p,) shift of each parameter, SI, that errors of the angles cause, to first order.
 
-        Nothing for what zeros and initial states that are fitted take up; NaN for a parameter that cannot be told.
+        Parameters
+        ----------
+        records : sequence of Record
+            The fitted recordings.
+        errors : sequence of (n,) ndarray
+            Errors of the angles, rad, one array for each recording.
+
+        Returns
+        -------
+        (p,) ndarray
+            SI. Errors that fitted zeros and initial states absorb cause no shift. NaN for a parameter that cannot be
+            determined.
         """
-        free = self._felt & ~self._held
+        free = self._sensitive & ~self._at_bound
         jacobian, norm = self._scaled(free)
         white = np.concatenate([whiten(r, self.phi, error) for r, error in zip(records, errors, strict=True)])
         change = np.linalg.lstsq(jacobian, white, rcond=None)[0] / norm
-        told = np.full(len(self.parameters), np.nan)
-        told[free] = change[: int(free.sum())]
-        return told
+        shift = np.full(len(self.parameters), np.nan)
+        shift[free] = change[: int(free.sum())]
+        return shift
 
     @property
-    def _held(self) -> NDArray[np.bool_]:
-        """(p,) whether a bound holds each parameter."""
+    def _at_bound(self) -> NDArray[np.bool_]:
+        """(p,) whether each parameter is at one of its bounds."""
         margin = 1e-6 * self.model.scales
         return (self.parameters <= self.model.lower + margin) | (self.parameters >= self.model.upper - margin)
 
     @property
-    def _felt(self) -> NDArray[np.bool_]:
-        """(p,) whether a little more of each parameter moves anything: of what lets go or does not, it does not."""
+    def _sensitive(self) -> NDArray[np.bool_]:
+        """(p,) whether the prediction changes with each parameter.
+
+        Stiction is an event: the joint either breaks away or stays stuck, so a small change of a break-away level may
+        change nothing.
+        """
         return np.linalg.norm(self.jacobian[:, : len(self.parameters)], axis=0) > 0.0
 
     def _scaled(self, which: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-        """Return the Jacobian's columns of some parameters and of all that is own, over their norms, and the norms."""
+        """Return the Jacobian's columns of some shared and all nuisance parameters, normalised, and the norms."""
         columns = np.concatenate([which, np.ones(self.jacobian.shape[1] - len(which), bool)])
         norm = np.linalg.norm(self.jacobian[:, columns], axis=0)
         norm[norm == 0.0] = 1.0
         return self.jacobian[:, columns] / norm, norm
 
     def _covariance(self, correlate: Callable[[Floats], Floats]) -> Floats:
-        felt, held = self._felt, self._held
-        jacobian, norm = self._scaled(felt)
+        sensitive, at_bound = self._sensitive, self._at_bound
+        jacobian, norm = self._scaled(sensitive)
         variance = self.cost / max(1, len(self.white) - jacobian.shape[1])
         bread = np.linalg.pinv(jacobian.T @ jacobian)
         covariance = variance * bread @ (jacobian.T @ correlate(jacobian)) @ bread / np.outer(norm, norm)
-        if (felt & held).any():
+        if (sensitive & at_bound).any():
             step = bread @ (jacobian.T @ self.white) / norm
             lower, upper = self.model.lower - self.parameters, self.model.upper - self.parameters
-            within = [(at, lower[i], upper[i]) for at, i in enumerate(np.flatnonzero(felt)) if held[i]]
-            covariance = _confined(step, covariance, within)
-        told = np.full((len(felt), len(felt)), np.nan)  # a parameter that cannot be told has none
-        free, rows = felt & ~held, np.flatnonzero(~held[felt])
-        told[np.ix_(free, free)] = covariance[np.ix_(rows, rows)]
-        return told
+            within = [(at, lower[i], upper[i]) for at, i in enumerate(np.flatnonzero(sensitive)) if at_bound[i]]
+            covariance = _truncated(step, covariance, within)
+        result = np.full((len(sensitive), len(sensitive)), np.nan)
+        free, rows = sensitive & ~at_bound, np.flatnonzero(~at_bound[sensitive])
+        result[np.ix_(free, free)] = covariance[np.ix_(rows, rows)]
+        return result
 
 
-def _confined(step: Floats, covariance: Floats, within: Sequence[tuple[int, float, float]]) -> Floats:
-    """Return the second moments about an estimate some of whose variables bounds hold.
+def _truncated(step: Floats, covariance: Floats, within: Sequence[tuple[int, float, float]]) -> Floats:
+    """Return the (k, k) second moments about an estimate of variables some of which are at a bound.
 
-    Without bounds the variables would be normal about the estimate plus ``step``. Each in ``within`` is cut off at its
-    bounds, and all that hang together with it follow: on the bound they would count as known, and the others as surer
-    than they are. One after another, the rest taken as normal (Simon and Simon, Int. J. Syst. Sci. 41, 2010).
+    Without bounds the variables would be normal about the estimate plus ``step``. The distribution of each variable in
+    ``within`` (position, lower and upper bound as distances from the estimate) is truncated at its bounds, and the
+    variables correlated with it are updated. Treating a variable on its bound as known would make the others appear
+    more certain than they are. The variables are truncated one after another, the rest taken as normal (Simon and
+    Simon, Int. J. Syst. Sci. 41, 2010).
     """
-    from scipy.stats import truncnorm  # takes most of a second to load, which who has nothing on a bound is spared
+    from scipy.stats import truncnorm  # takes most of a second to load: only for parameters at bounds
 
     for at, lower, upper in within:
         sd = np.sqrt(covariance[at, at])
@@ -175,11 +194,11 @@ def whiten(record: Record, phi: float, values: Floats) -> Floats:
     Parameters
     ----------
     record : Record
-        For the frame times: over a gap of k frames the correlation is φᵏ.
+        Its frame times count: over a gap of k frames the correlation is φᵏ.
     phi : float
-        Correlation from frame to frame, 0 ≤ φ < 1.
+        AR(1) coefficient, frame to frame, 0 ≤ φ < 1.
     values : (n,) or (n, k) ndarray
-        What to whiten, along the first axis.
+        Values to whiten, along the first axis.
 
     Returns
     -------
@@ -196,7 +215,7 @@ def whiten(record: Record, phi: float, values: Floats) -> Floats:
 
 
 def _correlate(record: Record, phi: float, values: Floats) -> Floats:
-    """Multiply (n, k) values by the correlation matrix of AR(1) noise, by one pass forwards and one backwards."""
+    """Multiply (n, k) values by the correlation matrix of AR(1) noise, in one forward and one backward pass."""
     step = phi ** (np.diff(record.time) / record.interval)
     forwards, backwards = values.copy(), values.copy()
     for i in range(1, len(values)):

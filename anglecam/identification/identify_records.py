@@ -1,4 +1,4 @@
-"""Recordings in, a model out: the one function that every caller uses, whatever the estimator."""
+"""From recordings to an identified model, with any estimator of the registry."""
 
 from __future__ import annotations
 
@@ -56,6 +56,20 @@ def identify_records(
     RigError
         If there is no such estimator, it takes no neck though one is given, no recording is left to fit, or the
         declared neck cannot make the recorded motion.
+
+    Examples
+    --------
+    A free swing of θ̈ + 2·θ̇ + 50·θ = 0, without noise:
+
+    >>> import numpy as np
+    >>> time = np.arange(0.0, 3.0, 0.05)
+    >>> angle = 0.2 * np.exp(-time) * np.cos(7.0 * time)
+    >>> swing = Record("swing", time, angle, command=None, zero_known=True, sigma=np.full(len(time), 1e-3))
+    >>> model = identify_records([swing], Rig(), "oe2")
+    >>> model.names
+    ('a_per_s', 'b_per_s2')
+    >>> [round(float(value), 3) for value in model.values]
+    [2.0, 50.0]
     """
     if estimator not in ESTIMATORS:
         raise RigError(f"no estimator {estimator!r}; choose one of {', '.join(ESTIMATORS)}")

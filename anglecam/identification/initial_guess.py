@@ -1,8 +1,8 @@
-"""Where a fit of θ̈ + aθ̇ + bθ = cu begins, without trusting anybody's guess.
+"""Starting values of a fit of θ̈ + aθ̇ + bθ = cu that need no initial guess.
 
-For given a and b the prediction is linear in everything else: in c, in each recording's initial state and in its
-zero. So a coarse grid over natural frequency and damping ratio, with a linear solution at each node (variable
-projection; Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), looks everywhere at once.
+For given a and b the prediction is linear in all other unknowns: in c, in each recording's initial state and in its
+zero. A coarse grid over natural frequency and damping ratio, with a linear solution at each node (variable projection;
+Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), therefore covers the whole range.
 """
 
 from __future__ import annotations
@@ -17,11 +17,13 @@ from anglecam.data.typing import Floats
 from anglecam.models.plant import Plant
 
 DAMPING_RATIOS = (0.01, 0.05, 0.2, 0.5, 0.8, 1.5, 4.0)
+"""Damping ratios of the grid, from weakly to strongly damped."""
 FREQUENCIES = 28
+"""Number of natural frequencies of the grid, from half a period in the longest recording to 0.7 of the Nyquist rate."""
 
 
 def start_parameters(records: Sequence[Record], *, count: int = 3) -> list[Floats]:
-    """Find the best nodes of the grid.
+    """Return the nodes of the grid with the smallest squared error.
 
     Parameters
     ----------
@@ -51,15 +53,15 @@ def start_parameters(records: Sequence[Record], *, count: int = 3) -> list[Float
 
 
 def _project(records: Sequence[Record], a: float, b: float, driven: bool) -> tuple[float, float]:
-    """Return the least squared error at (a, b) and the c that gives it."""
+    """Return the least squared error at (a, b) and the value of c at which it occurs."""
     plant = Plant()
     normal = moment = total = 0.0
     for record in records:
         free = [plant.predict(np.array([a, b, 0.0]), record.time, None, np.array(s)) for s in ([1.0, 0.0], [0.0, 1.0])]
-        own = np.column_stack(free if record.zero_known else [*free, np.ones(len(record.time))])
-        if not np.all(np.isfinite(own)):
+        nuisance = np.column_stack(free if record.zero_known else [*free, np.ones(len(record.time))])
+        if not np.all(np.isfinite(nuisance)):
             return math.inf, math.nan
-        q, _ = np.linalg.qr(own)
+        q, _ = np.linalg.qr(nuisance)
         rest = record.angle - q @ (q.T @ record.angle)
         total += float(rest @ rest)
         if record.command is not None:

@@ -3,8 +3,8 @@
     state (θ, θ̇, a, b, c[, z]):   θ̈ = c·u − a·θ̇ − b·θ,   ȧ = ḃ = ċ = ż = 0                        (Eq. (30))
     measured: θ + z + noise of variance r
 
-z is the zero of a recording's angle, one state more where it is not declared. Between two frames, whatever their
-distance, the mean is integrated as the other estimators integrate it, and its derivative is the filter's F.
+z is the zero of a recording's angle, an additional state where it is not declared. Between two frames, at any distance,
+the mean is integrated as in the other estimators, and the derivative of that integration is the filter's F.
 """
 
 from __future__ import annotations
@@ -18,19 +18,19 @@ from numba import njit
 from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
-from anglecam.models.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, SOURCES, WIDTH, integrate
+from anglecam.models.integrator import COMPILED, SOURCES, integrate
 from anglecam.models.plant import MAX_STEP
 
 SHARED = slice(2, 5)
-"""Where a, b, c stand in the state; what stands elsewhere is the recording's own."""
+"""Position of a, b, c in the state; the other states are nuisance parameters of the recording."""
 _STEPS = np.array([0.1, 1.0, 1.0, 10.0, 10.0])
-"""Least magnitudes of θ, θ̇, a, b, c, SI, that difference quotients are taken against."""
-_NO_SERVOS, _NO_LOADS, _NO_DRIES = (np.zeros((max(1, len(ids)), WIDTH)) for ids in (SERVO_IDS, LOAD_IDS, DRY_IDS))
+"""Smallest magnitudes of θ, θ̇, a, b, c, SI, that scale the steps of difference quotients."""
+_NO_EFFECTS = COMPILED.table(())
 
 
 @dataclass(frozen=True)
 class Filtered:
-    """What one pass leaves of a recording of n frames; s states: 5, or 6 with the zero."""
+    """Result of one pass through a recording of n frames; s states: 5, or 6 with the zero."""
 
     state: Floats
     """(n, s) after each frame, SI."""
@@ -41,9 +41,9 @@ class Filtered:
     prior_covariance: Floats
     """(n, s, s) before each frame."""
     transition: Floats
-    """(n, s, s) F that led to each frame from the one before; to the first, what keeps the parameters alone."""
+    """(n, s, s) F from the frame before to each frame; for the first, the matrix that keeps only the parameters."""
     process: Floats
-    """(n, s, s) Q on the way to each frame; to the first, the covariance before it of all but the parameters."""
+    """(n, s, s) Q between the frame before and each frame; for the first, the prior covariance without parameters."""
     measurement_variance: float
     """r, rad²."""
     gain: Floats
@@ -55,19 +55,19 @@ class Filtered:
 
     @property
     def normalised(self) -> Floats:
-        """(n,) innovations divided by the filter's own standard deviation of them."""
+        """(n,) innovations divided by the standard deviation that the filter predicts for them."""
         return self.innovation / np.sqrt(self.innovation_variance)
 
 
 class _Filter(ExtendedKalmanFilter):
-    """filterpy's filter with the nonlinear prediction that it leaves to a subclass."""
+    """filterpy's filter with the nonlinear prediction, which filterpy leaves to a subclass."""
 
     def __init__(self, states: int) -> None:
         super().__init__(dim_x=states, dim_z=1)
         self.predicted = np.zeros(states)
 
     def predict_x(self, u: object = 0) -> None:
-        """Put the integrated mean in place of F·x."""
+        """Use the integrated mean in place of F·x."""
         self.x = self.predicted
 
 
@@ -85,27 +85,27 @@ def filter_record(
     Parameters
     ----------
     record : Record
-        Frames at any instants.
+        Frames at any times.
     mean : (s,) ndarray
         θ (rad), θ̇ (rad/s), a (1/s), b (1/s²), c (1/s²) and perhaps z (rad) before the first frame.
     covariance : (s, s) ndarray
-        Of that; rows of zeros for what is known.
+        Covariance of ``mean``; rows of zeros for known states.
     process_variance : float
-        Diagonal of Q over one median frame interval, in the square of each state's unit; a longer gap adds the more.
-        What is known at the start, and the zero, stays as it is.
+        Diagonal of Q over one median frame interval, in the square of each state's unit; a gap adds in proportion to
+        its length. States that are known at the start, and the zero, have no process noise.
     measurement_variance : float
         r, rad².
     about : (n, s) ndarray, optional
-        Trajectory to linearise about; about the filter's own running estimate otherwise.
+        Trajectory to linearise about; the filter's running estimate otherwise.
 
     Returns
     -------
     Filtered
-        Of the whole recording; not finite from where the estimate ran away.
+        For the whole recording; not finite from the frame at which the estimate diverges.
     """
     n, s = len(record.time), len(mean)
     command = record.command or Command(np.zeros(1), np.zeros(1))
-    H = measured(s)
+    H = observation_matrix(s)
     drift = process_variance * np.eye(s)
     drift[np.diag(covariance) == 0.0] = 0.0
     drift[5:] = 0.0
@@ -145,33 +145,35 @@ def filter_record(
     )
 
 
-def measured(states: int) -> Floats:
-    """Return H (1, s): an angle is measured from its zero."""
+def observation_matrix(states: int) -> Floats:
+    """Return H (1, s): the measured angle is θ plus the zero z."""
     return np.array([[1.0, 0.0, 0.0, 0.0, 0.0, 1.0]])[:, :states]
 
 
 def _advance(state: Floats, span: Floats, command: Command) -> tuple[Floats, Floats]:
-    """Integrate the state over ``span`` (2,) and give the derivative of its end."""
+    """Return the state integrated over ``span`` (2,) and the derivative of its end with respect to its start."""
     reached, F = state.copy(), np.eye(len(state))
     steps = 1e-5 * np.maximum(np.abs(state[:5]), _STEPS)
     knots = np.stack([command.time, command.angle, np.zeros(len(command.time))])
-    reached[:2], F[:2, :5] = _flow(state[:5], span, knots, steps, _NO_SERVOS, _NO_LOADS, _NO_DRIES, MAX_STEP)
+    reached[:2], F[:2, :5] = _flow(state[:5], span, knots, steps, _NO_EFFECTS, MAX_STEP)
     return reached, F
 
 
 def _compile_once(code):  # type: ignore[no-untyped-def]  # compiled
+    """Return the flow of the plant and its derivative, compiled by the first process that runs it."""
+
     @njit(cache=True)
-    def _flow(state, span, knots, steps, servos, loads, dries, max_step):  # type: ignore[no-untyped-def]
+    def _flow(state, span, knots, steps, table, max_step):  # type: ignore[no-untyped-def]
         assert len(code) > 0
         slopes = np.empty((2, 5))
         for j in range(5):
             low, high = state.copy(), state.copy()
             low[j] -= steps[j]
             high[j] += steps[j]
-            under = integrate(span, low[0], low[1], knots, 0.0, low[2:], servos, loads, dries, max_step)[1]
-            over = integrate(span, high[0], high[1], knots, 0.0, high[2:], servos, loads, dries, max_step)[1]
-            slopes[:, j] = (over - under) / (high[j] - low[j])
-        return integrate(span, state[0], state[1], knots, 0.0, state[2:], servos, loads, dries, max_step)[1], slopes
+            below = integrate(span, low[0], low[1], knots, 0.0, low[2:], table, max_step)[1]
+            above = integrate(span, high[0], high[1], knots, 0.0, high[2:], table, max_step)[1]
+            slopes[:, j] = (above - below) / (high[j] - low[j])
+        return integrate(span, state[0], state[1], knots, 0.0, state[2:], table, max_step)[1], slopes
 
     return _flow
 

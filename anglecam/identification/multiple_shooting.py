@@ -1,16 +1,17 @@
-"""Multiple shooting: where a long free run goes astray, predict a recording in windows, each from a state of its own.
+"""Multiple shooting: where a long free run diverges, predict a recording in windows with separate initial states.
 
-A free run goes astray in two ways. A plant that *drifts* (no stiffness, b ≈ 0: a pole near zero; or an unstable one)
-adds up every small torque that the model lacks until the sum hides all else. And a model that *loses count*, such as a
-linear one of a wide swing whose period depends on amplitude, is out of step after some periods: the cost is then a maze
-of valleys, one for each miscounted period. Windows bound both. Each window's initial state is one of its own unknowns,
-and nothing ties it to the end of the window before.
+A free run diverges in two ways. A plant that *drifts* (no stiffness, b ≈ 0: a pole near zero; or an unstable pole)
+accumulates every small torque that the model lacks until the sum hides everything else. And a model that *loses step*,
+for example a linear model of a wide swing whose period depends on amplitude, is out of phase after some periods: the
+cost then has many local minima, one for each miscounted period. Windows bound both errors. The initial state of each
+window is a nuisance parameter of that window, and nothing ties it to the end of the window before.
 
-What it costs: two more unknowns a window, and what only a long run tells. Over two time constants the start of a rate
-is forgotten for the most part, so gain, damping and friction of a drifting plant are told nearly as well as before,
-while its slow stiffness is told by how b·θ differs from window to window and no longer by its own decay. The standard
-error of a swing's frequency grows with the power 3/2 of the shortening, and with as many windows as fit in, by the
-shortening itself.
+The cost is two more unknowns for each window and the loss of the information that only a long run contains. Over two
+time constants an initial rate is largely forgotten, so gain, damping and friction of a drifting plant are determined
+nearly as well as before. Its small stiffness is then determined by the differences of b·θ between windows and no longer
+by its slow decay. The standard error of a swing's frequency grows with the power 3/2 of the shortening, and with as
+many windows as fit in, by the shortening itself.
+
 Bock, in Modelling of Chemical Reaction Systems, Springer 1981, 102-125; Ribeiro, Tiels, Umenberger, Schön, Aguirre, On
 the smoothness of nonlinear system identification, Automatica 121, 2020, 109158.
 """
@@ -30,27 +31,28 @@ from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit
 
 TIME_CONSTANTS = 2.0
-"""A drifting plant's window in time constants of its fastest pole: a decaying rate has lost 86 % of its start by then,
-a growing error has become 7.4 times as large."""
+"""Window of a drifting plant, in time constants of its fastest pole. By its end a decaying rate has lost 86 % of its
+start, and a growing error has become 7.4 times as large."""
 PERIODS = 2.0
-"""A swinging plant's window: fewer would not tell damping from an initial rate, more may lose count again."""
-FEWEST = 4
-"""Windows a drifting recording is cut into at least, where the plant has no time constant to go by."""
-ASTRAY = 0.25
-"""A free run that errs by more than this share of the swing is out of step: for two sinusoids of one amplitude it is
-a phase error of 14°, of which a fit that keeps step leaves none."""
+"""Window of an oscillating plant, in periods. Fewer would not separate damping from an initial rate; more may lose
+step again."""
+MIN_WINDOWS = 4
+"""Fewest windows of a drifting recording; they apply where the plant has no time constant that sets their length."""
+OUT_OF_STEP = 0.25
+"""RMS error of a free run, as a share of the RMS swing, above which it is out of step. For two sinusoids of one
+amplitude it is a phase error of 14°; a fit that keeps step leaves no phase error."""
 
 
 def drifts(plant_parameters: Floats, records: Sequence[Record]) -> bool:
-    """Tell whether a plant drifts or runs away over the longest of some recordings.
+    """Return whether a plant drifts or diverges over the longest of some recordings.
 
-    It does if a pole that does not swing decays too slowly to be seen decaying, its time constant longer than the
-    recording, or if a pole grows by more than e over it.
+    It does if a real pole decays so slowly that its time constant exceeds the recording, or if a pole grows by more
+    than a factor e over it.
 
     Parameters
     ----------
     plant_parameters : (p,) ndarray
-        Of the plant without effects, a (1/s) and b (1/s²) first.
+        Parameters of the plant without effects, a (1/s) and b (1/s²) first.
     records : sequence of Record
         At least one.
 
@@ -65,27 +67,27 @@ def drifts(plant_parameters: Floats, records: Sequence[Record]) -> bool:
 
 
 def loses_step(fit: Fit, records: Sequence[Record]) -> bool:
-    """Tell whether a fitted model's free run is out of step with what was measured."""
+    """Return whether a fitted model's free run is out of step with the measured angles."""
     swing = np.concatenate([r.angle - r.angle.mean() for r in records])
-    return fit.rmse > ASTRAY * float(np.sqrt(np.mean(swing**2)))
+    return fit.rmse > OUT_OF_STEP * float(np.sqrt(np.mean(swing**2)))
 
 
 def windows(records: Sequence[Record], plant_parameters: Floats) -> list[Record]:
-    """Cut recordings into windows that a plant cannot run astray in.
+    """Cut recordings into windows in which the free run of a plant does not diverge.
 
     Parameters
     ----------
     records : sequence of Record
         Recordings of one plant.
     plant_parameters : (p,) ndarray
-        Of the plant without effects as fitted so far, a (1/s) and b (1/s²) first.
+        Parameters of the plant without effects as fitted so far, a (1/s) and b (1/s²) first.
 
     Returns
     -------
     list of Record
-        Each window under its recording's name, with the whole history of the command. In windows of a plant that
-        drifts the zero that the angle came with counts as known: where no stiffness tells which angle is neutral, a
-        zero of its own beside an initial state of its own would leave a prediction as it is.
+        Each window has its recording's name and the whole history of the command. In windows of a drifting plant the
+        zero of the angle counts as known: without stiffness no angle is distinguished as neutral, and a fitted zero
+        in addition to a fitted initial state would not change the prediction.
     """
     if not records:
         return []
@@ -93,7 +95,7 @@ def windows(records: Sequence[Record], plant_parameters: Floats) -> list[Record]
     if drifts(plant_parameters, records):
         fastest = float(np.max(np.abs(poles.real)))
         length = TIME_CONSTANTS / fastest if fastest > 0.0 else math.inf
-        return [replace(part, zero_known=True) for r in records for part in _cut(r, length, FEWEST)]
+        return [replace(part, zero_known=True) for r in records for part in _cut(r, length, MIN_WINDOWS)]
     turns = float(np.max(np.abs(poles.imag))) or float(np.min(np.abs(poles.real)))
     return [part for r in records for part in _cut(r, PERIODS * 2.0 * math.pi / turns, 1)]
 
@@ -103,11 +105,11 @@ def _poles(plant_parameters: Floats) -> NDArray[np.complex128]:
 
 
 def _cut(record: Record, length: float, fewest: int) -> list[Record]:
-    """Cut one recording into windows of equal length (s), about as long as asked for."""
+    """Cut one recording into windows of equal length, approximately ``length`` seconds."""
     span = float(record.time[-1] - record.time[0]) + record.interval
     most = max(1, len(record.time) // MIN_FRAMES)
     count = min(most, max(fewest, round(span / length)))
     edges = record.time[0] + span * np.arange(count + 1) / count
     parts = [record.between(start, stop) for start, stop in pairwise(edges)]
-    # where frames are missing a window may be left with too few for a state of its own
+    # where frames are missing a window may have too few frames for an initial state
     return [part for part in parts if len(part.time) >= MIN_FRAMES // 2]

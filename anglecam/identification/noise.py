@@ -1,8 +1,8 @@
-"""What the camera adds: the size and colour of the angle's noise, from what cannot be motion.
+"""Size and AR(1) coefficient of the angle's noise, estimated from data that no motion changes.
 
-In a film that is the mouth's distance from the pivot, which no motion alters; it sees what a picture at rest hides,
-the pixel grid and the codec under a moving edge. In a series from elsewhere it is the rest before the first command
-change, where the mechanism may still be shaken by something of its own.
+In a film that is the mark's distance from the pivot. It includes errors that a picture at rest hides: the pixel grid
+and the codec under a moving edge. In a series without a film it is the rest before the first command change, during
+which the mechanism may still be disturbed.
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 
 DISTANCE = "distance from the pivot"
-MEASURED = "the measurement's own statement"
-LEAST_REST = 6
-"""Frames; a shorter rest says nothing about colour."""
+"""Source of noise estimated from the mark's distance from the pivot."""
+MEASURED = "stated by the measurement"
+"""Source of noise whose size the measurement states and whose correlation the distance from the pivot shows."""
+MIN_REST_FRAMES = 6
+"""Fewest frames of a rest; a shorter rest does not determine the AR(1) coefficient."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class Noise:
     sigma: float
     """Standard deviation, rad."""
     phi: float
-    """Correlation from frame to frame."""
+    """AR(1) coefficient, frame to frame."""
     phi_error: float
     """Standard error of ``phi``."""
     source: str
@@ -37,12 +39,12 @@ class Noise:
 
     @property
     def filmed(self) -> bool:
-        """Whether it is a camera's, and so goes along with the motion."""
+        """Whether the noise is a camera's, whose errors may follow the motion."""
         return self.source in (DISTANCE, MEASURED)
 
 
 def noise_floor(records: Sequence[Record]) -> Noise | None:
-    """Say how good the angles are, apart from any model.
+    """Return the noise of the angles, independent of any model.
 
     Parameters
     ----------
@@ -52,19 +54,19 @@ def noise_floor(records: Sequence[Record]) -> Noise | None:
     Returns
     -------
     Noise or None
-        Where a film's angles are the whole head's, they are better than the mouth's distance from the pivot tells, and
-        their own statement counts; ``None`` where nothing tells.
+        The smaller of the stated uncertainty and the noise from the mark's distance: angles that registration of the
+        whole body gives are better than that distance shows. ``None`` if nothing determines the noise.
     """
-    witness, stated = motion_free_noise(records), stated_noise(records)
-    if witness is None or stated is None:
-        return witness or stated
-    if witness.filmed and stated.sigma < witness.sigma:
-        return replace(witness, sigma=stated.sigma, source=MEASURED)
-    return witness
+    estimated, stated = motion_free_noise(records), stated_noise(records)
+    if estimated is None or stated is None:
+        return estimated or stated
+    if estimated.filmed and stated.sigma < estimated.sigma:
+        return replace(estimated, sigma=stated.sigma, source=MEASURED)
+    return estimated
 
 
 def motion_free_noise(records: Sequence[Record]) -> Noise | None:
-    """Estimate the noise from what cannot be motion.
+    """Estimate the noise from data that no motion changes.
 
     Parameters
     ----------
@@ -74,40 +76,40 @@ def motion_free_noise(records: Sequence[Record]) -> Noise | None:
     Returns
     -------
     Noise or None
-        From the distance to the pivot where there are marks, else from the rest; ``None`` where there is neither.
+        From the distance to the pivot if there are marks, otherwise from the rest; ``None`` if there is neither.
     """
-    crosses = [r.lever_scatter for r in records if r.lever_scatter is not None]
-    if crosses:
-        return autoregression(crosses, DISTANCE)
+    scatters = [r.lever_scatter for r in records if r.lever_scatter is not None]
+    if scatters:
+        return autoregression(scatters, DISTANCE)
     rests = []
     for record in records:
         change = record.command.first_change() if record.command else None
-        if change is not None and (record.time < change).sum() >= LEAST_REST:
+        if change is not None and (record.time < change).sum() >= MIN_REST_FRAMES:
             rests.append(record.angle[record.time < change])
     return autoregression(rests, "rest") if rests else None
 
 
 def stated_noise(records: Sequence[Record]) -> Noise | None:
-    """Return the stated uncertainties, root mean square, as noise of unknown colour; ``None`` where none is stated."""
+    """Return the RMS stated uncertainty as noise of unknown AR(1) coefficient; ``None`` where none is stated."""
     stated = np.concatenate([r.sigma for r in records])
     stated = stated[np.isfinite(stated)]
     return Noise(float(np.sqrt(np.mean(stated**2))), 0.0, 1.0, "stated") if len(stated) else None
 
 
 def autoregression(parts: Sequence[Floats], source: str) -> Noise:
-    """Fit one AR(1) process to several stretches.
+    """Fit one AR(1) process to several stretches of data.
 
     Parameters
     ----------
     parts : sequence of (n,) ndarray
-        Stretches, rad; each is taken about its own mean.
+        Stretches, rad; the mean of each is subtracted.
     source : str
-        What they are, for the reader.
+        Description of the data.
 
     Returns
     -------
     Noise
-        With φ corrected for the bias that taking out the means brings, and kept within [0, 0.98].
+        With φ corrected for the bias that subtracting the means causes, and clipped to [0, 0.98].
     """
     total = count = lagged = pairs = 0.0
     for part in parts:

@@ -1,8 +1,8 @@
-"""Output error: the model runs freely, and its parameters are those whose angle is nearest to the measured one.
+"""Output error: the parameters minimise the difference between the measured angle and that of a free run.
 
     minimise Σ_recordings |W(y − z − θ(t; p, x₀))|²  over p (shared) and x₀, z (each recording's nuisance)
 
-W whitens first-order autoregressive noise, so that a coloured residual is not counted as so many independent
+W whitens first-order autoregressive noise, so that correlated residuals do not count as as many independent
 observations. The initial state x₀ and, unless declared, the zero z of the angle are unknown in every recording.
 Ljung, System Identification, 2nd ed., 1999, sec. 7.5.
 """
@@ -22,17 +22,20 @@ from anglecam.identification.fit import Fit, whiten
 from anglecam.models.model import Model
 
 STEP = 1e-6
-"""Of the difference quotients, as a share of a parameter."""
+"""Step of the difference quotients, as a share of a parameter's magnitude."""
 SETTLED = 1e-3
-"""Log-likelihood; a fit that has gained no more by its last `PATIENCE` steps is as good as it will be. Along a ridge it
-would crawl for many more, and where the angle has kinks one small step may come before a large one."""
+"""Log-likelihood; a fit ends when its last `PATIENCE` steps have gained no more than this. Along a ridge it would
+otherwise continue with many tiny steps."""
 PATIENCE = 3
+"""Steps; with a kinked prediction one small step may precede a large one, so a single small step does not end a fit."""
 RUNAWAY = 1e100
-"""rad; a plant that comes so far has run away: the squares of its slopes would soon have no number."""
-HEAT, MOST = 8, 60
-"""Evaluations that each of several starts is given before the best of them goes on, and that a fit may take."""
+"""rad; a larger angle counts as divergence: the squares of its derivatives would soon overflow."""
+TRIAL_EVALUATIONS = 8
+"""Evaluations of each of several starts before only the best of them is continued."""
+MAX_EVALUATIONS = 60
+"""Most evaluations of a fit."""
 _BLAS = ThreadpoolController()
-"""The matrices here have some twenty columns: threads that wait for each other made a fit ten times slower."""
+"""Limits BLAS to one thread. The matrices have some twenty columns, and waiting threads made a fit ten times slower."""
 
 
 def fit_output_error(
@@ -49,36 +52,36 @@ def fit_output_error(
     Parameters
     ----------
     model : Model
-        What to fit.
+        Model to fit.
     records : sequence of Record
-        All fitted at once.
+        Recordings, all fitted at once.
     starts : sequence of (p,) ndarray
-        Shared parameters to start from, SI; the best end is kept.
+        Starting values of the shared parameters, SI; the best result is kept.
     nuisance : sequence of ndarray, optional
-        Starts of each recording's nuisance unknowns; from its first frames otherwise.
+        Starting values of each recording's nuisance parameters; from its first frames otherwise.
     phi : float
-        Autocorrelation of the noise from frame to frame.
+        AR(1) coefficient of the noise, frame to frame.
     fixed : bool
-        Hold the shared parameters at ``starts[0]`` and fit only what is each recording's nuisance: a prediction.
+        Hold the shared parameters at ``starts[0]`` and fit only the nuisance parameters: a prediction.
 
     Returns
     -------
     Fit
-        The best of the starts.
+        The best result of all starts.
     """
     nuisance = [first_state(model, record) for record in records] if nuisance is None else nuisance
-    return min(_fit_all(model, records, starts, nuisance, phi, fixed, MOST), key=lambda fit: fit.cost)
+    return min(_fit_all(model, records, starts, nuisance, phi, fixed, MAX_EVALUATIONS), key=lambda fit: fit.cost)
 
 
 def fit_best_start(
     model: Model, records: Sequence[Record], starts: Sequence[Floats], nuisance: Sequence[Floats], phi: float
 ) -> Fit:
-    """Fit as `fit_output_error` does, but go on from only one start: the best after a few steps from each.
+    """Fit as `fit_output_error` does, but continue only the start that is best after a few steps.
 
-    For models whose fits are slow; which valley is the deepest is then known almost as well.
+    For models whose fits are slow; a few steps find the deepest minimum almost as reliably.
     """
-    heats = _fit_all(model, records, starts, nuisance, phi, False, HEAT)
-    best = min(heats, key=lambda fit: fit.cost)
+    trials = _fit_all(model, records, starts, nuisance, phi, False, TRIAL_EVALUATIONS)
+    best = min(trials, key=lambda fit: fit.cost)
     return fit_output_error(model, records, [best.parameters], nuisance=best.nuisance, phi=phi)
 
 
@@ -91,7 +94,7 @@ def _fit_all(
     fixed: bool,
     most: int,
 ) -> list[Fit]:
-    # a trial step may let the plant run away; its cost is then not finite and the step is refused
+    # a trial step may make the plant diverge; its cost is then not finite and the step is rejected
     with _BLAS.limit(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
         return [_fit_once(model, records, start, nuisance, phi, fixed, most) for start in starts]
 
@@ -99,7 +102,7 @@ def _fit_all(
 def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:
     """Predict recordings in free run with the parameters of ``fit``; only initial states and zeros are fitted.
 
-    They start from the first frames, and also from rest: with dry friction the two may end in different valleys.
+    Two fits start from the rates of the first frames and from rest: with dry friction they may end in different minima.
     """
     moving = [first_state(fit.model, record) for record in records]
     resting = [
@@ -114,7 +117,7 @@ def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:
 
 
 def predicted_angle(model: Model, parameters: Floats, record: Record, nuisance: Floats) -> Floats:
-    """Return the (n,) angle, rad, that a model gives a recording from its nuisance unknowns; NaN where it runs away."""
+    """Return the (n,) angle, rad, that a model predicts for a recording; NaN where it diverges."""
     zero = 0.0 if record.zero_known else nuisance[model.states]
     angle = zero + model.predict(parameters, record.time, record.command, nuisance[: model.states], record.view)
     return np.where(np.abs(angle) < RUNAWAY, angle, np.nan)
@@ -123,13 +126,13 @@ def predicted_angle(model: Model, parameters: Floats, record: Record, nuisance: 
 def output_error(
     model: Model, parameters: Floats, records: Sequence[Record], nuisance: Sequence[Floats], phi: float
 ) -> float:
-    """Return the sum of squared whitened residuals, rad², of a model as it stands; infinite where it runs away."""
+    """Return the sum of squared whitened residuals, rad², at given parameters; infinite if the model diverges."""
     with np.errstate(over="ignore", invalid="ignore"):
-        left = [
+        residuals = [
             whiten(r, phi, r.angle - predicted_angle(model, parameters, r, o))
             for r, o in zip(records, nuisance, strict=True)
         ]
-        cost = float(sum(one @ one for one in left))
+        cost = float(sum(one @ one for one in residuals))
     return cost if np.isfinite(cost) else np.inf
 
 
@@ -154,7 +157,7 @@ def _fit_once(
     latest: dict[bytes, list[Floats]] = {}
 
     def predicted(x: Floats) -> list[Floats]:
-        """Predict all recordings; the Jacobian is asked for where the errors just were."""
+        """Predict all recordings; the last result is kept, as the Jacobian follows the errors at the same point."""
         if x.tobytes() not in latest:
             parameters, unknowns = split(x)
             latest.clear()
@@ -168,9 +171,9 @@ def _fit_once(
         return np.concatenate(parts)
 
     def slope(record: Record, both: Floats, here: Floats, j: int, step: float) -> Floats:
-        beside = both.copy()
-        beside[j] += step
-        return (predicted_angle(model, beside[:p], record, beside[p:]) - here) / step
+        shifted = both.copy()
+        shifted[j] += step
+        return (predicted_angle(model, shifted[:p], record, shifted[p:]) - here) / step
 
     def jacobian(x: Floats) -> Floats:
         parameters, unknowns = split(x)
@@ -182,12 +185,12 @@ def _fit_once(
             place = [*shared, *range(edges[i], edges[i + 1])]
             block = np.empty((len(record.time), len(columns)))
             for k, j in enumerate(columns):
-                if j == p + model.states:  # the zero is added as it is
+                if j == p + model.states:  # the prediction contains the zero as a summand
                     block[:, k] = 1.0
                     continue
-                # a bound may be a wall of the physics: difference on its inner side there
+                # beyond a bound the model may be undefined: take the difference on the inner side
                 step = -steps[j] if j < p and both[j] + steps[j] > model.upper[j] else steps[j]
-                # where the plant just does not run away here it may beside it: then on the other side
+                # near divergence the plant may be finite here and diverge one step away: then take the other side
                 slopes = (slope(record, both, here, j, by) for by in (step, -step))
                 block[:, k] = next((one for one in slopes if np.isfinite(one).all()), 0.0)
             result[rows[i] : rows[i + 1], place] = -whiten(record, phi, block)
@@ -198,20 +201,20 @@ def _fit_once(
     lower, upper = np.full(len(x0), -np.inf), np.full(len(x0), np.inf)
     lower[:p], upper[:p] = model.lower, model.upper
 
-    def whole(x: Floats) -> Floats:
-        full = x0.copy()
-        full[free] = x
-        return full
+    def full(x: Floats) -> Floats:
+        unknowns = x0.copy()
+        unknowns[free] = x
+        return unknowns
 
-    def ended(x: Floats, white: Floats, slopes: Floats) -> Fit:
+    def fit_at(x: Floats, white: Floats, slopes: Floats) -> Fit:
         parameters, unknowns = split(x)
-        left = tuple(r.angle - here for r, here in zip(records, predicted(x), strict=True))
-        return Fit(model, parameters, tuple(unknowns), left, slopes, phi, white)
+        residuals = tuple(r.angle - here for r, here in zip(records, predicted(x), strict=True))
+        return Fit(model, parameters, tuple(unknowns), residuals, slopes, phi, white)
 
     inside = np.clip(x0, np.nextafter(lower, np.inf), np.nextafter(upper, -np.inf))
     costs = [0.5 * float(np.sum(errors(inside) ** 2))]
     if not math.isfinite(costs[0]):
-        return ended(x0, np.full(rows[-1], np.inf), np.zeros((rows[-1], len(x0))))
+        return fit_at(x0, np.full(rows[-1], np.inf), np.zeros((rows[-1], len(x0))))
 
     def settled(intermediate_result: OptimizeResult) -> None:
         costs.append(intermediate_result.cost)
@@ -219,9 +222,9 @@ def _fit_once(
             raise StopIteration
 
     found = least_squares(
-        lambda x: errors(whole(x)),
+        lambda x: errors(full(x)),
         inside[free],
-        jac=lambda x: jacobian(whole(x))[:, free],
+        jac=lambda x: jacobian(full(x))[:, free],
         bounds=(lower[free], upper[free]),
         x_scale="jac",
         xtol=1e-9,
@@ -232,14 +235,14 @@ def _fit_once(
     )
     slopes = np.zeros((rows[-1], len(x0)))
     slopes[:, free] = -found.jac
-    return ended(whole(found.x), found.fun, slopes)
+    return fit_at(full(found.x), found.fun, slopes)
 
 
 def first_state(model: Model, record: Record) -> Floats:
-    """Start a recording's nuisance unknowns at its first angle, and at rest if its command has held it there.
+    """Return starting values of a recording's nuisance parameters: its first angle, at rest before the first command.
 
-    One that begins in motion starts with its first rate: at rest a plant with dry friction may be stuck, where nothing
-    tells which way it should move.
+    A recording that begins in motion starts with its first rate: from rest a plant with dry friction may be stuck, and
+    the cost then does not depend on the direction in which it should move.
     """
     change = None if record.command is None else record.command.first_change()
     resting = change is not None and change >= record.time[0]

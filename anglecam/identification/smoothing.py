@@ -1,17 +1,20 @@
-"""Fixed-interval smoothing: what the whole data say of every frame, not only of those before it.
+"""Fixed-interval smoothing: the state of every frame given all data, not only the data before it.
 
-The filter's estimate x, P of a frame is joined by what later frames say of it (Fraser and Potter, IEEE Trans. Autom.
-Control 14, 1969). That is gathered backwards as information Λ, λ on the error of x: with the innovation y and gain K,
+The filter's estimate x, P of a frame is combined with the information of later frames (Fraser and Potter, IEEE Trans.
+Autom. Control 14, 1969). It is accumulated backwards as information Λ, λ on the error of x, with innovation y and gain
+K:
 
     before a frame's measurement   λ ← λ + (ΛK + Hᵀ/r)·y         Λ ← Λ + HᵀH/r
     back to the frame before       λ ← Fᵀ(1 + ΛQ)⁻¹λ             Λ ← Fᵀ(1 + ΛQ)⁻¹ΛF
     smoothed                       P ← (P⁻¹ + Λ)⁻¹               x ← x + Pλ
 
-The result is Rauch, Tung and Striebel's. Their gain is F⁻¹ where Q = 0: it would run a damped plant backwards in time,
-and of a motion that decays by e⁻¹⁰⁰ nothing is left but rounding. Information decays with the motion; and a covariance
-far smaller than the filter's, as all are in the first frames, is not left to the difference of two large ones.
+The result equals that of Rauch, Tung and Striebel. Their gain is F⁻¹ where Q = 0: it would run a damped plant backwards
+in time, and of a motion that decays by e⁻¹⁰⁰ nothing but rounding would be left. Information decays with the motion. In
+addition, a covariance far smaller than the filter's, as in the first frames, is not computed as the difference of two
+large ones.
 
-To step from a recording to the one before is the same: F keeps the parameters alone, Q is what its first state may be.
+The step from a recording to the recording before has the same form: F keeps only the parameters, and Q is the
+covariance of the first state.
 """
 
 from __future__ import annotations
@@ -22,12 +25,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from anglecam.data.typing import Floats
-from anglecam.identification.kalman import SHARED, Filtered, measured
+from anglecam.identification.kalman import SHARED, Filtered, observation_matrix
 
 
 @dataclass(frozen=True)
 class Smoothed:
-    """A recording's states given all frames of all recordings."""
+    """States of a recording given all frames of all recordings."""
 
     state: Floats
     """(n, s) θ (rad), θ̇ (rad/s), a (1/s), b (1/s²), c (1/s²) and perhaps the zero (rad)."""
@@ -41,7 +44,7 @@ def smooth(passed: Sequence[Filtered]) -> tuple[Smoothed, ...]:
     Parameters
     ----------
     passed : sequence of Filtered
-        In the order in which the parameters were handed on.
+        In the order in which the filter passed through them.
 
     Returns
     -------
@@ -51,7 +54,7 @@ def smooth(passed: Sequence[Filtered]) -> tuple[Smoothed, ...]:
     result = []
     for one, later in zip(passed, _later_frames(passed), strict=True):
         covariance = np.array(
-            [_joined(P, information) for P, (information, _) in zip(one.covariance, later, strict=True)]
+            [_combined(P, information) for P, (information, _) in zip(one.covariance, later, strict=True)]
         )
         moved = [P @ vector for P, (_, vector) in zip(covariance, later, strict=True)]
         result.append(Smoothed(one.state + np.array(moved), covariance))
@@ -62,18 +65,18 @@ def smooth_first_states(passed: Sequence[Filtered]) -> tuple[Floats, ...]:
     """Return only each recording's (s,) smoothed state at its first frame."""
     firsts = [later[0] for later in _later_frames(passed)]
     return tuple(
-        one.state[0] + _joined(one.covariance[0], information) @ vector
+        one.state[0] + _combined(one.covariance[0], information) @ vector
         for one, (information, vector) in zip(passed, firsts, strict=True)
     )
 
 
 def _later_frames(passed: Sequence[Filtered]) -> list[list[tuple[Floats, Floats]]]:
-    """Gather, for each frame of each recording, what all later ones say of the error of its filtered state: Λ and λ."""
+    """Return, for each frame of each recording, the information Λ, λ of all later frames on its filtered state."""
     result = []
     shared_information, shared_vector = np.zeros((3, 3)), np.zeros(3)
     for one in reversed(passed):
         n, s = one.state.shape
-        H, r = measured(s)[0], one.measurement_variance
+        H, r = observation_matrix(s)[0], one.measurement_variance
         weight, towards = np.outer(H, H) / r, H / r
         information, vector = np.zeros((s, s)), np.zeros(s)
         information[SHARED, SHARED], vector[SHARED] = shared_information, shared_vector
@@ -91,9 +94,9 @@ def _later_frames(passed: Sequence[Filtered]) -> list[list[tuple[Floats, Floats]
     return result[::-1]
 
 
-def _joined(covariance: Floats, information: Floats) -> Floats:
+def _combined(covariance: Floats, information: Floats) -> Floats:
     """Return (P⁻¹ + Λ)⁻¹ = R(1 + RᵀΛR)⁻¹Rᵀ with P = RRᵀ, for a P that may be singular."""
-    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))  # where the head rests its rate's variance is 0 ± rounding
+    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))  # at rest the variance of the rate is 0 ± rounding
     divisor = np.where(scale > 0.0, scale, 1.0)
     with np.errstate(all="ignore"):
         relative = covariance / np.outer(divisor, divisor)
@@ -101,7 +104,7 @@ def _joined(covariance: Floats, information: Floats) -> Floats:
         return np.full_like(covariance, np.nan)
     values, vectors = np.linalg.eigh(relative)
     root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    # of a pass that ran away rounding leaves eigenvalues below 1: its fit refuses it, not this
-    surer, axes = np.linalg.eigh(np.eye(len(root)) + root.T @ information @ root)
-    half = root @ axes / np.sqrt(np.maximum(surer, 1.0))
+    # after a diverging pass rounding may leave eigenvalues below 1; the caller rejects such a pass by its cost
+    precision, axes = np.linalg.eigh(np.eye(len(root)) + root.T @ information @ root)
+    half = root @ axes / np.sqrt(np.maximum(precision, 1.0))
     return half @ half.T

@@ -15,15 +15,15 @@ from anglecam.data.typing import Floats
 from anglecam.neck.large_angle import LargeAngleNeck, linearise, restoring_tangent, restoring_torque
 
 MAX_STEP = 0.004
-"""s; see `anglecam.models.plant.MAX_STEP`."""
+"""Longest Runge-Kutta step, s; see `anglecam.models.plant.MAX_STEP`."""
 NODES = 512
-"""Angles at which the torque is tabulated with its tangent: a cubic between them errs by less than 2e-7 N·m, and within
-1° of a linkage's toggle by less than 2e-5 N·m."""
+"""Number of angles at which torque and tangent are tabulated. The error of the cubic between them is below 2e-7 N·m,
+and within 1° of a linkage's toggle below 2e-5 N·m."""
 
 
 @njit(cache=True)
 def _accelerate(theta, omega, drive, low, step, torque, tangent, gamma, constants):  # type: ignore[no-untyped-def]
-    """Solve Eq. (31) for θ̈, all that depends on the angle alone from tables."""
+    """Return θ̈ of Eq. (31), with everything that depends on the angle alone interpolated from tables."""
     place = (theta - low) / step
     if not 0.0 <= place < len(torque) - 1:
         return np.nan
@@ -41,7 +41,7 @@ def _accelerate(theta, omega, drive, low, step, torque, tangent, gamma, constant
 
 @njit(cache=True)
 def _integrate(time, theta, omega, switches, drives, low, step, torque, tangent, gamma, constants, max_step):  # type: ignore[no-untyped-def]
-    """Run by fourth-order Runge-Kutta between stops, which are the instants asked for and the command's switches."""
+    """Integrate by fourth-order Runge-Kutta from stop to stop: the requested instants and the command's switches."""
     states = np.empty((len(time), 2))
     states[0] = theta, omega
     k, m, now = 0, len(switches), time[0]
@@ -77,13 +77,13 @@ class Quantity:
     """A quantity of the neck that can be estimated."""
 
     name: str
-    """As result files name it."""
+    """Name in result files; it ends in the unit used there."""
     lower: float
-    """SI."""
+    """Lower bound, SI."""
     upper: float
-    """SI; stiffness and damping below the integrator's limit of stability."""
+    """Upper bound, SI; stiffness and damping below the integrator's limit of stability."""
     scale: float
-    """Magnitude, SI, that difference quotients are taken against."""
+    """Magnitude, SI, that scales the step of a difference quotient."""
     to_file: float = 1.0
     """Factor from SI to the unit in ``name``."""
 
@@ -97,21 +97,22 @@ QUANTITIES = (
     Quantity("neutral_deg", -math.pi / 2, math.pi / 2, 0.1, math.degrees(1.0)),
     Quantity("common_stretch_m", 0.0, 0.2, 0.01),
 )
-"""C; c3; h; K; torque at neutral that the springs carry too much; θ0; common stretch of two springs."""
+"""C; c3; h; K; excess of the springs' torque at neutral; θ0; common stretch of two springs."""
 DEFAULT = ("damping_nms", "torque_gain_nm_per_v", "sensor_gain_v_per_rad", "spring_rate_n_per_m")
 FREE_SWING = ("damping_nms", "spring_rate_n_per_m")
-"""What a swing without a command can tell: of c3 and h only their product is in it, one with K but for the bend."""
+"""Quantities that a swing without a command determines. c3 and h enter only as their product, which acts as K does
+except for curvature."""
 
 
 @dataclass(frozen=True)
 class LargeAngle:
     """Eq. (31) with some of its quantities free and the others known.
 
-    Everything in Eq. (31) can be divided by the inertia, so mass, L and J_cg are known here, and the command tells c3
-    and C_i by their product alone. The rotor's inertia and damping are too small to be seen. Of what is left the
-    Jacobian's singular values decide; these are of relative changes over σ, for five recordings of 8 s at 30 Hz with
-    σ = 0.2° and unknown zeros, and steps, chirps and triangles between −21° and 28° on the paper's neck with the exact
-    linkage and two springs:
+    Everything in Eq. (31) can be divided by the inertia, so mass, L and J_cg are taken as known, and the command
+    determines only the product of c3 and C_i. The rotor's inertia and damping are too small to be identified. The
+    singular values of the Jacobian decide which of the other quantities can be free. The table gives them for relative
+    changes divided by σ, for five recordings of 8 s at 30 Hz with σ = 0.2° and unknown zeros: steps, chirps and
+    triangles between −21° and 28° on the paper's neck with the exact linkage and two springs.
 
     ===================== ====================== =============================================================
     free                  singular values        relative uncertainty
@@ -124,19 +125,19 @@ class LargeAngle:
     C, c3, h, K, stretch  4200, 730, 240, 190, … 0.35 %, 0.30 %, 8.5 %, 2.8 %, 2.3 %
     ===================== ====================== =============================================================
 
-    At small angles only a, b and c are there to be seen, Eq. (28), and h and K are one: it is the bend of the spring,
-    of the linkage and of the weight that parts them. So the first row is the `DEFAULT`; where the head stays within a
-    few degrees, or γ is taken for constant, leave out h or K.
+    At small angles only a, b and c are identifiable, Eq. (28), and h and K act as one quantity. Only the curvature of
+    spring, linkage and weight separates them. The first row is therefore the `DEFAULT`. Where the head stays within a
+    few degrees, or γ is taken as constant, leave out h or K.
 
-    What is held known must be right at large angles: on the same neck a constant γ leaves 0.45° RMS where the linear
-    model leaves 0.24°, with h at its bound, and the paper's single spring, which holds nothing below −21°, runs away
-    from every start: the fit's cost is then infinite.
+    The quantities that are held fixed must be right at large angles. On the same neck a constant γ leaves 0.45° RMS,
+    with h at its bound, where the linear model leaves 0.24°. The paper's single spring, which holds nothing below −21°,
+    diverges from every start, and the fit's cost is then infinite.
     """
 
     neck: LargeAngleNeck = field(default_factory=LargeAngleNeck)
-    """What is known, and where a free quantity starts."""
+    """Values of the fixed quantities, and starting values of the free ones."""
     free: tuple[str, ...] = DEFAULT
-    """Names out of `QUANTITIES`."""
+    """Names of the free quantities, from `QUANTITIES`."""
 
     states = 2
     """Unknown initial states of a recording: angle (rad) and rate (rad/s)."""
@@ -166,7 +167,7 @@ class LargeAngle:
 
     @property
     def scales(self) -> Floats:
-        """Magnitudes, SI, that difference quotients are taken against."""
+        """Magnitudes, SI, that scale the steps of difference quotients."""
         return np.array([q.scale for q in self._quantities])
 
     @property
@@ -176,7 +177,7 @@ class LargeAngle:
 
     @property
     def nominal(self) -> Floats:
-        """The free quantities as `neck` has them, SI."""
+        """The free quantities at the values of `neck`, SI."""
         p = self.neck.parameters
         values = {
             "damping_nms": p.damping,
@@ -190,24 +191,24 @@ class LargeAngle:
         return np.array([values[name] for name in self.free])
 
     def starts(self, abc: Floats) -> list[Floats]:
-        """Work out where a fit can begin from a linear model of the same recordings.
+        """Return starting values of a fit from a linear model of the same recordings.
 
         Parameters
         ----------
         abc : (3,) ndarray
-            a (1/s), b (1/s²) and c (1/s²) of Eq. (30), command and angle both of the head: that of small angles.
+            a (1/s), b (1/s²) and c (1/s²) of Eq. (30), of small angles; command and angle are both of the head.
 
         Returns
         -------
         list of (p,) ndarray
-            SI, in the order of `names`: Eq. (33) at neutral solved for C and c3 and, as b alone does not tell them
-            apart, once for h with K as `neck` has it and once the other way round; then `nominal`.
+            SI, in the order of `names`. Eq. (33) at neutral is solved for C and c3. As b alone does not separate h
+            from K, it is solved once for h with K of `neck` and once for K with h of `neck`; `nominal` comes last.
         """
         a, b, c = abc
         near, servo = linearise(self.neck), self.neck.parameters.servo
         gamma, spring = float(self.neck.ratio.slope(0.0)), self.neck.parameters.spring
         gain = c * near.psi / servo.command_gain
-        stiffness = b * near.psi - near.eta + servo.torque_gain * servo.sensor_gain * gamma  # that the feedback brings
+        stiffness = b * near.psi - near.eta + servo.torque_gain * servo.sensor_gain * gamma  # of the feedback
         rate = spring.rate + (stiffness - gain * servo.sensor_gain * gamma) / (spring.base * spring.arm)
         found = {
             "damping_nms": a * near.psi - servo.back_emf_damping * gamma,
@@ -219,10 +220,10 @@ class LargeAngle:
         return [np.clip(value, self.lower, self.upper) for value in values] + [self.nominal]
 
     def neck_at(self, parameters: Floats) -> LargeAngleNeck:
-        """Put parameters, SI, in the order of `names`, into the neck."""
+        """Return the neck with the given parameters, SI, in the order of `names`."""
         value = dict(zip(self.free, (float(v) for v in parameters), strict=True))
         p, servo = self.neck.parameters, self.neck.parameters.servo
-        # c3 by way of the amplifier, which is nowhere else in Eq. (31)
+        # c3 is set through the amplifier gain, which appears nowhere else in Eq. (31)
         amplifier = value.get("torque_gain_nm_per_v", servo.torque_gain) / servo.torque_gain * servo.amplifier_gain
         whole = replace(
             p,
@@ -251,8 +252,8 @@ class LargeAngle:
     def run(self, parameters: Floats, time: Floats, command: Command | None, state: Floats) -> Floats:
         """Run the neck freely from an initial state; see `anglecam.models.plant.Plant.run`.
 
-        The command, rad, becomes the input voltage C_i·command, Eq. (29). Angle and rate are not finite from where the
-        head would leave the reach of its linkage.
+        The command, rad, becomes the input voltage C_i·command, Eq. (29). From the instant at which the head would
+        leave the reach of its linkage, angle and rate are not finite.
         """
         neck, nodes = self.neck_at(parameters), self._nodes
         p = neck.parameters

@@ -1,4 +1,4 @@
-"""What every forward model offers to an estimator."""
+"""The interface of a forward model that an estimator can fit."""
 
 from __future__ import annotations
 
@@ -10,7 +10,11 @@ from anglecam.data.typing import Floats
 
 
 class Model(Protocol):
-    """What can be fitted: `anglecam.models.plant.Plant` and `anglecam.models.third_order.ThirdOrder`."""
+    """A model that predicts a recording's angle from parameters, a command and an initial state.
+
+    Implemented by `anglecam.models.plant.Plant`, `anglecam.models.third_order.ThirdOrder` and
+    `anglecam.models.large_angle.LargeAngle`, where the members are documented.
+    """
 
     states: int
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,16 +11,18 @@ from anglecam.data.camera_evidence import UNKNOWN_VIEW, View
 from anglecam.data.command import Command
 from anglecam.data.typing import Floats
 from anglecam.effects import Effect, Knots
-from anglecam.models.integrator import DRY_IDS, LOAD_IDS, SERVO_IDS, WIDTH, integrate
+from anglecam.models.integrator import INTEGRATOR, Integrator
 
 MAX_STEP = 0.006
-"""s; at the paper's natural frequency of 23 rad/s a step response errs by less than 5e-5 degrees."""
+"""Longest Runge-Kutta step, s. At the paper's natural frequency of 23 rad/s it keeps the error of a step response
+below 5e-5 degrees."""
 KINKED_STEP = 0.002
-"""The same where the servo's torque has kinks, across which a step is good to second order only."""
+"""Longest step, s, where the servo's torque has kinks, across which a step is accurate to second order only, and where
+an effect adds states, which may be faster than the load."""
 SHUTTER_ITERATIONS = 3
-"""Times that a frame's instant is sought from the angle shown at it; each leaves a few hundredths of the error."""
+"""Fixed-point iterations for the instant at which a frame was exposed; each leaves a few hundredths of the error."""
 EXACT = 0.0
-"""Where nothing is nonlinear between the command's knots."""
+"""Value of the longest step that selects the exact series, for a plant that is linear between the command's knots."""
 _NO_COMMAND = Knots(np.zeros(1), np.zeros(1), np.zeros(1))
 
 
@@ -30,7 +32,9 @@ class Plant:
 
     effects: tuple[Effect, ...] = ()
     driven: bool = True
-    """Whether any recording has a command; a free swing tells nothing about c."""
+    """Whether any recording has a command; a free swing does not determine c."""
+    integrator: Integrator = field(default=INTEGRATOR, repr=False)
+    """Compiled for a ledger that contains the plant's effects."""
 
     states = 2
     """Unknown initial states of a recording: angle (rad) and rate (rad/s)."""
@@ -43,7 +47,7 @@ class Plant:
 
     @property
     def base_count(self) -> int:
-        """Parameters that are the plant's own; those of the effects follow."""
+        """Number of parameters of the plant without effects; the effects' parameters follow them."""
         return 3 if self.driven else 2
 
     @property
@@ -60,7 +64,7 @@ class Plant:
 
     @property
     def scales(self) -> Floats:
-        """Magnitudes, SI, that difference quotients are taken against."""
+        """Magnitudes, SI, that scale the steps of difference quotients."""
         return np.array([1.0, 10.0, 0.01][: self.base_count] + [0.1 for e in self.effects for _ in e.parameters])
 
     @property
@@ -70,29 +74,29 @@ class Plant:
 
     @property
     def kinked(self) -> bool:
-        """Whether torque jumps or bends: something holds the head, limits what pulls at it or leaves it unanswered."""
+        """Whether the torque jumps or has kinks: dry friction, or a servo with a limit or a dead zone."""
         return any(e.port in ("servo", "friction") for e in self.effects)
 
     def with_effect(self, effect: Effect) -> Plant:
         """Return the plant with one more effect."""
-        return Plant((*self.effects, effect), self.driven)
+        return replace(self, effects=(*self.effects, effect))
 
     def predict(
         self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNKNOWN_VIEW
     ) -> Floats:
-        """Return the (n,) angle, rad, that the camera would see of what `run` gives."""
-        own = self.parameters_by_effect(parameters)
+        """Return the (n,) angle, rad, that the camera would measure of the motion that `run` returns."""
+        pairs = self.parameters_by_effect(parameters)
         angle, rate = self.run(parameters, time, command, state).T
-        late = [(e, p) for e, p in own if e.timing is not None]
-        if late:
-            happened = time
+        timed = [(e, p) for e, p in pairs if e.timing is not None]
+        if timed:
+            exposed = time
             for _ in range(SHUTTER_ITERATIONS):
-                shown = angle + rate * (happened - time)
-                happened = time
-                for effect, values in late:
-                    happened = effect.timing(happened, shown, values, view)  # type: ignore[misc]
-            angle = self._at(parameters, time, happened, command, state)
-        for effect, values in own:
+                shown = angle + rate * (exposed - time)
+                exposed = time
+                for effect, values in timed:
+                    exposed = effect.timing(exposed, shown, values, view)  # type: ignore[misc]
+            angle = self._at(parameters, time, exposed, command, state)
+        for effect, values in pairs:
             if effect.observation is not None:
                 angle = effect.observation(time, angle, values, view)
         return angle
@@ -107,51 +111,51 @@ class Plant:
         time : (n,) ndarray
             Instants, s; the state is given at the first.
         command : Command or None
-            What was commanded; ``None`` for a free swing.
+            The command; ``None`` for a free swing.
         state : (2,) ndarray
             Angle (rad) and rate (rad/s) at ``time[0]``.
 
         Returns
         -------
         (n, 2) ndarray
-            Angle, rad, and rate, rad/s; not finite where the plant runs away.
+            Angle, rad, and rate, rad/s; not finite where the plant diverges.
         """
         abc = np.zeros(3)
         abc[: self.base_count] = parameters[: self.base_count]
-        tables = [np.zeros((max(1, len(ids)), WIDTH)) for ids in (SERVO_IDS, LOAD_IDS, DRY_IDS)]
-        knots, lag, step = _NO_COMMAND, 0.0, EXACT
+        pairs = self.parameters_by_effect(parameters)
+        knots, lag = _NO_COMMAND, 0.0
         if command is not None:
             knots = Knots(command.time, command.angle, np.zeros(len(command.time)))
-        for effect, own in self.parameters_by_effect(parameters):
+        for effect, values in pairs:
             if effect.command is not None:
-                knots = effect.command(knots, own)
+                knots = effect.command(knots, values)
             if effect.lag is not None:
-                lag += effect.lag(own)
-            for ids, table, port in zip(
-                (SERVO_IDS, LOAD_IDS, DRY_IDS), tables, ("servo", "load", "friction"), strict=True
-            ):
-                if effect.port == port:
-                    table[ids.index(effect.id), : len(own)] = own
-            if effect.port in ("servo", "load", "friction"):
-                step = KINKED_STEP if effect.port == "servo" or step == KINKED_STEP else MAX_STEP
-        rows = np.stack([knots.time, knots.level, knots.slope])
-        servos, loads, dries = tables
-        return integrate(time, state[0], state[1], rows, lag, abc, servos, loads, dries, step)
+                lag += effect.lag(values)
+        rows, table = np.stack([knots.time, knots.level, knots.slope]), self.integrator.effects.table(pairs)
+        return self.integrator.integrate(time, state[0], state[1], rows, lag, abc, table, self._max_step)
 
-    def _at(self, parameters: Floats, time: Floats, happened: Floats, command: Command | None, state: Floats) -> Floats:
-        """Return the angle, rad, at instants a little beside the frames, in any order; the state stays at the first."""
-        order = np.argsort(happened)
-        early = happened[order] < time[0]
-        grid = np.concatenate([time[:1], happened[order][~early]])
+    @property
+    def _max_step(self) -> float:
+        """Longest step of the integrator, s."""
+        ports = {e.port for e in self.effects}
+        if ports & {"servo", "dynamics"}:
+            return KINKED_STEP
+        return MAX_STEP if ports & {"load", "friction"} else EXACT
+
+    def _at(self, parameters: Floats, time: Floats, exposed: Floats, command: Command | None, state: Floats) -> Floats:
+        """Return the angle, rad, at instants near the frames, in any order; ``state`` is that of the first frame."""
+        order = np.argsort(exposed)
+        early = exposed[order] < time[0]
+        grid = np.concatenate([time[:1], exposed[order][~early]])
         states = self.run(parameters, grid, command, state)
         angle = np.empty(len(time))
         angle[order[~early]] = states[1:, 0]
-        # before the first frame there is only its tangent
-        angle[order[early]] = state[0] + state[1] * (happened[order][early] - time[0])
+        # before the first frame the motion is unknown: follow its tangent
+        angle[order[early]] = state[0] + state[1] * (exposed[order][early] - time[0])
         return angle
 
     def parameters_by_effect(self, parameters: Floats) -> list[tuple[Effect, Floats]]:
-        """Pair each effect, in the order in which the signal passes them, with its parameters, the fixed among them."""
+        """Pair each effect with its parameters, the fixed included, in the order in which the signal passes them."""
         edges = self.base_count + np.cumsum([0, *(len(e.parameters) for e in self.effects)])
         pairs = [(e, e.complete(parameters[i:j])) for e, i, j in zip(self.effects, edges, edges[1:], strict=False)]
         return sorted(pairs, key=lambda pair: pair[0].rank)

@@ -17,6 +17,7 @@ from anglecam.data.command import Command
 from anglecam.data.typing import Floats
 
 MAX_STEP = 0.004
+"""Longest step of the series, s; `ThirdOrder.upper` keeps it stable."""
 
 
 @njit(cache=True)
@@ -55,10 +56,10 @@ class ThirdOrder:
     """Third-order plant with zeros."""
 
     driven: bool = True
-    """Whether any recording has a command; a free swing tells nothing about the numerator."""
+    """Whether any recording has a command; a free swing does not determine the numerator."""
 
     states = 3
-    """Unknown initial states of a recording: angle (rad) and the two inner ones of the observer form."""
+    """Unknown initial states of a recording: angle (rad) and the two other states of the observer form."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -77,7 +78,7 @@ class ThirdOrder:
 
     @property
     def scales(self) -> Floats:
-        """Magnitudes, SI, that difference quotients are taken against."""
+        """Magnitudes, SI, that scale the steps of difference quotients."""
         return np.array([1.0, 10.0, 1e3, 1.0, 10.0, 1e3])[: self._count]
 
     @property
@@ -92,7 +93,7 @@ class ThirdOrder:
     def predict(
         self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNKNOWN_VIEW
     ) -> Floats:
-        """Run the plant freely from an initial state; see `anglecam.models.plant.Plant.run`."""
+        """Return the (n,) angle, rad, of a free run; see `anglecam.models.plant.Plant.run`."""
         switches = np.zeros(1) if command is None else command.time
         values = np.zeros(1) if command is None else command.angle
         numerator = parameters[3:] if self.driven else np.zeros(3)

@@ -12,23 +12,23 @@ from anglecam.models.model import Model
 
 
 def step_figures(model: Model, parameters: Floats, poles: NDArray, steady_state: float) -> StepFigures:
-    """Simulate the response to a unit step and read its figures off.
+    """Simulate the response to a unit step and return its figures.
 
     Parameters
     ----------
     model : Plant or ThirdOrder
-        What responds.
+        The model.
     parameters : (p,) ndarray
         Its parameters, SI.
     poles : ndarray of complex
-        Its poles, 1/s: how long and how finely to simulate.
+        Its poles, 1/s; the slowest sets the simulated time.
     steady_state : float
-        Gain at rest, to which times and overshoot refer.
+        Gain at rest; times and overshoot refer to it.
 
     Returns
     -------
     StepFigures
-        `NO_STEP` for a model that is not stable.
+        `NO_STEP` for a model that is unstable or has no steady state.
     """
     slowest = -float(np.max(poles.real))
     if slowest <= 0.0 or steady_state == 0.0:

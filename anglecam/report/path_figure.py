@@ -22,6 +22,7 @@ from anglecam.effects import effect as entry
 from anglecam.identification.fit import Fit
 from anglecam.loop.stepwise import applicable
 from anglecam.loop.verdict import Verdict
+from anglecam.models.added_acceleration import added_acceleration
 from anglecam.report.figures import AFTER, COMMAND, MEASURED, STYLE, _svg
 from anglecam.report.wording import plain
 
@@ -122,6 +123,10 @@ def curve_of(effect: Effect, fit: Fit, records: Sequence[Record]) -> EffectCurve
         return _ordered(np.degrees(x), np.degrees(torque), name, "torque added, °/s²")
     abc = np.zeros(3)
     abc[: min(3, len(fit.parameters))] = fit.parameters[:3]
+    if effect.port == "dynamics":
+        pairs = zip(records, angles, strict=True)
+        torque = np.concatenate([added_acceleration(effect, own, abc, r.time, a, r.command) for r, a in pairs])
+        return _ordered(np.degrees(angle), np.degrees(torque), "angle, °", "torque added, °/s²")
     levels = [np.zeros(len(r.time)) if r.command is None else r.command.at(r.time) for r in records]
     asked = abc[2] * np.concatenate(levels) - abc[1] * angle
     given = np.array([effect.servo(q, t, abc, own) for q, t in zip(asked, angle, strict=True)])

@@ -1,4 +1,4 @@
-"""Every effect of the ledger against a truth that shares nothing with it."""
+"""Every effect of the ledger against a reference that shares no code with it."""
 
 from __future__ import annotations
 
@@ -37,13 +37,14 @@ MOVED = {
     "linkage_geometry": ({"share": 1.0}, [1.0]),
     "constant_torque": ({"torque": 5.0}, [5.0]),
 }
+UNITS = {"", "s", "deg", "deg/s", "deg/s2", "1/s", "1/s2", "1/rad"}
 VIEW = View(neutral=math.radians(20.0), lever_px=200.0, pivot_px=(-80.0, 60.0))
 NOD = np.radians(np.linspace(-25.0, 25.0, len(TIME)))
 
 
 @pytest.mark.parametrize("kind", COMMANDS)
 @pytest.mark.parametrize("effect_id", MOVED)
-def test_motion_with_an_effect_is_the_laboratorys(tmp_path, effect_id, kind):
+def test_motion_with_an_effect_equals_the_laboratorys(tmp_path, effect_id, kind):
     truth, parameters = MOVED[effect_id]
     recording = {"name": "r", "duration_s": 6.0, "command": COMMANDS[kind]}
     plant = dict(zip("abc", ABC.tolist(), strict=True))
@@ -69,7 +70,7 @@ def _line(place: np.ndarray, pivot: np.ndarray) -> np.ndarray:
     return np.unwrap(line) if line.ndim else line
 
 
-def _mouth() -> np.ndarray:
+def _mark() -> np.ndarray:
     return np.stack([np.cos(VIEW.neutral + NOD), np.sin(VIEW.neutral + NOD)], axis=-1)
 
 
@@ -80,24 +81,24 @@ def _zeroed(line: np.ndarray) -> np.ndarray:
 def test_a_pivot_beside_the_axis_turns_the_line():
     wrong = np.array([0.25, -0.15])
     at_rest = np.array([np.cos(VIEW.neutral), np.sin(VIEW.neutral)])
-    view = replace(VIEW, neutral=float(_line(at_rest, wrong)))  # all that is known of neutral was seen from there
+    view = replace(VIEW, neutral=float(_line(at_rest, wrong)))  # neutral is known only as measured from there
     found = effect("pivot_offset").observation(TIME, NOD, wrong, view)
-    assert _zeroed(found) == pytest.approx(_zeroed(_line(_mouth(), wrong)), abs=2e-6)
+    assert _zeroed(found) == pytest.approx(_zeroed(_line(_mark(), wrong)), abs=2e-6)
 
 
-def test_a_tilted_camera_shortens_what_lies_across_its_axis():
+def test_a_tilted_camera_shortens_lengths_across_its_axis():
     tilt, axis = math.radians(15.0), math.radians(30.0)
     along = np.array([math.cos(axis), math.sin(axis)])
     across = np.array([-along[1], along[0]])
-    mouth = _mouth()
+    mark = _mark()
     height = 0.8
-    shown = (mouth @ along)[:, None] * along + math.cos(tilt) * (mouth @ across)[:, None] * across
+    shown = (mark @ along)[:, None] * along + math.cos(tilt) * (mark @ across)[:, None] * across
     shown -= height * math.sin(tilt) * across  # the line goes from a mark that stands before the plane
     expected = _zeroed(_line(shown, np.zeros(2)))
     assert _zeroed(_observe("camera_tilt", tilt, axis, height)) == pytest.approx(expected, abs=2e-6)
 
 
-def test_a_lens_draws_mouth_and_pivot_about_the_middle_of_the_picture():
+def test_a_lens_displaces_mark_and_pivot_about_the_middle_of_the_picture():
     kappa, centre = -0.04, np.array([VIEW.pivot_px[0], -VIEW.pivot_px[1]]) / VIEW.lever_px
 
     def drawn(place):
@@ -109,15 +110,15 @@ def test_a_lens_draws_mouth_and_pivot_about_the_middle_of_the_picture():
     x, y = VIEW.lever_px * pivot
     view = View(float(np.arctan2(arm[1], arm[0])), lever, (float(x), float(-y)))  # all that the picture shows
     found = effect("lens_distortion").observation(TIME, NOD, np.array([kappa]), view)
-    assert _zeroed(found) == pytest.approx(_zeroed(_line(drawn(centre + _mouth()), pivot)), abs=2e-6)
+    assert _zeroed(found) == pytest.approx(_zeroed(_line(drawn(centre + _mark()), pivot)), abs=2e-6)
 
 
-def test_a_mouth_lower_in_the_picture_is_seen_later():
+def test_a_mark_lower_in_the_picture_is_recorded_later():
     row_time, plant = 3e-5, Plant((effect("rolling_shutter"),))
     command = Command(np.array([0.0, 0.5, 2.0]), np.radians([0.0, 20.0, -10.0]))
     fine = np.arange(0.0, 6.2, 1e-4)
     angle = Plant().predict(ABC, fine, command, np.zeros(2))
-    # the shutter passes the mouth when both are at the same row
+    # the shutter passes the mark when both are at the same row
     late = fine - row_time * (VIEW.pivot_px[1] - VIEW.lever_px * np.sin(VIEW.neutral + angle))
     expected = np.interp(TIME, late, angle)
     predicted = plant.predict(np.append(ABC, row_time), TIME, command, np.zeros(2), VIEW)
@@ -125,7 +126,7 @@ def test_a_mouth_lower_in_the_picture_is_seen_later():
     assert np.degrees(np.abs(np.interp(TIME, fine, angle) - expected)).max() > 0.3
 
 
-def test_clock_and_drift_do_what_they_say():
+def test_clock_scale_stretches_the_command_and_drift_is_linear():
     command = Command(np.array([0.0, 1.0, 3.0]), np.radians([0.0, 10.0, -5.0]))
     later = Command(command.time * 1.01, command.angle)
     scaled = Plant((effect("clock_scale"),)).predict(np.append(ABC, 0.01), TIME, command, np.zeros(2))
@@ -135,10 +136,11 @@ def test_clock_and_drift_do_what_they_say():
 
 def test_the_ledger_is_the_contracts():
     assert {e.id for e in LEDGER} >= {*MOVED, "camera_tilt", "pivot_offset", "lens_distortion", "rolling_shutter"}
-    assert {e.id for e in LEDGER} >= {"clock_scale", "angle_drift"}
-    assert len(LEDGER) == 19
+    assert {e.id for e in LEDGER} >= {"clock_scale", "angle_drift", "damping_asymmetry"}
+    assert len({e.id for e in LEDGER}) == len(LEDGER)
     names = [p.name for e in LEDGER for p in e.parameters]
     assert len(set(names)) == len(names)
+    assert {p.unit for e in LEDGER for p in e.parameters} <= UNITS
     for e in LEDGER:
         assert set(e.aliases) < {other.id for other in LEDGER} - {e.id}
         assert e.needs(VIEW)
@@ -146,7 +148,7 @@ def test_the_ledger_is_the_contracts():
 
 
 @pytest.mark.parametrize("lag", [1e-6, 1e-4, 1e-3, 1e-2])
-def test_a_lag_is_as_exact_beside_what_is_nonlinear_as_alone_however_short_it_is(lag):
+def test_a_lag_of_any_length_is_as_accurate_with_a_nonlinear_effect_as_alone(lag):
     time = np.arange(0.0, 4.0, 1.0 / 30.0)
     command = Command(np.array([0.0, 0.5, 1.5, 2.7]), np.radians([0.0, 10.0, -8.0, 12.0]))
     alone, beside = Plant((effect("actuator_lag"),)), Plant((effect("actuator_lag"), effect("quadratic_drag")))

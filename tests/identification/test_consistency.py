@@ -1,4 +1,4 @@
-"""The tests of consistency themselves: how often they cry wolf, and what they catch."""
+"""The consistency tests themselves: their rate of false alarms, and the errors that they detect."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ def fitted(records):
     return fit_ekf(records, TRUE, settings_for(records, TRUE, SIGMA))
 
 
-def rarely(count, trials, probability):
-    """Whether so many of so many are within 99.8 % of what a binomial gives."""
+def plausible(count, trials, probability):
+    """Return whether a count lies within the central 99.8 % of a binomial distribution."""
     low, high = binom.interval(0.998, trials, probability)
     return low <= count <= high
 
 
 def test_bounds_hold_for_95_percent_of_sums_of_squares():
     sums = np.random.default_rng(0).chisquare(30, 2000)
-    assert rarely(sum(consistency(float(s), 30).holds for s in sums), 2000, 0.95)
+    assert plausible(sum(consistency(float(s), 30).holds for s in sums), 2000, 0.95)
 
 
-def test_errors_in_units_ten_powers_apart_are_tested_alike():
+def test_errors_in_units_that_differ_by_powers_of_ten_are_tested_alike():
     rng = np.random.default_rng(1)
     half = np.array([[1e-4, 0.0, 0.0], [0.5, 1.0, 0.0], [300.0, 100.0, 1e3]])
     errors = rng.normal(size=(4000, 3)) @ half.T
@@ -50,7 +50,7 @@ def test_errors_in_units_ten_powers_apart_are_tested_alike():
     assert found.mean == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / 12000))
 
 
-def test_one_pass_from_a_start_as_uncertain_as_stated_has_errors_and_innovations_as_large_as_stated():
+def test_one_pass_from_a_start_with_its_stated_uncertainty_has_errors_and_innovations_of_their_stated_size():
     variance = (SIGMA**2, 1e-6, *SPREAD**2)
     errors, covariances, normalised = [], [], []
     for seed in range(60):
@@ -64,10 +64,10 @@ def test_one_pass_from_a_start_as_uncertain_as_stated_has_errors_and_innovations
     assert np.mean(np.square(normalised)) == pytest.approx(1.0, abs=3.3 * np.sqrt(2.0 / np.size(normalised)))
 
 
-def test_innovations_of_the_iterated_filter_pass_both_tests_as_often_as_chance_allows():
+def test_innovations_of_the_iterated_filter_fail_both_tests_at_their_nominal_rates():
     estimates = [fitted(noisy(seed)) for seed in range(120)]
-    assert rarely(sum(innovation_consistency(e).holds for e in estimates), 120, 0.95)
-    assert rarely(sum(innovation_whiteness(e.normalised).p_value < 0.05 for e in estimates), 120, 0.05)
+    assert plausible(sum(innovation_consistency(e).holds for e in estimates), 120, 0.95)
+    assert plausible(sum(innovation_whiteness(e.normalised).p_value < 0.05 for e in estimates), 120, 0.05)
 
 
 def test_fitted_unknowns_are_not_counted_as_degrees_of_freedom():
@@ -76,13 +76,13 @@ def test_fitted_unknowns_are_not_counted_as_degrees_of_freedom():
     assert innovation_consistency(fitted([*undeclared, *undeclared])).degrees_of_freedom == 480 - 3 - 2 * 3
 
 
-def test_a_noise_that_is_stated_a_quarter_too_small_is_found_out():
+def test_noise_stated_20_percent_too_small_is_detected():
     records = noisy(0)
     estimate = fit_ekf(records, TRUE, settings_for(records, TRUE, 0.8 * SIGMA))
     assert not innovation_consistency(estimate).holds
 
 
-def test_coloured_noise_and_a_hidden_dead_time_are_not_white():
+def test_innovations_with_ar1_noise_or_an_unmodelled_dead_time_are_not_white():
     assert innovation_whiteness(fitted(noisy(0, phi=0.4)).normalised).p_value < 1e-4
     late = [record(TruePlant(dead_time_s=0.03), Recording("steps"), np.random.default_rng(0), sigma_deg=0.0)]
     assert innovation_whiteness(fitted(noisy(0, late)).normalised).p_value < 1e-4

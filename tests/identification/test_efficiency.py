@@ -36,7 +36,7 @@ SEEDS = 60
 
 @pytest.fixture(scope="module")
 def trials():
-    """Errors of the linear estimator, output error and the filter, and the covariances that the last two state."""
+    """Return errors of linear estimator, output error and filter, the covariances of the last two, and the bound."""
     exact = record(TruePlant(), Recording("steps"), np.random.default_rng(0), sigma_deg=0.0)
     exact = replace(exact, zero_known=True)
     linear = np.linalg.pinv(fit_output_error(Plant(), [exact], [TRUE]).jacobian)[:3]
@@ -60,20 +60,20 @@ def test_the_linear_estimator_meets_the_bound(trials):
     assert abs(found.mean - 1.0) < 3.3 * np.sqrt(2.0 / found.degrees_of_freedom)
 
 
-def test_output_error_and_the_filter_waste_nothing_from_starts_80_percent_off(trials):
+def test_output_error_and_the_filter_are_efficient_from_starts_80_percent_off(trials):
     linear, output_error, ekf = np.mean(trials[0] ** 2, axis=1)
     assert np.all(linear / output_error > 0.92), linear / output_error
     assert np.all(linear / ekf > 0.9), linear / ekf
 
 
-def test_parameter_errors_are_as_large_as_both_state(trials):
+def test_parameter_errors_agree_with_the_covariances_that_both_state(trials):
     errors, covariances, _ = trials
     for error, covariance in zip(errors[1:], covariances, strict=True):
         found = error_consistency(error, covariance)
         assert abs(found.mean - 1.0) < 3.3 * np.sqrt(2.0 / found.degrees_of_freedom)
 
 
-def test_roots_scatter_as_their_uncertainty_says():
+def test_the_scatter_of_roots_agrees_with_their_uncertainty():
     covariance = np.diag([0.0, 0.01, 1.0, 100.0])
     stated = roots_with_sigma(SYS2_DENOMINATOR, covariance)
     assert stated.value == pytest.approx([-13.22, -6.145 + 10.54698891j, -6.145 - 10.54698891j])
@@ -88,7 +88,7 @@ def test_roots_scatter_as_their_uncertainty_says():
 
 
 def stairs(levels, seed, sigma):
-    """Make steps of SYS2 every 1.5 s, at 30 frames a second."""
+    """Return a record of SYS2 with a step every 1.5 s, at 30 frames a second."""
     switches = np.array([0.0, *(0.51 + 1.5 * np.arange(len(levels)))])
     command = Command(switches, np.radians([0.0, *levels]))
     time = np.arange(0.0, 0.5 + 1.5 * len(levels), 1.0 / 30.0)
@@ -117,7 +117,7 @@ def test_poles_and_zeros_of_sys2_are_recovered_within_their_uncertainty():
     assert abs(error_consistency(np.array(parameters), np.array(covariances)).mean - 1.0) < 3.3 * np.sqrt(2.0 / 72)
 
 
-def test_sys2_predicts_another_series_of_steps_to_the_noise_and_the_second_order_does_not():
+def test_sys2_predicts_other_steps_down_to_the_noise_and_the_second_order_model_does_not():
     fitted = [stairs([1.0, 0.0, 0.5, -0.5, -1.0, 0.0, 0.8, 0.2], 0, np.radians(0.1))]
     other = stairs([0.3, 0.9, -0.2, -0.9, 0.0, 1.0], 1, np.radians(0.1))
     second = fit_output_error(Plant(), fitted, start_parameters(fitted))

@@ -29,7 +29,7 @@ def fitted(records, start, sigma=SIGMA):
     return fit_ekf(records, np.array(start), settings_for(records, np.array(start), sigma))
 
 
-def test_the_filter_finds_a_b_c_from_a_start_that_is_half_off_and_knows_how_well():
+def test_the_filter_finds_a_b_c_from_a_start_50_percent_off_with_errors_of_their_stated_size():
     normalised = []
     for seed in range(4):
         records = session(TruePlant(), seed, sigma_deg=0.2)
@@ -40,7 +40,7 @@ def test_the_filter_finds_a_b_c_from_a_start_that_is_half_off_and_knows_how_well
 
 
 @pytest.mark.parametrize("factors", [(0.2, 0.2, 1.8), (1.8, 1.8, 0.2), (0.2, 1.8, 1.8), (1.8, 0.2, 0.2)])
-def test_from_80_percent_off_it_settles_at_the_minimum_of_output_error_and_states_its_covariance(factors):
+def test_from_80_percent_off_it_converges_to_the_minimum_of_output_error_and_states_its_covariance(factors):
     records = [record(TruePlant(), Recording("steps"), np.random.default_rng(3), sigma_deg=0.2)]
     estimate = fitted(records, TRUE * factors)
     fit = fit_output_error(Plant(), records, [TRUE])
@@ -52,13 +52,13 @@ def test_from_80_percent_off_it_settles_at_the_minimum_of_output_error_and_state
     assert estimate.covariance == pytest.approx(bound, rel=0.01)
 
 
-def test_innovations_are_as_large_as_the_filter_says():
+def test_innovations_have_the_variance_that_the_filter_states():
     records = session(TruePlant(), 7, sigma_deg=0.2)
     estimate = fitted(records, TRUE)
     assert np.std(np.concatenate(estimate.normalised)) == pytest.approx(1.0, abs=0.1)
 
 
-def test_frames_at_irregular_times_and_missing_ones_are_no_hindrance():
+def test_irregular_and_missing_frames_are_filtered():
     full = record(TruePlant(), Recording("steps"), np.random.default_rng(0), sigma_deg=0.0, rate_hz=1000.0)
     normalised = []
     for seed in range(20):
@@ -72,7 +72,7 @@ def test_frames_at_irregular_times_and_missing_ones_are_no_hindrance():
     assert 0.6 < np.std(normalised) < 1.4  # 99 % of a standard deviation over 20 draws of what is nearly two numbers
 
 
-def test_an_undeclared_zero_is_a_state_of_its_own():
+def test_an_undeclared_zero_is_an_additional_state():
     records = session(TruePlant(), 5, sigma_deg=0.2)
     shifts = np.radians([3.0, -2.0, 1.0, 0.0, 5.0])
     records = [replace(r, angle=r.angle + shift) for r, shift in zip(records, shifts, strict=True)]
@@ -82,7 +82,7 @@ def test_an_undeclared_zero_is_a_state_of_its_own():
         assert abs(one.state[0, 5] - shift) < 4.0 * np.sqrt(one.covariance[0, 5, 5]) < np.radians(0.2)
 
 
-def test_a_free_swing_tells_a_and_b_and_nothing_of_c():
+def test_a_free_swing_determines_a_and_b_but_not_c():
     swing = Recording("release", "release", amplitude_deg=15.0, rest_s=0.0)
     records = [record(TruePlant(a=0.4, b=30.0), swing, np.random.default_rng(0), sigma_deg=0.1)]
     estimate = fitted(records, [1.0, 20.0, 0.0], np.radians(0.1))
@@ -90,7 +90,7 @@ def test_a_free_swing_tells_a_and_b_and_nothing_of_c():
     assert estimate.parameters[2] == estimate.covariance[2, 2] == 0.0
 
 
-def test_the_papers_own_settings_and_start_lead_to_its_model():
+def test_the_papers_settings_and_start_lead_to_its_model():
     records = session(TruePlant(), 8, sigma_deg=0.05)
     estimate = fit_ekf(records, np.array([5.0, 531.0, 520.0]), PAPER)
     assert estimate.parameters == pytest.approx(TRUE, rel=0.05)
@@ -117,7 +117,7 @@ class TestSelfTestOfThePaper:
         noisy = angle + rng.normal(0.0, self.sigma, len(time))
         return Record("step", time, noisy, Command(np.zeros(1), np.ones(1)), True, np.full(len(time), np.nan))
 
-    def test_the_error_is_that_of_the_bound_and_so_is_the_stated_sigma(self):
+    def test_the_error_and_the_stated_sigma_equal_the_bound(self):
         found = [fitted([self.step(np.random.default_rng(seed))], self.start, self.sigma) for seed in range(100)]
         values, stated = np.array([f.parameters for f in found]), np.array([f.covariance.diagonal() for f in found])
         records = [self.step(np.random.default_rng(0))]
@@ -127,7 +127,7 @@ class TestSelfTestOfThePaper:
         # the deviation of 100 draws is itself uncertain by 7 %
         assert np.sqrt(np.median(stated, axis=0)) / np.std(values, axis=0) == pytest.approx(1.0, abs=0.2)
 
-    def test_the_papers_settings_end_low_in_every_parameter_but_not_in_b_and_c_where_c_may_move(self):
+    def test_the_papers_settings_underestimate_every_parameter_but_not_b_and_c_where_c_is_free(self):
         settings = replace(PAPER, measurement_variance=0.5)
         free = replace(settings, initial_variance=(1000.0,) * 4 + (1e6,))
         records = [[self.step(np.random.default_rng(seed))] for seed in range(60)]
@@ -137,7 +137,7 @@ class TestSelfTestOfThePaper:
         assert np.all(let_go[1:] > 1.0), let_go
 
 
-def test_a_pass_that_runs_away_is_refused_and_the_filter_ends_where_output_error_does():
+def test_a_diverging_pass_is_rejected_and_the_filter_ends_at_the_result_of_output_error():
     records = session(TruePlant(), 4)[:-1]
     by_filter, by_output_error = (identify_records(records, Rig(), name) for name in ("ekf", "oe2"))
     assert by_filter.values == pytest.approx(by_output_error.values, rel=1e-4)

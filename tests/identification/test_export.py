@@ -1,4 +1,4 @@
-"""A fitted model in other programs: the same poles, the same covariance, units beside the numbers."""
+"""A fitted model in other programs: the same poles, the same covariance, and a unit for each number."""
 
 import json
 import subprocess
@@ -68,7 +68,7 @@ def test_poles_are_equal_in_every_form(identified, estimator, tmp_path):
     np.testing.assert_allclose(np.sort_complex(told.poles_per_s), poles, rtol=1e-12)
 
 
-def test_the_gain_at_rest_and_the_step_are_the_models(identified):
+def test_the_gain_at_rest_and_the_step_response_are_the_models(identified):
     found = identified["oe2"]
     _, angle = signal.step(scipy_system(fitted_model(found)), T=np.linspace(0.0, 2.0, 4001))
     assert angle[-1] == pytest.approx(found.step.steady_state, rel=1e-6)
@@ -86,7 +86,7 @@ def test_the_mat_file_is_a_struct_with_names_units_and_covariance(tmp_path):
     assert [str(cell[0]) for cell in struct["units"][:, 0]] == ["1/s", "1/s^2", "1/s^2"]
     np.testing.assert_array_equal(struct["covariance"], covariance)
     np.testing.assert_array_equal(struct["values"][:, 0], [26.0, 524.0, 508.0])
-    assert struct["num"].shape == (1, 1)  # rows, as MATLAB's tf takes them
+    assert struct["num"].shape == (1, 1)  # rows, as MATLAB's tf expects
     assert struct["den"].shape == (1, 3)
     assert [str(struct[key][0]) for key in ("input_unit", "output_unit")] == ["deg", "deg"]
 
@@ -118,13 +118,13 @@ def test_a_model_without_covariance_gives_its_standard_uncertainties(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"parameters": {"a_per_s": 3}}', '{"parameters": {}}', "not JSON"])
-def test_what_is_no_model_is_one_line(tmp_path, text):
+def test_a_file_that_is_no_model_is_reported_in_one_line(tmp_path, text):
     (tmp_path / "bad.json").write_text(text)
     with pytest.raises(InputError, match=r"bad.json: not a model.json"):
         read_model(tmp_path / "bad.json")
 
 
-def test_a_large_angle_model_goes_out_as_what_is_left_of_it_at_neutral():
+def test_a_large_angle_model_is_exported_as_its_linearisation_at_neutral():
     model = LargeAngle(LargeAngleNeck(gamma="exact", common_stretch=0.03))
     covariance = np.diag([1e-6, 1e-4, 1e-3, 25.0])
     out = fitted_large_angle(model, model.nominal, covariance)
@@ -151,17 +151,18 @@ def test_a_large_angle_model_goes_out_as_what_is_left_of_it_at_neutral():
         ("tau_s", "s"),
     ],
 )
-def test_units_are_read_off_names(name, unit):
+def test_units_are_parsed_from_names(name, unit):
     assert unit_of(name) == unit
 
 
 def test_loading_the_exports_does_not_load_python_control():
-    code = "import sys, anglecam.cli.app, anglecam.identification.export, json; print(json.dumps('control' in sys.modules))"
+    modules = "anglecam.cli.app, anglecam.identification.export"
+    code = f"import sys, {modules}, json; print(json.dumps('control' in sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert json.loads(done.stdout) is False
 
 
-def test_identify_writes_the_model_for_matlab_beside_its_json(tmp_path, monkeypatch):
+def test_identify_writes_the_model_for_matlab_and_as_json(tmp_path, monkeypatch):
     for record in session(Plant(), 4)[:2]:
         series = AngleSeries(
             record.name, record.time, record.angle, np.full(len(record.time), np.nan), ("ok",) * len(record.time)

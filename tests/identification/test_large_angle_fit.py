@@ -1,4 +1,4 @@
-"""Fits of the laboratory's neck at ±25°: linear, third-order and large-angle side by side."""
+"""Fits of the laboratory's neck at ±25°: linear, third-order and large-angle models compared."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def records(angles, seed):
 
 
 def missed_deg(fit: Fit, held, angle) -> float:
-    """RMS distance of a held-out prediction from the true angle, each about its own zero."""
+    """Return the RMS difference of a held-out prediction from the true angle, the mean of each subtracted."""
     wrong = held.angle - predict_output_error(fit, [held]).residuals[0] - angle
     return float(np.degrees(np.std(wrong)))
 
@@ -70,7 +70,7 @@ def test_physical_parameters_lie_within_their_stated_uncertainty(angles):
     assert np.median(relative, axis=0) == pytest.approx([0.004, 0.004, 0.02, 0.007], rel=0.35)  # C, c3, h, K
 
 
-def test_a_wrong_guess_of_every_quantity_is_mended(angles):
+def test_a_wrong_start_of_every_quantity_is_corrected(angles):
     fitted, _ = records(angles, 1)
     servo, spring = PAPER.servo, PAPER.spring
     wrong = replace(
@@ -85,7 +85,7 @@ def test_a_wrong_guess_of_every_quantity_is_mended(angles):
     assert np.all(np.abs(fit.parameters - MODEL.nominal) < 4.0 * fit.sigma)
 
 
-def test_springs_that_do_not_quite_carry_the_head_are_found_out(angles):
+def test_springs_that_do_not_balance_the_head_are_detected(angles):
     fitted, _ = records(angles, 2)
     model = LargeAngle(replace(LABORATORY, pretension_error=0.15), (*MODEL.free, "pretension_error_nm"))
     declared = [replace(r, zero_known=True) for r in fitted]
@@ -95,7 +95,7 @@ def test_springs_that_do_not_quite_carry_the_head_are_found_out(angles):
     assert abs(excess) < 4.0 * sigma  # the laboratory's are balanced
 
 
-def test_identify_fits_the_neck_and_says_so_where_it_is_declared_wrongly(angles):
+def test_identify_fits_the_neck_and_reports_a_wrong_declaration(angles):
     fitted, held = records(angles, 2)
     model = identify_records(fitted, Rig(), "neck", held_out=[held], neck=LABORATORY)
     assert model.names == MODEL.names
@@ -107,7 +107,7 @@ def test_identify_fits_the_neck_and_says_so_where_it_is_declared_wrongly(angles)
         identify_records(fitted, Rig(), "neck", neck=replace(LABORATORY, common_stretch=None))
 
 
-def test_a_model_that_lacks_something_is_doubted_and_a_bound_is_named(angles):
+def test_a_model_with_a_large_residual_or_a_parameter_at_a_bound_is_doubted(angles):
     fitted, _ = records(angles, 3)
     sure = [replace(r, sigma=np.full(len(r.time), np.radians(SIGMA_DEG / 10.0))) for r in fitted]
     linear = identify_records(sure, Rig(), "oe2")

@@ -1,4 +1,4 @@
-"""Windows: which plants are cut, how, and what the fit gains by it."""
+"""Windows: for which plants recordings are cut, how, and the effect on the fit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from anglecam.models.plant import Plant
 TIME = np.arange(0.0, 20.0, 0.02)
 SWING = Plant((effect("gravity_geometry"),), driven=False)
 HANGING = np.array([0.06, 64.0, 64.0, np.pi])
-"""a, b, G and θ0 of a pendulum whose stiffness is its weight's alone."""
+"""a, b, G and θ0 of a pendulum whose only stiffness comes from its weight."""
 
 
 def record(plant, parameters, state, command=None):
@@ -34,7 +34,7 @@ def record(plant, parameters, state, command=None):
         (0.0, 0.0, True),
     ],
 )
-def test_only_what_neither_swings_nor_comes_back_is_taken_to_drift(a, b, cut):
+def test_only_a_plant_that_neither_oscillates_nor_returns_drifts(a, b, cut):
     free = Record("one", TIME, np.zeros(len(TIME)), None, False, np.full(len(TIME), np.nan))
     assert drifts(np.array([a, b]), [free]) == cut
 
@@ -48,7 +48,7 @@ def test_windows_of_a_drifting_plant_hold_every_frame_once_and_last_two_time_con
     assert all(part.zero_known and part.name == "one" and part.command is pushed for part in parts)
 
 
-def test_a_wide_swing_that_a_linear_model_lost_count_of_is_found_through_windows():
+def test_a_wide_swing_with_which_a_linear_model_loses_step_is_fitted_through_windows():
     whole = record(SWING, HANGING, [-1.6, 0.0])
     linear = fit_output_error(Plant(driven=False), [whole], [np.array([0.1, 52.0])])
     assert loses_step(linear, [whole])

@@ -39,13 +39,13 @@ def test_a_b_c_lie_within_their_stated_uncertainty():
 @pytest.mark.parametrize(
     "plant", [TruePlant(2.0, 40.0, 38.0), TruePlant(8.0, 150.0, 300.0), TruePlant(60.0, 900.0, 880.0)]
 )
-def test_no_guess_is_needed_to_find_another_plant(plant):
+def test_other_plants_are_found_without_an_initial_guess(plant):
     records = session(plant, 1)
     fit = fit_output_error(Plant(), records, start_parameters(records))
     assert fit.parameters == pytest.approx([plant.a, plant.b, plant.c], rel=0.01)
 
 
-def test_coloured_noise_is_counted_as_fewer_observations():
+def test_sigma_includes_ar1_noise():
     normalised = []
     for seed in range(20):
         records = noisy(seed, phi=0.6)
@@ -55,7 +55,7 @@ def test_coloured_noise_is_counted_as_fewer_observations():
     assert np.all((spread > 0.6) & (spread < 1.45)), spread
 
 
-def test_errors_that_hang_together_unknown_to_the_fit_are_in_sigma():
+def test_sigma_includes_correlated_errors_that_the_fit_was_not_given():
     found, stated = [], []
     for seed in range(20):
         records = session(TruePlant(), 40 + seed, sigma_deg=0.2, phi=0.6)
@@ -83,11 +83,11 @@ def test_prediction_of_a_held_out_recording_leaves_the_noise():
     assert np.degrees(predict_output_error(fit, [held_out]).rmse) == pytest.approx(0.1, rel=0.1)
 
 
-def test_errors_of_the_angles_change_parameters_as_foretold_and_not_at_all_where_zeros_take_them_up():
+def test_angle_errors_shift_parameters_as_predicted_and_not_at_all_where_fitted_zeros_absorb_them():
     known = [replace(r, zero_known=True) for r in EXACT]
     fit = fit_output_error(Plant(), known, [TRUE])
-    for course in (np.ones_like, np.sin):
-        errors = [1e-4 * course(r.angle) for r in known]
+    for shape in (np.ones_like, np.sin):
+        errors = [1e-4 * shape(r.angle) for r in known]
         off = fit_output_error(
             Plant(), [replace(r, angle=r.angle + e) for r, e in zip(known, errors, strict=True)], [TRUE]
         )
@@ -100,37 +100,37 @@ def test_errors_of_the_angles_change_parameters_as_foretold_and_not_at_all_where
 class TwoAlike:
     """Two parameters whose effects on the angle are nearly the same; the second is at most 1."""
 
-    states, names = 2, ("told", "bounded")
+    states, names = 2, ("free", "bounded")
     lower, upper, scales, to_file = np.zeros(2), np.array([np.inf, 1.0]), np.ones(2), np.ones(2)
 
     def predict(self, parameters, time, command, state, view=None):
         return parameters @ [np.sin(time), np.sin(1.05 * time)]
 
 
-def test_what_hangs_together_with_a_parameter_on_its_bound_is_as_unsure_as_the_bound_leaves_it():
+def test_sigma_of_a_parameter_correlated_with_one_at_its_bound_includes_the_distance_from_the_bound():
     rng, sigma, time = np.random.default_rng(0), 0.2, np.arange(0.0, 9.0, 1.0 / 15.0)
     exact = TwoAlike().predict(np.array([1.0, 0.9]), time, None, None)
     columns = np.column_stack([np.sin(time), np.sin(1.05 * time)])
     unbounded = sigma * np.sqrt(np.linalg.inv(columns.T @ columns)[0, 0])
-    model, unsure, sure = TwoAlike(), [], []
+    model, relaxed, fixed = TwoAlike(), [], []
     for _ in range(200):
         angle = exact + sigma * rng.standard_normal(len(time))
         measured = Record("one", time, angle, None, zero_known=True, sigma=np.full(len(time), sigma))
         fit = fit_output_error(model, [measured], [np.array([1.0, 0.5])], nuisance=[np.zeros(2)])
         if fit.parameters[1] > 1.0 - 1e-6:
             assert np.isnan(fit.sigma[1])
-            # no surer without the bound; the noise is known to 6 %
+            # no larger than without the bound; the noise is known to 6 %
             assert np.sqrt(fit.covariance[0, 0]) < 1.2 * unbounded
-            unsure.append((fit.parameters[0] - 1.0) / fit.sigma[0])
-            sure.append((fit.parameters[0] - 1.0) / (sigma / np.linalg.norm(np.sin(time))))
-    assert len(unsure) > 30
-    assert np.mean(np.abs(unsure) < 1.96) >= 0.9
-    assert np.mean(np.abs(sure) < 1.96) < 0.7  # as if the bound were the truth
+            relaxed.append((fit.parameters[0] - 1.0) / fit.sigma[0])
+            fixed.append((fit.parameters[0] - 1.0) / (sigma / np.linalg.norm(np.sin(time))))
+    assert len(relaxed) > 30
+    assert np.mean(np.abs(relaxed) < 1.96) >= 0.9
+    assert np.mean(np.abs(fixed) < 1.96) < 0.7  # as if the bound were the truth
 
 
 @dataclass(frozen=True)
-class RunsAway:
-    """The angle grows with time, and beyond a certain rate it runs away."""
+class Diverges:
+    """The angle grows with time, and beyond a certain rate it diverges."""
 
     beyond: float
 
@@ -141,9 +141,9 @@ class RunsAway:
         return parameters[0] * time if parameters[0] <= 1.0 else np.full(len(time), self.beyond)
 
 
-@pytest.mark.parametrize("beyond", [np.nan, 1e240])  # it has no number any more, or its square has none
-def test_a_start_beside_which_the_plant_runs_away_costs_nothing(beyond):
+@pytest.mark.parametrize("beyond", [np.nan, 1e240])  # the angle is not finite, or its square overflows
+def test_a_start_next_to_which_the_plant_diverges_is_fitted(beyond):
     time = np.arange(0.0, 2.0, 0.1)
     measured = Record("one", time, 0.5 * time, None, zero_known=True, sigma=np.full(len(time), 0.01))
-    fit = fit_output_error(RunsAway(beyond), [measured], [np.ones(1)], nuisance=[np.zeros(2)])
+    fit = fit_output_error(Diverges(beyond), [measured], [np.ones(1)], nuisance=[np.zeros(2)])
     assert fit.parameters == pytest.approx([0.5])

@@ -1,4 +1,4 @@
-"""The smoother against the textbook's recursion and against truth."""
+"""The smoother against the textbook's recursion and against the truth."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ TRUE = np.array([26.0, 524.0, 508.0])
 SIGMA = np.radians(0.2)
 PROCESS = 1e-6
 SPREAD = np.array([0.01, 0.1, 1.0, 10.0, 10.0])
-"""Deviations of the state before the first frame."""
+"""Standard deviations of the state before the first frame."""
 
 
 def wandering(rng):
-    """Draw a first state, let all five be knocked about at every frame, and film it: the filter's own assumptions."""
+    """Return true states with process noise in all five, and the filter's pass: data that meet its assumptions."""
     frames = record(TruePlant(), Recording("steps", duration_s=4.0), np.random.default_rng(0), sigma_deg=0.0)
     mean = np.array([0.0, 0.0, *TRUE])
     true = [mean + SPREAD * rng.normal(size=5)]
@@ -43,7 +43,7 @@ def wandering(rng):
 
 
 def textbook(passed):
-    """Rauch, Tung and Striebel as it is written."""
+    """Return the recursion of Rauch, Tung and Striebel as printed."""
     state, covariance = [passed.state[-1]], [passed.covariance[-1]]
     for i in range(len(passed.state) - 2, -1, -1):
         P, ahead = passed.covariance[i], passed.prior_covariance[i + 1]
@@ -58,7 +58,7 @@ def trials():
     return [wandering(np.random.default_rng(seed)) for seed in range(40)]
 
 
-def test_it_is_the_smoother_of_rauch_tung_and_striebel(trials):
+def test_the_result_equals_that_of_rauch_tung_and_striebel(trials):
     passed = trials[0][1]
     smoothed, (state, covariance) = smooth([passed])[0], textbook(passed)
     deviation = np.sqrt(np.einsum("nii->ni", covariance))
@@ -67,7 +67,7 @@ def test_it_is_the_smoother_of_rauch_tung_and_striebel(trials):
     assert np.max(np.abs(smoothed.covariance - covariance) / scale) < 1e-6
 
 
-def test_filtered_and_smoothed_errors_are_as_large_as_stated_in_all_five_states(trials):
+def test_filtered_and_smoothed_errors_agree_with_their_covariance_in_all_five_states(trials):
     for frame in (5, 40, 80, 110):
         filtered = error_consistency(
             np.array([passed.state[frame] - true[frame] for true, passed in trials]),
@@ -89,7 +89,7 @@ def test_smoothing_lowers_the_error_of_angle_and_rate(trials):
     assert np.all(after < 0.8 * before)
 
 
-def test_without_process_noise_a_long_overdamped_record_is_smoothed_to_the_noise_of_three_numbers():
+def test_without_process_noise_a_long_overdamped_record_keeps_only_the_noise_of_its_parameters():
     plant = TruePlant(a=200.0, b=2000.0, c=2000.0)  # over 20 s its fast mode decays by e⁻³⁷⁰⁰: no way back through F⁻¹
     recording = Recording("steps", duration_s=20.0)
     exact = record(plant, recording, np.random.default_rng(1), sigma_deg=0.0)
@@ -102,7 +102,7 @@ def test_without_process_noise_a_long_overdamped_record_is_smoothed_to_the_noise
     assert np.sqrt(np.mean(error**2)) < 0.2 * SIGMA
 
 
-def test_parameters_smoothed_in_one_recording_know_of_all_others():
+def test_parameters_smoothed_in_one_recording_use_all_others():
     records = session(TruePlant(), 3, sigma_deg=0.2)
     estimate = fit_ekf(records, TRUE, settings_for(records, TRUE, SIGMA))
     for one in smooth(estimate.filtered):
@@ -110,7 +110,7 @@ def test_parameters_smoothed_in_one_recording_know_of_all_others():
         assert one.covariance[-1, 2:5, 2:5] == pytest.approx(estimate.covariance, rel=1e-3)
 
 
-def test_the_smoothed_angle_is_nearer_to_the_truth_than_the_filtered_and_the_measured():
+def test_the_smoothed_angle_is_closer_to_the_truth_than_the_filtered_and_the_measured_angle():
     rows = np.array([[0.0, 0.0], [1.0, 12.0], [3.0, -6.0]])
     recording = Recording("steps", duration_s=5.0)
     made = record(TruePlant(), recording, np.random.default_rng(0), sigma_deg=0.2)

@@ -1,4 +1,4 @@
-"""Parameters are as sure as the pivot is known, in every recording anew, and as a declared neutral is."""
+"""Parameters are no more certain than the pivot of each recording and a declared neutral allow."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from support.series import session
 TRUE = np.array([26.0, 524.0, 508.0])
 EXACT = session(TruePlant(), 0, sigma_deg=0.0)
 OWN = np.radians(0.001)
-"""Each frame's own noise."""
+"""Noise independent from frame to frame, rad."""
 PIVOT = 1e-3
 """Standard uncertainty of the pivot, lever arms."""
 
@@ -33,7 +33,7 @@ def fitted(records):
     return fit, full_sigma(fit, records, Noise(OWN, 0.0, 0.1, "stated"))
 
 
-def test_a_pivot_that_is_wrong_in_every_recording_is_in_the_parameters_uncertainty():
+def test_the_parameters_uncertainty_includes_a_wrong_pivot_in_every_recording():
     rng = np.random.default_rng(1)
     fits = []
     for _ in range(20):
@@ -49,7 +49,7 @@ def test_a_pivot_that_is_wrong_in_every_recording_is_in_the_parameters_uncertain
     assert np.all(noise_alone[1:] > 2.0), noise_alone
 
 
-def test_a_declared_neutral_that_is_off_is_too():
+def test_the_parameters_uncertainty_includes_a_wrong_declared_neutral():
     rng = np.random.default_rng(2)
     fits = []
     for _ in range(20):
@@ -67,17 +67,17 @@ def test_a_declared_neutral_that_is_off_is_too():
     assert np.all(spread_of(fits)[0] < 1.45)
 
 
-def test_what_scatters_less_than_is_stated_has_the_rest_in_common():
+def test_stated_uncertainty_beyond_the_scatter_counts_as_common_to_all_frames():
     common = replace(EXACT[0], sigma=np.full(len(EXACT[0].time), 5 * OWN), zero_known=True)
     noise = OWN * np.random.default_rng(3).normal(size=len(common.time))
     records = [replace(common, angle=common.angle + noise)]
     torque = Plant().with_effect(effect("constant_torque"))
     fit = fit_output_error(torque, records, [np.append(TRUE, 0.0)])
-    sigma = full_sigma(fit, records, Noise(5 * OWN, 0.0, 0.1, "stated"))  # as if all of it were each frame's own
+    sigma = full_sigma(fit, records, Noise(5 * OWN, 0.0, 0.1, "stated"))  # as if all of it were independent
     assert sigma[3] == pytest.approx(TRUE[1] * np.sqrt(24.0) * OWN, rel=0.05)
 
 
-def test_a_filters_parameters_are_no_surer_than_the_pivot_lets_them_be():
+def test_the_filters_uncertainties_include_the_pivots():
     sigma = [np.sqrt(OWN**2 + PIVOT**2 * (2 - 2 * np.cos(r.angle))) for r in EXACT]
     noise = np.random.default_rng(4)
     records = [
@@ -88,7 +88,7 @@ def test_a_filters_parameters_are_no_surer_than_the_pivot_lets_them_be():
     assert filtered.sigmas == pytest.approx(optimal.sigmas, rel=0.1)
 
 
-def test_where_no_uncertainty_is_stated_the_scatter_alone_counts():
+def test_without_stated_uncertainty_only_the_scatter_counts():
     unstated = [replace(r, sigma=np.full(len(r.time), np.nan)) for r in EXACT]
     records = [replace(r, angle=r.angle + OWN * np.cos(1e4 * r.time)) for r in unstated]
     fit, sigma = fitted(records)

@@ -26,11 +26,10 @@ def test_another_process_finds_the_compiled_integrator():
     assert said.split() == ["1", "0"]
 
 
-def test_a_change_of_an_effect_changes_what_the_compiled_integrator_is_known_by(tmp_path, monkeypatch):
+def test_the_cache_key_of_the_compiled_integrator_changes_with_the_source_of_an_effect(tmp_path):
     (tmp_path / "drag.py").write_text("one")
-    monkeypatch.setattr(integrator.effects, "__path__", [str(tmp_path)])
-    before = integrator._sources()
+    before = integrator.hash_of_sources(tmp_path)
     (tmp_path / "drag.py").write_text("two")
-    assert integrator._sources() != before
+    assert integrator.hash_of_sources(tmp_path) != before
     (enclosed,) = (cell.cell_contents for cell in integrator.integrate.py_func.__closure__ or ())
     assert enclosed == integrator.SOURCES

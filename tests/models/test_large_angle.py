@@ -1,4 +1,4 @@
-"""The compiled large-angle neck against the laboratory, its small-angle limit, and what can be told from its angle."""
+"""The compiled large-angle neck against the laboratory, its small-angle limit, and identifiability."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_prediction_agrees_with_the_laboratory(name):
     assert np.degrees(predicted) == pytest.approx(np.degrees(true_angle(name)), abs=5e-5)
 
 
-def test_small_commands_are_answered_as_by_equation_28():
+def test_the_response_to_small_commands_is_that_of_equation_28():
     linear, small = linear_neck(PAPER), command("chirp", share=1e-4)
     expected = Plant().predict(np.array([linear.a, linear.b, linear.c]), TIME, small, REST)
     for neck in (LargeAngleNeck(), LargeAngleNeck(common_stretch=0.03)):
@@ -35,7 +35,7 @@ def test_small_commands_are_answered_as_by_equation_28():
         assert predicted == pytest.approx(expected, abs=2e-4 * np.max(np.abs(expected)))
 
 
-def test_parameters_land_where_equation_31_has_them():
+def test_parameters_enter_equation_31_at_their_places():
     model = LargeAngle(LABORATORY, tuple(q.name for q in QUANTITIES))
     values = np.array([0.2, 2.5, 1.1, 1500.0, 0.1, 0.7, 0.03])
     neck = model.neck_at(values)
@@ -57,7 +57,7 @@ def test_the_command_gain_of_equation_29_scales_the_command():
     assert LargeAngle(neck).predict(nominal, TIME, double, REST) == pytest.approx(expected, abs=1e-15)
 
 
-def test_a_linear_model_tells_where_to_start():
+def test_a_linear_model_gives_the_starting_values():
     model, near = LargeAngle(LABORATORY), linearise(LABORATORY)
     for start in model.starts(np.array([near.a, near.b, near.c])):
         assert start == pytest.approx(model.nominal, rel=1e-9)
@@ -73,17 +73,17 @@ def test_a_head_driven_beyond_its_linkage_has_no_angle():
     assert np.all(np.isnan(predicted[TIME > 1.0]))
 
 
-def test_four_quantities_show_at_large_angles_and_three_at_small_ones():
+def test_four_quantities_are_identifiable_at_large_angles_and_three_at_small_angles():
     wide, narrow = singular_values(LABORATORY, 1.0), singular_values(LABORATORY, 0.2)
     constant = singular_values(LargeAngleNeck(common_stretch=LABORATORY.common_stretch), 0.2)
     assert wide[0] / wide[-1] < 150
-    assert wide[-1] > 30  # relative uncertainty of the least seen combination below 1/30
-    assert narrow[-1] < 2  # not seen at all
+    assert wide[-1] > 30  # relative uncertainty of the least certain combination below 1/30
+    assert narrow[-1] < 2  # not identifiable
     assert constant[-1] < 0.3
-    assert narrow[-2] > 20  # the other three are
+    assert narrow[-2] > 20  # the other three are identifiable
 
 
-def test_an_unknown_quantity_is_named_with_those_that_there_are():
+def test_an_unknown_quantity_is_reported_with_the_known_ones():
     with pytest.raises(ValueError, match="no quantity 'mass'; choose from damping_nms"):
         LargeAngle(LABORATORY, ("mass",))
     with pytest.raises(ValueError, match="one spring has none"):
@@ -91,7 +91,7 @@ def test_an_unknown_quantity_is_named_with_those_that_there_are():
 
 
 def singular_values(neck: LargeAngleNeck, share: float) -> np.ndarray:
-    """Of the default set's Jacobian in relative changes over 0.2°, initial states and zeros projected out."""
+    """Return those of the default set's Jacobian, relative changes over 0.2°, nuisance parameters projected out."""
     model, parts = LargeAngle(neck), []
     p = model.nominal
     for name in COMMANDS:

@@ -1,4 +1,4 @@
-"""The compiled integrator against closed forms and against an event-based oracle that shares nothing with it."""
+"""The compiled integrator against closed forms and against an event-based reference that shares no code with it."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from scipy.linalg import expm
 from anglecam.data.command import Command
 from anglecam.effects import LEDGER, effect
 from anglecam.effects.effect import PORTS
+from anglecam.models.compiled_effects import STEPPED_PORTS
 from anglecam.models.plant import Plant
 from support.motion import Plant as TruePlant
 from support.motion import Recording, command_rows, move
@@ -41,13 +42,13 @@ def test_effects_at_their_null_change_nothing():
     base = Plant().predict(np.array([26.0, 524.0, 508.0]), TIME, command, np.array([0.1, 0.5]))
     nulls = np.concatenate([e.null for e in LEDGER])
     full = Plant(LEDGER).predict(np.array([26.0, 524.0, 508.0, *nulls]), TIME, command, np.array([0.1, 0.5]))
-    # an effect at one of the integrator's three ports goes by steps, and the others then change nothing
+    # an effect inside the equation of motion is integrated in steps; the others then change nothing
     stepped = Plant((effect("dead_zone"),)).predict(
         np.array([26.0, 524.0, 508.0, 0.0]), TIME, command, np.array([0.1, 0.5])
     )
     assert full == pytest.approx(stepped, abs=1e-14)
     assert np.degrees(np.abs(base - full)).max() < 1e-4
-    outside = tuple(e for e in LEDGER if e.port not in ("servo", "load", "friction"))
+    outside = tuple(e for e in LEDGER if e.port not in STEPPED_PORTS)
     nulls = np.concatenate([e.null for e in outside])
     part = Plant(outside).predict(np.array([26.0, 524.0, 508.0, *nulls]), TIME, command, np.array([0.1, 0.5]))
     assert part == pytest.approx(base, abs=1e-14)
@@ -89,13 +90,14 @@ def test_prediction_is_smooth_in_the_dead_time():
     assert np.max(np.abs(fine - coarse)) < 0.02 * np.max(np.abs(fine))
 
 
-def test_every_entry_of_the_ledger_says_what_a_reader_needs():
+def test_every_entry_of_the_ledger_is_complete():
     ids = {e.id for e in LEDGER}
     assert ids >= {"dead_time", "coulomb_friction", "quadratic_drag"}
     for entry in LEDGER:
         assert entry.station in ("command", "actuator", "load", "camera")
         assert all((entry.summary, entry.equation, entry.relaxes, entry.separating_experiment, entry.source))
         assert sum(getattr(entry, port) is not None for port in PORTS) == 1
+        assert (entry.states > 0) == (entry.port in ("lag", "dynamics"))
         assert entry.parameters[0].starts
         for p in entry.parameters:
             assert p.symbol in entry.equation

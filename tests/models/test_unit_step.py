@@ -1,4 +1,4 @@
-"""Step figures against the paper's own models, as recomputed."""
+"""Step figures of the paper's models, recomputed."""
 
 from __future__ import annotations
 

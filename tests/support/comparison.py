@@ -1,4 +1,4 @@
-"""Models beside a measurement that none of them was fitted to, as Figs. 11 and 15 set SYS1 and SYS2."""
+"""Models compared with a measurement that none of them was fitted to, as SYS1 and SYS2 in Figs. 11 and 15."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Comparison:
-    """What such a figure draws; arrays of length n."""
+    """Data of such a figure; arrays of length n."""
 
     time: Floats
-    """s."""
+    """Frame times, s."""
     command: Floats
-    """rad; zeros without a command."""
+    """Command, rad; zeros without a command."""
     measured: Floats
-    """rad."""
+    """Measured angle, rad."""
     predicted: dict[str, Floats]
     """Free run of each model, rad, by its name."""
     rmse: dict[str, float]
@@ -32,19 +32,19 @@ class Comparison:
 
 
 def compare_models(record: Record, fits: Mapping[str, Fit]) -> Comparison:
-    """Let models predict a recording in free run.
+    """Predict a recording with several models in free run.
 
     Parameters
     ----------
     record : Record
-        Held out: only its first state, and its zero unless declared, are fitted.
+        Held-out recording: only its first state, and its zero unless declared, are fitted.
     fits : mapping of str to Fit
-        Models by name, such as SYS1 and SYS2.
+        Models by name, for example SYS1 and SYS2.
 
     Returns
     -------
     Comparison
-        In the order of ``fits``.
+        Predictions and errors in the order of ``fits``.
     """
     runs = {name: predict_output_error(fit, [record]) for name, fit in fits.items()}
     return Comparison(

@@ -1,4 +1,4 @@
-"""Whether an estimator is as good as it says: χ² tests of its errors and of its innovations.
+"""χ² tests of an estimator's errors and innovations against the uncertainty that it states.
 
     NEES   eᵀP⁻¹e         of an error e whose stated covariance is P: χ² with as many degrees of freedom as e has
     NIS    yᵀS⁻¹y         of an innovation y whose stated variance is S: the same, and needs no truth
@@ -22,16 +22,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Consistency:
-    """A mean of squared normalised errors beside what it should be."""
+    """A mean of squared normalised errors and the range that is expected."""
 
     mean: float
-    """Per degree of freedom: 1 is expected, more says that the stated uncertainty is too small."""
+    """Mean per degree of freedom. 1 is expected; a larger mean shows that the stated uncertainty is too small."""
     lower: float
-    """Below which it falls by chance once in forty times."""
+    """The mean is lower by chance once in forty times."""
     upper: float
-    """Above which it rises by chance once in forty times."""
+    """The mean is higher by chance once in forty times."""
     degrees_of_freedom: int
-    """Of the sum."""
+    """Degrees of freedom of the sum."""
 
     @property
     def holds(self) -> bool:
@@ -47,12 +47,12 @@ def consistency(total: float, degrees_of_freedom: int) -> Consistency:
     total : float
         The sum.
     degrees_of_freedom : int
-        How many independent normal terms of variance 1 it should be the squares of.
+        Number of independent normal terms of variance 1 whose squares it should be the sum of.
 
     Returns
     -------
     Consistency
-        Everything per degree of freedom.
+        Mean and bounds per degree of freedom.
     """
     lower, upper = special.chdtri(degrees_of_freedom, [0.975, 0.025]) / degrees_of_freedom
     return Consistency(total / degrees_of_freedom, float(lower), float(upper), degrees_of_freedom)
@@ -66,7 +66,7 @@ def error_consistency(errors: Floats, covariances: Floats) -> Consistency:
     errors : (m, k) ndarray
         Estimate minus truth, of m independent trials.
     covariances : (m, k, k) ndarray
-        As the estimator stated them; not singular.
+        Covariances that the estimator states; not singular.
 
     Returns
     -------
@@ -84,13 +84,13 @@ def innovation_consistency(estimate: EkfEstimate) -> Consistency:
     Parameters
     ----------
     estimate : EkfEstimate
-        All its recordings are taken together.
+        Result of the filter; all its recordings are tested together.
 
     Returns
     -------
     Consistency
-        With the number of frames as degrees of freedom, less the unknowns that further passes have fitted to them: the
-        sum is then the least sum of squares.
+        Its degrees of freedom are the number of frames minus the unknowns that passes after the first fit to them, as
+        the sum is then a minimised sum of squares.
     """
     normalised = np.concatenate(estimate.normalised)
     return consistency(float(normalised @ normalised), len(normalised) - estimate.fitted)
@@ -98,11 +98,12 @@ def innovation_consistency(estimate: EkfEstimate) -> Consistency:
 
 @dataclass(frozen=True)
 class Whiteness:
-    """Ljung and Box's test."""
+    """Result of Ljung and Box's test."""
 
     statistic: float
     """Q = N(N + 2) Σ r_k²/(N − k), χ² with as many degrees of freedom as lags for white innovations."""
     lags: int
+    """Largest distance, frames."""
     p_value: float
     """Probability of so large a statistic by chance."""
     correlation: Floats
@@ -110,15 +111,15 @@ class Whiteness:
 
 
 def innovation_whiteness(normalised: Sequence[Floats], *, lags: int = 12) -> Whiteness:
-    """Test whether innovations are independent of those before (Ljung and Box, Biometrika 65, 1978).
+    """Test whether innovations are independent of earlier ones (Ljung and Box, Biometrika 65, 1978).
 
     Parameters
     ----------
     normalised : sequence of (n,) ndarray
         Normalised innovations of each recording; products are taken within recordings only.
     lags : int
-        How far apart, in frames, at most. Parameters of a plant fitted to the same data, unlike those of a model of the
-        noise, cost no degree of freedom.
+        Largest distance, frames. Plant parameters fitted to the same data cost no degree of freedom; parameters of a
+        noise model would.
 
     Returns
     -------

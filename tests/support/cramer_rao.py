@@ -1,8 +1,9 @@
 """The Cramér–Rao bound: no unbiased estimator of a model's parameters has a smaller covariance.
 
-    cov ≥ σ² [(JᵀJ)⁻¹]_pp,   J = ∂(angles)/∂(parameters, every recording's own unknowns)
+    cov ≥ σ² [(JᵀJ)⁻¹]_pp,   J = ∂(angles)/∂(parameters, nuisance parameters of every recording)
 
-The unknowns of a recording, its first state and perhaps its zero, are in J because they have to be estimated too.
+The nuisance parameters of a recording, its first state and perhaps its zero, are part of J because they are estimated
+too.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ Floats = NDArray[np.float64]
 
 
 def cramer_rao_bound(
-    model: Model, parameters: Floats, records: Sequence[Record], own: Sequence[Floats], sigma: float
+    model: Model, parameters: Floats, records: Sequence[Record], nuisance: Sequence[Floats], sigma: float
 ) -> Floats:
-    """Bound the covariance of a model's parameters for given commands, frame times and noise.
+    """Return the lower bound of the parameters' covariance for given commands, frame times and noise.
 
     Parameters
     ----------
@@ -33,9 +34,9 @@ def cramer_rao_bound(
     parameters : (p,) ndarray
         Its true parameters, SI.
     records : sequence of Record
-        For their frame times and commands; their angles are not used.
-    own : sequence of ndarray
-        Each recording's true unknowns: initial states, then the zero (rad) unless declared.
+        Their frame times and commands are used; their angles are not.
+    nuisance : sequence of ndarray
+        True nuisance parameters of each recording: initial states, then the zero (rad) unless declared.
     sigma : float
         Standard deviation of white noise on every angle, rad.
 
@@ -46,21 +47,21 @@ def cramer_rao_bound(
     """
     exact = [
         replace(r, angle=model.predict(parameters, r.time, r.command, o[: model.states]) + o[model.states :].sum())
-        for r, o in zip(records, own, strict=True)
+        for r, o in zip(records, nuisance, strict=True)
     ]
-    # a fit that begins at the truth ends there, and leaves its derivatives
-    return parameter_covariance(fit_output_error(model, exact, [parameters], nuisance=own), sigma)
+    # a fit that starts at the truth ends there and provides the derivatives
+    return parameter_covariance(fit_output_error(model, exact, [parameters], nuisance=nuisance), sigma)
 
 
 def parameter_covariance(fit: Fit, sigma: float) -> Floats:
-    """Return the covariance of fitted parameters under noise of known size: the bound where the fit ended.
+    """Return the covariance of fitted parameters for noise of known size: the bound at the fit's result.
 
     Parameters
     ----------
     fit : Fit
-        With no parameter at a bound of its own.
+        Fit with no parameter at one of its bounds.
     sigma : float
-        Standard deviation of the noise, rad; `Fit.covariance` takes what the residual shows.
+        Standard deviation of the noise, rad; `Fit.covariance` estimates it from the residuals.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The laboratory's neck at large angles, commanded as far as its linkage reaches, and the model of just that neck."""
+"""The laboratory's neck at large angles, commanded over the full reach of its linkage, and the model of that neck."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ TIME = np.arange(0.0, 6.0, 1 / 30)
 
 _LIMIT = slack_limit(PAPER.spring, *LargeAngleNeck(gamma="exact").ratio.reach)
 LABORATORY = LargeAngleNeck(gamma="exact", common_stretch=1.25 * _LIMIT)
-"""Springs a quarter more stretched than needed lest one go slack, as in `synth.motion.neck`."""
+"""Springs stretched a quarter more than is needed to keep both taut, as in `synth.motion.neck`."""
 
 
 def command(name: str, share: float = 1.0) -> Command:
-    """Give one of the commands, or a share of it."""
+    """Return one of the commands, scaled by ``share``."""
     rows = _rows(name)
     return Command(rows[:, 0], share * np.radians(rows[:, 1]))
 
 
 def true_angle(name: str) -> NDArray[np.float64]:
-    """Let the laboratory answer one of the commands: rad at `TIME`."""
+    """Return the laboratory's response to one of the commands, rad, at `TIME`."""
     spec = spec_of({}, COMMANDS[name], NECK)
     return move(spec, spec.recordings[0], _rows(name), TIME[-1]).angle(TIME)
 
 
 def noisy(name: str, angle: NDArray[np.float64], rng: np.random.Generator, sigma_deg: float) -> Record:
-    """Measure an angle with white noise, its zero unknown."""
+    """Return a record of an angle with white noise and an unknown zero."""
     measured = angle + rng.normal(0.0, math.radians(sigma_deg), len(angle))
     return Record(name, TIME, measured, command(name), False, np.full(len(angle), np.nan))
 

@@ -1,7 +1,7 @@
-"""The true motion behind a drawn film: commands, and the plant that answers them.
+"""The true motion behind a drawn film: commands, and the response of the plant.
 
-θ̈ = c·u − a·θ̇ − b·θ, by the matrix exponential from one instant to the next, so the linear answer has no step
-size. Quadratic drag and dry friction are integrated from event to event. SI and radians inside.
+θ̈ = c·u − a·θ̇ − b·θ is solved by the matrix exponential from one instant to the next, so the linear response has no step
+size. Quadratic drag and dry friction are integrated from event to event. Units inside are SI and radians.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 UPDATE_S = 0.02
-"""A servo takes a new set-point 50 times a second: smooth commands are stairs of this tread."""
+"""Interval of a servo's set-points, s: 50 a second. Smooth commands are stairs with this tread."""
 
 
 @dataclass(frozen=True)
 class Plant:
-    """Second-order plant with the effects that may be hidden in it."""
+    """Second-order plant with the effects that it may contain."""
 
     a: float = 26.0
     """Viscous damping, 1/s."""
@@ -28,34 +28,34 @@ class Plant:
     c: float = 508.0
     """Drive, 1/s²."""
     dead_time_s: float = 0.0
-    """The command acts this much later."""
+    """Delay of the command, s."""
     quadratic_drag: float = 0.0
     """q in −q·θ̇·abs(θ̇), 1/rad."""
     coulomb: float = 0.0
     """Dry friction while moving, rad/s²."""
     breakaway: float | None = None
-    """Dry friction at rest, rad/s²; None: the same as while moving."""
+    """Dry friction at rest, rad/s²; ``None`` for the same as while moving."""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """What is played to the rig while one clip is taken."""
+    """The command played to the rig during one clip."""
 
     name: str
     kind: str = "steps"
     """steps | stairs | triangle | chirp | random | release; release has no command file."""
     duration_s: float = 8.0
     amplitude_deg: float = 12.0
-    """Largest command; for a release, the angle the head is let go from."""
+    """Largest command; for a release, the angle from which the body is released."""
     rest_s: float = 0.8
     """Time at rest before anything moves."""
     fastest_hz: float = 3.0
-    """Where a chirp ends."""
+    """Frequency at the end of a chirp."""
     held_out: bool = False
 
 
 def command_rows(recording: Recording, rng: np.random.Generator) -> np.ndarray:
-    """Rows (time_s, command_deg), each held until the next; switches fall between frames, not on them."""
+    """Return rows (time_s, command_deg), each held until the next; switches fall between frames."""
     start, end, top = recording.rest_s, recording.duration_s, recording.amplitude_deg
     if recording.kind in {"steps", "stairs", "random"}:
         shares = {
@@ -77,12 +77,12 @@ def command_rows(recording: Recording, rng: np.random.Generator) -> np.ndarray:
         else:
             raise ValueError(f"no command for a recording of kind {recording.kind!r}")
     rows = np.vstack([[0.0, 0.0], np.column_stack([times, levels])])
-    # The file is the truth: what is played is what can be read back from it.
+    # the file is the truth: the command is played as it can be read back from the file
     return np.column_stack([rows[:, 0].round(6), rows[:, 1].round(5)])
 
 
 def move(plant: Plant, recording: Recording, times: np.ndarray, rows: np.ndarray | None) -> np.ndarray:
-    """Angle in degrees at the given times, from rest at zero, or let go from `amplitude_deg` without rows."""
+    """Return the angle, degrees, at given times, from rest at zero or, without rows, released from `amplitude_deg`."""
     if rows is None:
         angle, begin = np.radians(recording.amplitude_deg), recording.rest_s
         knots, levels = np.array([begin]), np.array([0.0])
@@ -99,7 +99,7 @@ def move(plant: Plant, recording: Recording, times: np.ndarray, rows: np.ndarray
 def _by_exponential(
     plant: Plant, knots: np.ndarray, levels: np.ndarray, times: np.ndarray, begin: float, angle: float
 ) -> np.ndarray:
-    """Angles at `times` with the command as a third, constant state: (θ, ω, u) ← exp(A·Δt)·(θ, ω, u)."""
+    """Return the angles at `times` with the command as a third, constant state: (θ, ω, u) ← exp(A·Δt)·(θ, ω, u)."""
     instants = np.union1d(np.union1d(knots[knots > begin], times), [begin])
     held = levels[np.maximum(np.searchsorted(knots, instants, side="right") - 1, 0)]
     A = np.array([[0.0, 1.0, 0.0], [-plant.b, -plant.a, plant.c], [0.0, 0.0, 0.0]])
@@ -114,7 +114,7 @@ def _by_exponential(
 def _by_events(
     plant: Plant, knots: np.ndarray, levels: np.ndarray, times: np.ndarray, begin: float, angle: float
 ) -> np.ndarray:
-    """Angles at `times`, from switch to switch and from stop to stop: the sign of ω never changes inside a step."""
+    """Return the angles at `times`, integrated between switches and stops, so that ω has one sign within each run."""
     last = max(times[-1], begin) + 1e-9
     switches = np.append(np.union1d([begin], knots[(knots > begin) & (knots < last)]), last)
     limit = plant.coulomb if plant.breakaway is None else plant.breakaway

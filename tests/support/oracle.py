@@ -2,9 +2,9 @@
 
     share = coverage(border(vertices_px, faces), width, height)
 
-It knows nothing of meshes, depth or cameras. Each edge of the border is cut where it crosses those of pixels; a piece
-that falls by dy within a pixel covers everything to its right by dy (Green's theorem), so that a running sum along
-each row gives the areas. No samples are taken anywhere.
+It uses no meshes, depth or cameras. Each edge of the border is cut where it crosses pixel edges. A piece that falls by
+dy within a pixel covers everything to its right by dy (Green's theorem), so a running sum along each row gives the
+areas. Nothing is sampled.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 
 def coverage(border_px: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Share of each pixel (height, width) within a border of directed edges (n, 2, 2); pixel (0, 0) is at (0, 0)."""
+    """Return each pixel's share, (height, width), inside a border of (n, 2, 2) directed edges; (0, 0) is a centre."""
     area = np.zeros((height, width + 1))
     for start, end in np.asarray(border_px, dtype=float) + 0.5:  # from pixel centres to pixel corners
         cuts = np.unique(np.concatenate([[0.0, 1.0], *(_crossings(start[k], end[k]) for k in (0, 1))]))
@@ -30,22 +30,22 @@ def coverage(border_px: np.ndarray, width: int, height: int) -> np.ndarray:
 
 
 def centroid(share: np.ndarray) -> np.ndarray:
-    """Centre of a picture's light (x, y), px."""
+    """Return the centroid (x, y), px, of a picture's intensity."""
     y, x = np.indices(share.shape)
     return np.array([np.average(x, weights=share), np.average(y, weights=share)])
 
 
 def border(vertices_px: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Directed edges (n, 2, 2) about what triangles cover that are seen from their front, given projected vertices."""
+    """Return the directed edges (n, 2, 2) around the area of the triangles that face the camera."""
     ahead, behind = (vertices_px[faces[:, k]] - vertices_px[faces[:, 0]] for k in (1, 2))
-    # y points down in a picture, so what is counter-clockwise in the world is clockwise here
+    # y points down in a picture: counter-clockwise in the world is clockwise here
     front = faces[ahead[:, 0] * behind[:, 1] - ahead[:, 1] * behind[:, 0] < 0]
     edges = {(int(a), int(b)) for face in front for a, b in zip(face, np.roll(face, -1), strict=True)}
     return vertices_px[[edge for edge in edges if edge[::-1] not in edges]]
 
 
 def _crossings(start: float, end: float) -> np.ndarray:
-    """Where along an edge, 0 to 1, a coordinate crosses whole numbers."""
+    """Return the positions along an edge, 0 to 1, at which a coordinate crosses whole numbers."""
     low, high = sorted((start, end))
     whole = np.arange(np.ceil(low), np.floor(high) + 1)
     return (whole - start) / (end - start) if high > low else np.empty(0)

@@ -1,9 +1,9 @@
-"""Poles and zeros with their uncertainty: the parameters' covariance carried over to a polynomial's roots.
+"""Poles and zeros with their uncertainty: the parameters' covariance propagated to the roots of a polynomial.
 
     p(s) = Σ c_k·sᵏ = 0   ⇒   ∂s/∂c_k = −sᵏ/p′(s)
 
-To first order, so for roots farther apart than their uncertainty: where two meet p′ = 0, and they move by the square
-root of a change.
+This is first order and holds for roots farther apart than their uncertainty. At a double root p′ = 0, and the roots
+move by the square root of a change.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ class Roots:
     """Roots of a real polynomial."""
 
     value: NDArray[np.complex128]
-    """(n,), by real part, upper of a pair first, 1/s."""
+    """(n,) in the order of the real part, the upper root of a pair first, 1/s."""
     covariance: Floats
-    """(n, 2, 2) of each root's real and imaginary part, 1/s²; nothing in the imaginary part of a real root."""
+    """(n, 2, 2) covariance of each root's real and imaginary part, 1/s²; zero for the imaginary part of a real root."""
 
     @property
     def sigma(self) -> Floats:
@@ -32,19 +32,19 @@ class Roots:
 
 
 def roots_with_sigma(coefficients: Floats, covariance: Floats) -> Roots:
-    """Find a polynomial's roots and their uncertainty.
+    """Return a polynomial's roots and their uncertainty.
 
     Parameters
     ----------
     coefficients : (n + 1,) ndarray
         Highest power first, as in `numpy.roots`.
     covariance : (n + 1, n + 1) ndarray
-        Of the coefficients; zeros for one that is fixed, such as the leading 1 of a denominator.
+        Covariance of the coefficients; zeros for a fixed one, for example the leading 1 of a denominator.
 
     Returns
     -------
     Roots
-        All n.
+        All n roots.
     """
     value = np.roots(coefficients).astype(complex)
     value = value[np.lexsort((-value.imag, value.real.round(9)))]

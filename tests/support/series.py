@@ -1,6 +1,6 @@
-"""Angle series made to order, with noise of known size and colour, for tests that need no film.
+"""Angle series with noise of known size and AR(1) coefficient, for tests that need no film.
 
-The motion comes from `support.motion`, which integrates the plant on its own.
+The motion comes from `support.motion`, whose integration shares nothing with the package.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from support.motion import Plant, Recording, command_rows, move
 
 
 def noise(rng: np.random.Generator, n: int, sigma: float, phi: float = 0.0) -> NDArray[np.float64]:
-    """Draw (n,) AR(1) noise of standard deviation ``sigma``."""
+    """Return (n,) AR(1) noise of standard deviation ``sigma`` and coefficient ``phi``."""
     e = rng.normal(size=n)
     for i in range(1, n):
         e[i] = phi * e[i - 1] + np.sqrt(1.0 - phi**2) * e[i]
@@ -30,7 +30,7 @@ def record(
     phi: float = 0.0,
     rate_hz: float = 30.0,
 ) -> Record:
-    """Make one recording's series: exact motion plus noise."""
+    """Return one recording's series: exact motion plus noise."""
     rows = None if recording.kind == "release" else command_rows(recording, rng)
     time = np.arange(0.0, recording.duration_s, 1.0 / rate_hz)
     if rows is None:
@@ -41,7 +41,7 @@ def record(
 
 
 def session(plant: Plant, seed: int, *, sigma_deg: float = 0.05, phi: float = 0.0) -> list[Record]:
-    """Make steps, stairs, triangle, chirp and random steps; the last is meant to be held out."""
+    """Return records of steps, stairs, triangle, chirp and random steps; the last is meant to be held out."""
     rng = np.random.default_rng(seed)
     kinds = ("steps", "stairs", "triangle", "chirp", "random")
     return [record(plant, Recording(kind, kind), rng, sigma_deg=sigma_deg, phi=phi) for kind in kinds]

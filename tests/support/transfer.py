@@ -14,7 +14,7 @@ SYS2 = np.array([*SYS2_DENOMINATOR[1:], *SYS2_NUMERATOR])
 def respond(
     numerator: np.ndarray, denominator: np.ndarray, times: np.ndarray, switches: np.ndarray, levels: np.ndarray
 ) -> np.ndarray:
-    """Give the (n,) response from rest at zero: H(s)/s = Σ rᵢ/(s − pᵢ), so a unit step answers Σ rᵢ·exp(pᵢt)."""
+    """Return the (n,) response from rest at zero: H(s)/s = Σ rᵢ/(s − pᵢ), so the step response is Σ rᵢ·exp(pᵢt)."""
     residues, poles, _ = residue(numerator, np.polymul(denominator, [1.0, 0.0]))
     since = np.maximum(times[:, None] - switches, 0.0)
     steps = np.exp(since[:, :, None] * poles) @ residues

@@ -1,0 +1,167 @@
+"""Effects with additional states, defined in this file only, against SciPy's integration of the same equations."""
+
+from __future__ import annotations
+
+import sys
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numba import njit
+from scipy.integrate import solve_ivp
+
+from anglecam.data.command import Command
+from anglecam.effects import LEDGER, Effect, Parameter, effect, ledger_of
+from anglecam.models.added_acceleration import added_acceleration
+from anglecam.models.integrator import integrator_of
+from anglecam.models.plant import Plant
+
+A, B, C = 26.0, 524.0, 508.0
+TIME = np.arange(0.0, 5.0, 1 / 30)
+COMMAND = Command(np.array([0.0, 0.51, 1.9, 3.2]), np.array([0.0, 0.3, -0.2, 0.05]))
+RATIO, FREQUENCY, DAMPING = 0.3, 40.0, 3.0
+
+
+@njit
+def _second_mass(theta, omega, v, abc, states, parameters):
+    """Return ÿ and the reaction on the load of a mass at y on a spring and a damper."""
+    push = parameters[1] ** 2 * (theta - states[0]) + parameters[2] * (omega - states[1])
+    return (states[1], push), -parameters[0] * push
+
+
+@njit
+def _moves_along(theta, omega, v, abc, parameters):
+    return (theta, omega)
+
+
+@njit
+def _lagging_drive(theta, omega, v, abc, states, parameters):
+    """Replace the drive c·v by c·x with τ·ẋ = v − x."""
+    return ((v - states[0]) / parameters[0],), abc[2] * (states[0] - v)
+
+
+@njit
+def _settled(theta, omega, v, abc, parameters):
+    return (v,)
+
+
+def _entry(effect_id, states, dynamics, initial, *parameters):
+    return Effect(
+        effect_id, "load", "", "", "", parameters, (), "", "", states=states, dynamics=dynamics, initial=initial
+    )
+
+
+EFFECT = _entry(
+    "second_mass",
+    2,
+    _second_mass,
+    _moves_along,
+    Parameter("inertia_ratio", "μ", 0.0, 0.0, 1.0, (0.1,)),
+    Parameter("frequency_per_s", "ω", 0.0, 0.0, 500.0, (40.0,)),
+    Parameter("damping_per_s", "d", 0.0, 0.0, 500.0, (3.0,)),
+)
+LAGGING = _entry("drive_state", 1, _lagging_drive, _settled, Parameter("lag_s", "τ", 0.0, 0.0, 1.0, (0.05,)))
+
+
+@pytest.fixture(scope="module")
+def integrator():
+    """Compile the package's ledger, the effect of this module and one more."""
+    (mine,) = ledger_of([sys.modules[__name__]])
+    return integrator_of((*LEDGER, mine, LAGGING))
+
+
+def second_mass(state, u, sign):
+    theta, omega, y, speed = state
+    push = FREQUENCY**2 * (theta - y) + DAMPING * (omega - speed)
+    return C * u - A * omega - B * theta - RATIO * push - sign, push
+
+
+def reference(first, friction=0.0):
+    """Integrate load and second mass between switches and standstills; dry friction is F·sgn θ̇."""
+    state, angles = np.array(first, dtype=float), np.empty(len(TIME))
+    for now, until in pairwise([*COMMAND.time, TIME[-1] + 1e-9]):
+        u = float(COMMAND.at(np.array([now]))[0])
+        while now < until:
+            torque = second_mass(state, u, 0.0)[0]
+            stuck = friction > 0.0 and state[1] == 0.0 and abs(torque) <= friction
+            direction = np.sign(state[1] or torque)
+
+            def rate(_t, x, u=u, stuck=stuck, direction=direction):
+                acceleration, push = second_mass(x, u, friction * direction)
+                return [0.0, 0.0, x[3], push] if stuck else [x[1], acceleration, x[3], push]
+
+            def ends(_t, x, u=u, stuck=stuck, direction=direction):
+                return abs(second_mass(x, u, 0.0)[0]) - friction if stuck else direction * x[1]
+
+            ends.terminal, ends.direction = friction > 0.0, (1.0 if stuck else -1.0)
+            run = solve_ivp(rate, (now, until), state, "DOP853", events=ends, dense_output=True, rtol=1e-10, atol=1e-12)
+            inside = (now <= TIME) & (run.t[-1] >= TIME)
+            angles[inside] = run.sol(TIME[inside])[0]
+            now, state = run.t[-1], run.y[:, -1].copy()
+            if run.status == 1 and not stuck:
+                state[1] = 0.0
+            elif run.status == 1:  # just over the level that holds
+                state[1] = 1e-12 * np.sign(second_mass(state, u, 0.0)[0])
+    return angles
+
+
+@pytest.mark.parametrize("first", [(0.0, 0.0), (0.1, 0.5)])
+def test_a_second_mass_behind_a_spring_moves_the_load_as_scipy_integrates_it(integrator, first):
+    plant = Plant((EFFECT,), integrator=integrator)
+    predicted = plant.predict(np.array([A, B, C, RATIO, FREQUENCY, DAMPING]), TIME, COMMAND, np.array(first))
+    assert np.degrees(predicted) == pytest.approx(np.degrees(reference([*first, *first])), abs=1e-4)
+    without = Plant().predict(np.array([A, B, C]), TIME, COMMAND, np.array(first))
+    assert np.max(np.abs(np.degrees(predicted - without))) > 1.0
+
+
+def test_states_go_on_while_dry_friction_holds_the_load(integrator):
+    plant = Plant((EFFECT, effect("coulomb_friction")), integrator=integrator)
+    parameters = np.array([A, B, C, RATIO, FREQUENCY, DAMPING, 8.0, 0.0, 0.0, 0.0])
+    predicted = plant.predict(parameters, TIME, COMMAND, np.zeros(2))
+    assert np.degrees(predicted) == pytest.approx(np.degrees(reference(np.zeros(4), 8.0)), abs=2e-3)
+
+
+def test_a_lag_as_a_state_equals_the_lag_in_closed_form(integrator):
+    parameters, first = np.array([A, B, C, 0.05]), np.array([0.1, 0.5])
+    stepped = Plant((LAGGING,), integrator=integrator).predict(parameters, TIME, COMMAND, first)
+    closed = Plant((effect("actuator_lag"),)).predict(parameters, TIME, COMMAND, first)
+    assert np.degrees(stepped) == pytest.approx(np.degrees(closed), abs=1e-4)
+
+
+def test_two_effects_with_states_act_together(integrator):
+    parameters = np.array([A, B, C, RATIO, FREQUENCY, DAMPING])
+    both = Plant((EFFECT, LAGGING), integrator=integrator)
+    mixed = Plant((EFFECT, effect("actuator_lag")), integrator=integrator)
+    first = np.array([0.1, 0.5])
+    predicted = [p.predict(np.append(parameters, 0.05), TIME, COMMAND, first) for p in (both, mixed)]
+    assert np.degrees(predicted[0]) == pytest.approx(np.degrees(predicted[1]), abs=1e-4)
+
+
+@pytest.mark.parametrize("effects", [(), ("coulomb_friction",), ("dead_zone", "quadratic_drag", "backlash"), LEDGER])
+def test_an_effect_added_to_the_ledger_leaves_every_other_prediction_bit_for_bit(integrator, effects):
+    entries = tuple(effect(e) if isinstance(e, str) else e for e in effects)
+    parameters = np.concatenate([[A, B, C], *([p.starts[0] for p in e.parameters] for e in entries)])
+    angles = [
+        plant.predict(parameters, TIME, COMMAND, np.array([0.1, 0.5]))
+        for plant in (Plant(entries), Plant(entries, integrator=integrator))
+    ]
+    assert np.array_equal(angles[0], angles[1], equal_nan=True)
+
+
+def test_an_effect_at_its_null_changes_nothing(integrator):
+    plant = Plant((EFFECT,), integrator=integrator)
+    at_null = plant.predict(np.array([A, B, C, *EFFECT.null]), TIME, COMMAND, np.array([0.1, 0.5]))
+    without = Plant((effect("dead_zone"),)).predict(np.array([A, B, C, 0.0]), TIME, COMMAND, np.array([0.1, 0.5]))
+    assert at_null == pytest.approx(without, abs=1e-14)  # both in Runge-Kutta steps of one length
+
+
+def test_the_acceleration_added_along_a_motion_is_that_of_the_equation(integrator):
+    time = np.arange(0.0, 2.0, 1e-3)
+    values = np.array([RATIO, FREQUENCY, DAMPING])
+    plant = Plant((EFFECT,), integrator=integrator)
+    motion = plant.run(np.array([A, B, C, *values]), time, COMMAND, np.array([0.1, 0.5]))
+    added = added_acceleration(EFFECT, values, np.array([A, B, C]), time, motion[:, 0], COMMAND)
+    left = np.gradient(motion[:, 1], time) - (C * COMMAND.at(time) - A * motion[:, 1] - B * motion[:, 0])
+    away = np.abs(time - 0.51) > 0.01  # a difference quotient across the step of the command is neither side's
+    away[[0, -1]] = False
+    assert added[away] == pytest.approx(left[away], abs=0.02 * np.max(np.abs(left)))
