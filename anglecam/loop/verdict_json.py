@@ -62,7 +62,7 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
     dict
         Every candidate has its error on what is held out, those among them that the loop did not try there.
     """
-    model = dict(zip(verdict.after.model.names, parameter_values(verdict), strict=True))
+    model = fitted_parameters(verdict)
     named = {name for accepted in verdict.accepted for name in accepted.alias_set}
     return {
         "verdict": verdict.verdict,
@@ -137,7 +137,8 @@ def _held_out_error(candidate: Candidate, verdict: Verdict) -> float:
     return predict_held_out(candidate.fit, verdict.fitted, ())[0].rmse
 
 
-def parameter_values(verdict: Verdict) -> list[dict[str, float]]:
+def fitted_parameters(verdict: Verdict) -> dict[str, dict[str, float]]:
+    """Return each parameter of the final model by name: ``value`` and ``sigma``, in the unit that its name states."""
     fit = verdict.after
     own = [p for a in verdict.accepted for p in a.effect.parameters]
     base = len(fit.parameters) - len(own)
@@ -146,4 +147,4 @@ def parameter_values(verdict: Verdict) -> list[dict[str, float]]:
     # with less than this the recordings do not tell it, as with an asymmetry of friction that hardly acts
     certain = [(value, s if s < p.upper - p.lower else np.nan) for p, (value, s) in zip(own, pairs[base:], strict=True)]
     told = pairs[:base] + [p.told(*pair) for p, pair in zip(own, certain, strict=True)]
-    return [{"value": value, "sigma": sigma} for value, sigma in told]
+    return {name: {"value": value, "sigma": sigma} for name, (value, sigma) in zip(fit.model.names, told, strict=True)}

@@ -159,18 +159,18 @@ def error_figure(before: Prediction, after: Prediction | None, floor: float) -> 
         return _svg(figure)
 
 
-def remainder_figure(remainders: Sequence[ResidualTorque]) -> str:
+def residual_torque_figure(torques: Sequence[ResidualTorque]) -> str:
     """Draw the torque that is left over against angle, velocity, command and time; points, and their means."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(2, 2, figsize=(WIDTH, 5.4), sharey=True, layout="constrained")
-        torque = np.degrees(np.concatenate([r.torque for r in remainders]))
-        noise = 2.0 * np.degrees(float(np.median(np.concatenate([r.sigma for r in remainders]))))
+        torque = np.degrees(np.concatenate([r.torque for r in torques]))
+        noise = 2.0 * np.degrees(float(np.median(np.concatenate([r.sigma for r in torques]))))
         against = {
-            "angle of the model, °": np.degrees(np.concatenate([r.angle for r in remainders])),
-            "velocity of the model, °/s": np.degrees(np.concatenate([r.velocity for r in remainders])),
+            "angle of the model, °": np.degrees(np.concatenate([r.angle for r in torques])),
+            "velocity of the model, °/s": np.degrees(np.concatenate([r.velocity for r in torques])),
         }
-        if any(r.command is not None for r in remainders):
-            commands = [np.zeros(len(r.time)) if r.command is None else r.command for r in remainders]
+        if any(r.command is not None for r in torques):
+            commands = [np.zeros(len(r.time)) if r.command is None else r.command for r in torques]
             against["command, °"] = np.degrees(np.concatenate(commands))
         else:
             axes[1, 1].set_axis_off()
@@ -181,10 +181,10 @@ def remainder_figure(remainders: Sequence[ResidualTorque]) -> str:
             ax.plot(*_means(x, torque), "o-", color=MEASURED, ms=4, lw=1.2, label="mean")
             ax.set_xlabel(label)
         last = axes.flat[len(against)]
-        for remainder in remainders:
-            last.plot(remainder.time, np.degrees(remainder.torque), lw=0.8, label=remainder.name)
+        for one in torques:
+            last.plot(one.time, np.degrees(one.torque), lw=0.8, label=one.name)
         last.set_xlabel("time, s")
-        if len(remainders) <= MOST:
+        if len(torques) <= MOST:
             handles, names = last.get_legend_handles_labels()
             last.legend(handles[1:], names[1:], fontsize=7, ncols=2)
         for ax in axes[:, 0]:

@@ -159,7 +159,7 @@ def _figures(verdict: Verdict, experiment: Experiment | None, series: Sequence[A
     if verdict.candidates:
         drawn["candidates"] = figures.candidate_figure(verdict.candidates, [a.effect.id for a in verdict.accepted])
     if verdict.verdict == "unexplained":
-        drawn["remainder"] = figures.remainder_figure(
+        drawn["residual_torque"] = figures.residual_torque_figure(
             estimate_residual_torque(verdict.after, verdict.fitted, verdict.noise)
         )
     if experiment is not None and experiment.command is not None and experiment.separated:

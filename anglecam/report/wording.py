@@ -6,7 +6,7 @@ import numpy as np
 
 from anglecam.effects import Effect
 from anglecam.loop.verdict import Verdict
-from anglecam.loop.verdict_json import parameter_values
+from anglecam.loop.verdict_json import fitted_parameters
 
 
 def sentence(verdict: Verdict) -> str:
@@ -44,7 +44,7 @@ def plain(effect_id: str) -> str:
 
 def describe(effect: Effect, verdict: Verdict) -> str:
     """Return an effect's fitted parameters with their standard uncertainties, as text."""
-    model = dict(zip(verdict.after.model.names, parameter_values(verdict), strict=True))
+    model = fitted_parameters(verdict)
     fitted = ((p.name, model[p.name]) for p in effect.parameters)
     return ", ".join(f"{name} = {with_uncertainty(told['value'], told['sigma'])}" for name, told in fitted)
 
