@@ -1,4 +1,4 @@
-"""What is small enough in a film to be the measurement's own."""
+"""The smallest first effect in a film exceeds the errors of the measurement."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CAMERA = 2e-4
         (5.0 * CAMERA, 0.0, 1.0),
     ],
 )
-def test_a_first_effect_must_do_twice_what_may_follow_the_motion_and_the_whole_uncertainty(left, phi, times):
+def test_a_first_effect_must_exceed_the_uncertainty_and_twice_the_part_that_can_follow_the_motion(left, phi, times):
     task = SimpleNamespace(camera=CAMERA)
     first = SimpleNamespace(cross_validated=SimpleNamespace(rmse=0.0))
     assert smallest_first_effect(task, first, SimpleNamespace(rmse=left, phi=phi)) == pytest.approx(times * CAMERA)

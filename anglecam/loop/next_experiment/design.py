@@ -29,7 +29,6 @@ from scipy.optimize import least_squares
 from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
-from anglecam.effects import LEDGER
 from anglecam.identification.fit import Fit, whiten
 from anglecam.identification.noise import Noise
 from anglecam.io.files import write_atomically
@@ -76,35 +75,9 @@ class Experiment:
         return _smallest(self.separations, self.separated or tuple(self.separations))
 
     @property
-    def per_second(self) -> float:
-        """Log-likelihood ratio expected for that pair, nat/s."""
-        return 0.5 * self.separation**2 / self.duration
-
-    @property
     def separated(self) -> tuple[Pair, ...]:
         """Pairs that this experiment separates."""
         return tuple(pair for pair, distance in self.separations.items() if distance >= self.separated_sigmas)
-
-    @property
-    def advice(self) -> str:
-        """The experiment in words, and for pairs that it does not separate the experiments that their effects name."""
-        what = "release" if self.command is None else "command"
-        lines = [f"No {what} within the rig's limits distinguishes the models in {LONGEST:g} s."]
-        if self.separated:
-            apart = "; ".join(
-                f"{first} and {second} then differ by {self.separations[first, second]:.2g} σ of the noise"
-                for first, second in self.separated
-            )
-            do = "Film" if self.command is None else "Play and film"
-            lines = [f"{do} {self.duration:g} s: {self.description}; {apart}."]
-        for (first, second), distance in self.separations.items():
-            if distance < self.separated_sigmas:
-                effects = [e for e in LEDGER if e.id in f"{first} + {second}".split(" + ")]
-                instead = "; ".join(f"{e.id}: {e.separating_experiment}" for e in effects)
-                lines.append(
-                    f"{first} and {second} differ by {distance:.2g} σ only, too little to distinguish them. {instead}"
-                )
-        return "\n".join(lines)
 
 
 @dataclass(frozen=True)
