@@ -54,7 +54,7 @@ class EffectCurve:
 
 
 def path_figure(verdict: Verdict) -> str:
-    """Draw the signal path as SVG: a box for each station, the effects considered there, and attributed ones as curves."""
+    """Draw the signal path as SVG: a box for each station, the effects considered, and attributed ones as curves."""
     considered = applicable([*verdict.fitted, *verdict.held_out])
     found = [a.effect for a in verdict.accepted]
     instead = {name for a in verdict.accepted for name in a.rivals}

@@ -9,7 +9,7 @@ from benchmarks.blind.judged import told
 
 CASES = sorted(path.parent for path in Path(__file__).parent.glob("*/spec.yaml"))
 SMALL = ("0029",)
-"""Filmed in every run of the tests; tests/cli/test_app.py takes a small film with an effect through the command line."""
+"""Filmed in every run of the tests; tests/cli/test_app.py closes the loop on a small film with an effect."""
 
 
 @pytest.mark.parametrize("name", SMALL)

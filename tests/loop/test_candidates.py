@@ -79,9 +79,7 @@ def test_in_a_film_a_change_below_the_angles_uncertainty_adds_no_staged_paramete
 
 
 @pytest.mark.parametrize(("sigma_deg", "alike"), [(0.002, "camera_tilt"), (0.05, "lens_distortion")])
-def test_of_effects_closer_than_the_cameras_uncertainty_the_simpler_one_is_named_unless_evidence_is_strong(
-    sigma_deg, alike
-):
+def test_between_effects_closer_than_the_cameras_uncertainty_only_strong_evidence_decides(sigma_deg, alike):
     effects = {"camera_tilt": {"tilt_deg": 9.0}}
     fitted, predicted = split_records(session(effects, seed=3, sigma_deg=sigma_deg), HELD_OUT)
     base = fit_output_error(Plant(), fitted, [np.array([26.0, 524.0, 508.0])])

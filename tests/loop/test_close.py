@@ -44,8 +44,8 @@ def test_the_hidden_effect_is_named_with_its_true_size(true, effect_id, name, va
 
 @pytest.mark.parametrize("seed", [105, 108])
 def test_a_wrongly_predicted_breakaway_does_not_contradict_dry_friction(seed):
-    # at each seed the fitted recordings do not determine the breakaway torque, or do not require it, and the held-out one
-    # depends on it
+    # at each seed the fitted recordings do not determine the breakaway torque, or do not require it, although the
+    # held-out one depends on it
     friction = {"coulomb_friction": {"torque": 1.83, "breakaway": 2.69}}
     verdict = close_records(drawn_session(friction, seed=seed, sigma_deg=0.0005), held_out=HELD_OUT)
     assert [a.effect.id for a in verdict.accepted] == ["coulomb_friction"]

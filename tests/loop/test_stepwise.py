@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from anglecam.loop.policy import DEFAULT
 from anglecam.loop.stepwise import smallest_first_effect
 
 CAMERA = 2e-4
@@ -22,7 +23,7 @@ CAMERA = 2e-4
     ],
 )
 def test_a_first_effect_must_exceed_the_uncertainty_and_twice_the_part_that_can_follow_the_motion(left, phi, times):
-    task = SimpleNamespace(camera=CAMERA)
+    task = SimpleNamespace(camera=CAMERA, policy=DEFAULT)
     first = SimpleNamespace(cross_validated=SimpleNamespace(rmse=0.0))
     assert smallest_first_effect(task, first, SimpleNamespace(rmse=left, phi=phi)) == pytest.approx(times * CAMERA)
     coarse = SimpleNamespace(cross_validated=SimpleNamespace(rmse=1e4 * CAMERA))

@@ -107,7 +107,7 @@ def ratio_gained(fits: list[Fit], records: list[Record], new: Record) -> float:
         ({"coulomb_friction": {"torque": 0.5}}, "quadratic_drag", 0.0),
     ],
 )
-def test_the_new_recording_gains_the_predicted_likelihood_ratio_faster_than_repeated_recordings(
+def test_the_proposed_recording_gains_the_predicted_likelihood_ratio_and_faster_than_repetition(
     rig, hidden, other, phi
 ):
     true_rig = rig(hidden, SLOW_STEPS, phi)
