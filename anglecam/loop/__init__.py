@@ -1,1 +1,1 @@
-"""Closing the loop: is anything missing from the model, what is it, and does it prove itself on new data."""
+"""Closing the loop: test whether the model lacks something, attribute it to an effect, and validate that effect."""

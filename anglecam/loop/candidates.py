@@ -1,4 +1,4 @@
-"""Attribution: every effect that could be added is fitted, and those that cannot be told apart are kept together."""
+"""Attribution: fit every promising effect, and find the effects that the recordings cannot distinguish."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.output_error import first_state, fit_best_start, fit_output_error, output_error
 from anglecam.loop.cross_validation import Prediction, predict_held_out
+from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_of, plant_of, refit_without
 from anglecam.loop.screen import Forecast
 from anglecam.threads import native_threads
@@ -24,52 +25,44 @@ from anglecam.threads import native_threads
 T = TypeVar("T")
 R = TypeVar("R")
 
-PROMISING, LEAST_PROMISING = 8, 3
-"""Most and fewest effects that are fitted, of those that the screen puts first."""
-HOPEFUL = 0.2
-"""Share of the best forecast below which an effect is not fitted, or if so from one start only, and of the best fit
-below which it is not tried on what was not fitted."""
-FULFILLED = 0.7
-"""Share of its forecast that a fit must reach, or else it begins again from where the screen tried the effect and from
-the effect's own start; and if it then reaches less than `HOPEFUL`, from half and twice the forecast's."""
-ASKED_FOR = 0.01
-"""Late parameters of an effect are left out unless without them so good a fit of them would be this improbable."""
-NEAREST = 8
-"""Starts of a late parameter that are fitted from, of those that come nearest."""
-SLOW = 0.2
-"""Share of the fastest speed in the recordings that counts as slow."""
-ALIAS_LEVEL = 0.05
+STAGED_STARTS = 8
+"""Start values of a staged parameter from which a fit is made: those with the smallest cost before fitting."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect added to a plant and fitted, and, where it is a serious one, tried on what it was not fitted to."""
+    """One effect added to a plant and fitted, and cross-validated unless its fit is poor."""
 
     forecast: Forecast
     fit: Fit
     log_likelihood_gain: float
-    """Over the plant without it, on the fitted recordings."""
+    """Over the plant without the effect, on the fitted recordings, nat."""
     held_out: Prediction | None
-    """Of what is held out by declaration, or of all block by block where nothing is."""
+    """Prediction of the held-out recordings, or of all frames by cross-validation if no recording is held out."""
     cross_validated: Prediction | None
-    """Of every frame by a model that was not fitted to it."""
+    """Prediction of every frame by a model that was not fitted to it."""
     predictive_gain: float
-    """Log-likelihood gain on ``unseen``."""
+    """Log-likelihood gain on ``cross_validated``, nat; −∞ where it is ``None``."""
 
     @property
     def effect(self) -> Effect:
-        """What was added, with those of its parameters that the data asked for."""
+        """The added effect, with the staged parameters that the data require."""
         return effects_of(self.fit)[-1]
 
     @property
     def evidence(self) -> float:
-        """Log-likelihood gained on what was fitted and on what was not, less one for each parameter spent."""
+        """Log-likelihood gain on fitted and on predicted frames, less one for each parameter, nat."""
         return self.log_likelihood_gain + self.predictive_gain - len(self.effect.parameters)
 
 
-def promising(all_forecasts: Sequence[Forecast]) -> list[Forecast]:
-    """Choose the effects that are worth a fit from forecasts in falling order."""
-    return [f for i, f in enumerate(all_forecasts[:PROMISING]) if i < LEAST_PROMISING or f.share >= HOPEFUL]
+def promising(all_forecasts: Sequence[Forecast], policy: Policy = DEFAULT) -> list[Forecast]:
+    """Choose the effects to fit from forecasts in descending order."""
+    screen = policy.screen
+    return [
+        f
+        for i, f in enumerate(all_forecasts[: screen.most_fitted])
+        if i < screen.fewest_fitted or f.share >= screen.smallest_forecast_share
+    ]
 
 
 def fit_candidates(
@@ -79,160 +72,213 @@ def fit_candidates(
     held_out: Sequence[Record],
     tried: Sequence[Forecast],
     camera: float = 0.0,
+    policy: Policy = DEFAULT,
 ) -> list[Candidate]:
-    """Fit effects beside what the plant already has, and predict what they were not fitted to.
+    """Fit each effect in addition to those of the plant, and predict what it was not fitted to.
 
     Parameters
     ----------
     base : Fit
         Of the plant so far, on ``fitted``.
     cross_validated : Prediction
-        The plant's so far, of every frame by a fit without it.
+        Of every frame by the plant so far, fitted without that frame.
     fitted, held_out : sequence of Record
         Recordings to fit and to predict only.
     tried : sequence of Forecast
-        What to try, and from where.
+        The effects, with their start values.
     camera : float
-        Stated uncertainty of a film's angle, rad; 0 for a series from elsewhere.
+        Stated standard uncertainty of a film's angle, rad; 0 for angle series from elsewhere.
+    policy : Policy
+        Thresholds.
 
     Returns
     -------
     list of Candidate
-        Strongest evidence first, then those that were not tried, best fit first.
+        Strongest evidence first, then those that were not cross-validated, best fit first.
     """
-    fits = map_in_threads(lambda one: fit_with(base, fitted, one, camera=camera), tried)
+    fits = map_in_threads(lambda one: fit_with(base, fitted, one, camera=camera, policy=policy), tried)
     gains = [log_likelihood_gain(base.cost, fit.cost, len(base.white)) for fit in fits]
-    serious = sorted(gains, reverse=True)[: LEAST_PROMISING - 1]
+    best_gains = sorted(gains, reverse=True)[: policy.screen.fewest_fitted - 1]
+    smallest = policy.candidates.smallest_gain_share
 
     def predict(i: int) -> Candidate:
-        if gains[i] < HOPEFUL * max(gains) and gains[i] not in serious:
+        if gains[i] < smallest * max(gains) and gains[i] not in best_gains:
             return Candidate(tried[i], fits[i], gains[i], None, None, -math.inf)
-        told, whole = predict_held_out(fits[i], fitted, held_out)
-        predictive = log_likelihood_gain(cross_validated.cost, whole.cost, sum(len(r.time) for r in whole.records))
-        return Candidate(tried[i], fits[i], gains[i], told, whole, predictive)
+        declared, all_frames = predict_held_out(fits[i], fitted, held_out, policy)
+        count = sum(len(r.time) for r in all_frames.records)
+        predictive = log_likelihood_gain(cross_validated.cost, all_frames.cost, count)
+        return Candidate(tried[i], fits[i], gains[i], declared, all_frames, predictive)
 
     candidates = map_in_threads(predict, range(len(tried)))
     return sorted(candidates, key=lambda c: (-c.evidence, -c.log_likelihood_gain))
 
 
 def fit_with(
-    base: Fit, records: Sequence[Record], forecast: Forecast, *, staged: bool = True, camera: float = 0.0
+    base: Fit,
+    records: Sequence[Record],
+    forecast: Forecast,
+    *,
+    staged: bool = True,
+    camera: float = 0.0,
+    policy: Policy = DEFAULT,
 ) -> Fit:
-    """Fit the plant of ``base`` with one more effect, from where the screen would start, or else the effect itself.
+    """Fit the plant of ``base`` with one more effect.
 
-    Its ``late`` parameters, which take most of the time, are let in as far as the data ask for them, or not at all.
+    Parameters
+    ----------
+    base : Fit
+        Of the plant so far, on ``records``.
+    records : sequence of Record
+        Recordings to fit.
+    forecast : Forecast
+        The effect, with its start values.
+    staged : bool
+        Whether to add the staged parameters that the data require; they take most of the time.
+    camera : float
+        Stated standard uncertainty of a film's angle, rad; 0 for angle series from elsewhere.
+    policy : Policy
+        Thresholds.
+
+    Returns
+    -------
+    Fit
+        The best of several starts: the forecast's, and where its gain falls short, others.
     """
     effect = forecast.effect
-    early = [p for p in effect.parameters if not p.staged]
-    plant = plant_of(base).with_effect(replace(effect, parameters=tuple(early)))
-    own = _held(base, records)
+    unstaged = [p for p in effect.parameters if not p.staged]
+    plant = plant_of(base).with_effect(replace(effect, parameters=tuple(unstaged)))
+    nuisance = _nuisance_at_rest(base, records)
 
-    def fit_from(*starts: NDArray[np.float64]) -> Fit:
-        values = [np.append(base.parameters, start[: len(early)]) for start in starts]
-        return fit_best_start(plant, records, values, own, base.phi)
+    def fit_from(*starts: Floats) -> Fit:
+        values = [np.append(base.parameters, start[: len(unstaged)]) for start in starts]
+        return fit_best_start(plant, records, values, nuisance, base.phi)
 
     first = effect.null
     first[0] = effect.parameters[0].starts[0]
     near = [effect.null + share * (forecast.start - effect.null) for share in (0.5, 2.0)]
-    # several parameters may have several valleys, and dry friction has them whenever a head is held or sets off
-    several = len(early) > 1 or effect.friction is not None
-    further = [(near, HOPEFUL)] if several else [([forecast.tried, first], FULFILLED), (near, HOPEFUL)]
+    # several parameters may give several local minima; dry friction does wherever the body sticks or breaks away
+    several = len(unstaged) > 1 or effect.friction is not None
+    incomplete, failed = policy.candidates.incomplete_fit_share, policy.candidates.failed_fit_share
+    further = [(near, failed)] if several else [([forecast.tried, first], incomplete), (near, failed)]
     best = fit_from(forecast.start, forecast.tried, first) if several else fit_from(forecast.start)
-    # what a limit does is not in proportion: scaled down it may do nothing, where nothing tells which way to go
-    for starts, share in further if forecast.share >= HOPEFUL else ():
+    # the change by a limit is not proportional: scaled down, it may be zero and have no gradient
+    for starts, share in further if forecast.share >= policy.screen.smallest_forecast_share else ():
         if log_likelihood_gain(base.cost, best.cost, len(base.white)) < share * forecast.gain:
             fit = fit_from(*starts)
             best = fit if fit.cost < best.cost else best
     if plant.kinked:
-        # on the way here initial states may have got into a valley of their own
-        again = fit_output_error(plant, records, [best.parameters], nuisance=own, phi=base.phi)
+        # the initial states may have ended in a local minimum on the way
+        again = fit_output_error(plant, records, [best.parameters], nuisance=nuisance, phi=base.phi)
         best = again if again.cost < best.cost else best
-    return with_staged(base, effect, best, records, camera) if staged else best
+    return with_staged(base, effect, best, records, camera, policy) if staged else best
 
 
 def fit_from_candidates(base: Fit, candidates: Sequence[Candidate], records: Sequence[Record]) -> Fit:
-    """Fit a plant again from where it stands in the candidates, if one of them is better there even without its effect.
+    """Fit a plant again from its parameters in a candidate, if they lower its cost even without the added effect.
 
-    Beside another effect, whatever its size, a fit with kinks may have come out of the valley that it was in.
+    While another effect was fitted, a plant with kinks may have left the local minimum in which it was.
     """
     count = len(base.parameters)
     starts = [(c.fit.parameters[:count], c.fit.nuisance) for c in candidates]
-    costs = [output_error(base.model, values, records, own, base.phi) for values, own in starts]
+    costs = [output_error(base.model, values, records, nuisance, base.phi) for values, nuisance in starts]
     if not costs or min(costs) >= base.cost:
         return base
-    values, own = starts[int(np.argmin(costs))]
-    return fit_output_error(base.model, records, [values], nuisance=own, phi=base.phi)
+    values, nuisance = starts[int(np.argmin(costs))]
+    return fit_output_error(base.model, records, [values], nuisance=nuisance, phi=base.phi)
 
 
-def _held(base: Fit, records: Sequence[Record]) -> list[NDArray[np.float64]]:
-    """Return each recording's own unknowns at rest where no command has moved the head yet.
+def _nuisance_at_rest(base: Fit, records: Sequence[Record]) -> list[Floats]:
+    """Return the nuisance parameters of each recording, with zero rates if no command has moved the body yet.
 
-    What holds a head or makes it answer late has kinks: dry friction, say, stops a small initial rate within a frame,
-    so that rate and angle there can hardly be told apart, and a fit that starts with the base model's rate keeps it.
+    An effect that holds or delays the body has kinks. Dry friction, for instance, stops a small initial rate within a
+    frame, so that the data hardly distinguish rate and angle there, and a fit that starts with the base model's rate
+    keeps it.
     """
     first, states = [first_state(base.model, record) for record in records], base.model.states
-    at_rest = [np.concatenate([own[:1], np.zeros(states - 1), own[states:]]) for own in base.nuisance]
-    return [rest if one[1] == 0.0 else own for own, rest, one in zip(base.nuisance, at_rest, first, strict=True)]
+    at_rest = [np.concatenate([fitted[:1], np.zeros(states - 1), fitted[states:]]) for fitted in base.nuisance]
+    return [
+        rest if state[1] == 0.0 else fitted for fitted, rest, state in zip(base.nuisance, at_rest, first, strict=True)
+    ]
 
 
 def fit_to_more(
-    fit: Fit, records: Sequence[Record], own: Sequence[NDArray[np.float64]], ledger: Sequence[Effect]
+    fit: Fit,
+    records: Sequence[Record],
+    nuisance: Sequence[Floats],
+    ledger: Sequence[Effect],
+    policy: Policy = DEFAULT,
 ) -> Fit:
-    """Fit a plant again to more recordings, with late parameters of its effects that the first ones did not ask for."""
-    best = fit_output_error(fit.model, records, [fit.parameters], nuisance=own, phi=fit.phi)
+    """Fit a plant to more recordings, with staged parameters of its effects that the first ones did not require."""
+    best = fit_output_error(fit.model, records, [fit.parameters], nuisance=nuisance, phi=fit.phi)
     for effect in effects_of(fit):
         whole = next(e for e in ledger if e.id == effect.id)
         if any(p.staged for p in whole.parameters):
-            early = tuple(p for p in whole.parameters if not p.staged)
+            unstaged = tuple(p for p in whole.parameters if not p.staged)
             base = refit_without(best, effect, records)
-            size = [best.parameters[best.model.names.index(p.name)] for p in early]
-            plant = plant_of(base).with_effect(replace(whole, parameters=early))
+            size = [best.parameters[best.model.names.index(p.name)] for p in unstaged]
+            plant = plant_of(base).with_effect(replace(whole, parameters=unstaged))
             start = np.append(base.parameters, size)
             first = fit_output_error(plant, records, [start], nuisance=best.nuisance, phi=fit.phi)
-            best = min(best, with_staged(base, whole, first, records), key=lambda one: one.cost)
+            best = min(best, with_staged(base, whole, first, records, policy=policy), key=lambda one: one.cost)
     return best
 
 
-def with_staged(base: Fit, effect: Effect, fit: Fit, records: Sequence[Record], camera: float = 0.0) -> Fit:
-    """Let in the late parameters of a fit's last effect, one after another, as far as the data ask for them.
+def with_staged(
+    base: Fit,
+    effect: Effect,
+    fit: Fit,
+    records: Sequence[Record],
+    camera: float = 0.0,
+    policy: Policy = DEFAULT,
+) -> Fit:
+    """Add the staged parameters of a fit's last effect, one after another, as far as the data require them.
 
-    At once, they would stand in for the size; one alone may show nothing that it and the next do show. When a head sets
-    off is all or nothing, so there are valleys everywhere: of many starts, each with the late parameters before it as
-    they are and without them, the fit begins from those that come nearest. In a film they must also change the
-    prediction by more than the angle is uncertain: what is finer may follow the measurement's own errors.
+    Added all at once, they could take over the role of the effect's first parameter. A single one may gain nothing
+    although it and the next one together do. The instant at which a stuck body breaks away is all or nothing, so the
+    cost has many local minima: of many starts, each with the previous staged parameters as fitted and without them,
+    those with the smallest cost are fitted. In a film, staged parameters must also change the prediction by more than
+    the angle's uncertainty, because a smaller change may follow errors of the measurement.
     """
     plant, best, spent = plant_of(base), fit, 0
-    effect = _within(effect, fit, records)
+    effect = _bound_speeds(effect, fit, records, policy)
     first = len(base.parameters) + sum(not p.staged for p in effect.parameters)
     for count in range(len(effects_of(fit)[-1].parameters) + 1, len(effect.parameters) + 1):
         richer = plant.with_effect(replace(effect, parameters=effect.parameters[:count]))
         bare = np.append(fit.parameters[:first], np.zeros(len(fit.parameters) - first))
         values = [np.append(x, v) for v in effect.parameters[count - 1].starts for x in (fit.parameters, bare)]
         values.sort(key=lambda one: output_error(richer, one, records, fit.nuisance, fit.phi))
-        fit, spent = fit_best_start(richer, records, values[:NEAREST], fit.nuisance, fit.phi), spent + 1
+        fit, spent = fit_best_start(richer, records, values[:STAGED_STARTS], fit.nuisance, fit.phi), spent + 1
         gain = log_likelihood_gain(best.cost, fit.cost, len(fit.white))
-        if 2.0 * gain > special.chdtri(spent, ASKED_FOR) and rms_difference(fit, best) > camera:
+        needed = special.chdtri(spent, policy.candidates.false_staged_parameter_rate)
+        if 2.0 * gain > needed and rms_difference(fit, best) > camera:
             best, spent = fit, 0
     return best
 
 
-def _within(effect: Effect, fit: Fit, records: Sequence[Record]) -> Effect:
-    """Bound an effect's speeds to the slow part of what the recordings show: a curve over all of it is any curve."""
+def _bound_speeds(effect: Effect, fit: Fit, records: Sequence[Record], policy: Policy) -> Effect:
+    """Bound parameters that are speeds to slow motion: a curve over all speeds can take the shape of other effects."""
     predicted = [(r.time, r.angle - left) for r, left in zip(records, fit.residuals, strict=True)]
     fastest = max(float(np.max(np.abs(np.gradient(angle, time)))) for time, angle in predicted)
-    slow = [replace(p, upper=min(p.upper, SLOW * fastest)) if p.is_speed else p for p in effect.parameters]
-    return replace(effect, parameters=tuple(slow))
+    slow = policy.candidates.slow_speed_share * fastest
+    bounded = [replace(p, upper=min(p.upper, slow)) if p.is_speed else p for p in effect.parameters]
+    return replace(effect, parameters=tuple(bounded))
 
 
 def find_rivals(
-    best: Fit, base: Fit, records: Sequence[Record], effect: Effect, others: Sequence[Forecast], camera: float = 0.0
+    best: Fit,
+    base: Fit,
+    records: Sequence[Record],
+    effect: Effect,
+    others: Sequence[Forecast],
+    camera: float = 0.0,
+    policy: Policy = DEFAULT,
 ) -> dict[str, Fit]:
-    """Keep every effect that could have made the data in which ``effect`` explains this much more than it.
+    """Find every effect B that could have produced the data although ``effect``, A, explains them better.
 
-    If B were true, log L(A) − log L(B) would be normal with mean −d²/2 and variance d², d being the distance in
-    standard deviations of the noise from B's prediction to the nearest that A can give (Cox, J. R. Statist. Soc. B
-    24, 1962). Whatever d is, the gap is then larger than z²/2 no more often than a normal variable is larger than z.
-    In a film there are errors that follow the motion too: what is finer than the angle's uncertainty decides nothing.
+    If B is true, log L(A) − log L(B) is normal with mean −d²/2 and variance d², where d is the distance, in standard
+    deviations of the noise, from B's prediction to the nearest prediction of A (Cox, J. R. Statist. Soc. B 24, 1962).
+    Whatever d is, the difference exceeds z²/2 no more often than a standard normal variable exceeds z. In a film,
+    errors of the measurement may follow the motion, too, so a difference below the angle's uncertainty does not count.
 
     Parameters
     ----------
@@ -247,15 +293,17 @@ def find_rivals(
     others : sequence of Forecast
         Each a B.
     camera : float
-        Stated uncertainty of a film's angle, rad; 0 for a series from elsewhere.
+        Stated standard uncertainty of a film's angle, rad; 0 for angle series from elsewhere.
+    policy : Policy
+        Thresholds.
 
     Returns
     -------
     dict
-        Id of each that stays → the same plant with it in place of ``effect``.
+        Id of each B that cannot be excluded → the same plant with B in place of ``effect``.
     """
-    fits = map_in_threads(lambda other: fit_with(base, records, other, camera=camera), others)
-    widest = 0.5 * special.ndtri(ALIAS_LEVEL) ** 2
+    fits = map_in_threads(lambda other: fit_with(base, records, other, camera=camera, policy=policy), others)
+    widest = 0.5 * special.ndtri(policy.candidates.true_rival_rejection_rate) ** 2
     gaps = [log_likelihood_gain(fit.cost, best.cost, len(best.white)) for fit in fits]
     return {
         other.effect.id: fit
@@ -265,19 +313,19 @@ def find_rivals(
 
 
 def rms_difference(one: Fit, other: Fit) -> float:
-    """Return by how much the predictions of two fits to the same recordings differ, rad RMS."""
+    """Return the RMS difference, rad, between the predictions of two fits to the same recordings."""
     return float(np.sqrt(np.mean((np.concatenate(one.residuals) - np.concatenate(other.residuals)) ** 2)))
 
 
 def map_in_threads(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    """Do the same with every item side by side: the integrator, which takes most of the time, lets go of Python."""
+    """Apply ``work`` to all items in parallel; the integrator, which takes most of the time, releases the GIL."""
     with ThreadPoolExecutor(native_threads()) as pool:
         return list(pool.map(work, items))
 
 
 def log_likelihood_gain(before: float, after: float, n: int) -> float:
-    """Return what the log-likelihood of n whitened residuals gains where their sum of squares, rad², falls."""
+    """Return the log-likelihood gain of n whitened residuals whose sum of squares, rad², falls from before to after."""
     if not math.isfinite(after):
         return -math.inf
-    finest = n * 1e-9**2  # rad², so that data without any noise do not divide by nothing
-    return 0.5 * n * math.log((before + finest) / (after + finest))
+    offset = n * 1e-9**2  # rad²; avoids a division by zero for data without noise
+    return 0.5 * n * math.log((before + offset) / (after + offset))

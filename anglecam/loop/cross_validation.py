@@ -1,10 +1,14 @@
-"""Predictions of recordings that a model was not fitted to, and how much better one model predicts them than another.
+"""Block cross-validation: predictions of frames that a model was not fitted to, and the gain of one model over another.
 
-Every frame is predicted in free run by a model that was fitted without it: recordings that are held out by declaration
-by the model of all others, and of the others every fifth quarter of a second by a fit to the rest. With longer
-stretches left out the rest may lack what tells a parameter, such as a limit that is reached once, and the prediction
-errs by that more than by what the model lacks. Stone, J. R. Statist. Soc. B 36, 1974; Burman, Chow, Nolan, Biometrika
-81, 1994.
+Every frame is predicted in a free run by a model that was fitted without it. Recordings that are declared as held out
+are predicted by the model of all others. The others are divided into blocks, and every fifth block is predicted by a
+fit to the remaining four fifths, five times in turn. If longer blocks were left out, the remaining frames might not
+determine a parameter, such as a limit that is reached once, and the prediction would err because of that and not
+because of what the model lacks. Stone, J. R. Statist. Soc. B 36, 1974; Burman, Chow, Nolan, Biometrika 81, 1994.
+
+A prediction runs free through the block from the frames before it, so the frames beside a block inform its prediction
+only through the parameters. The response of a mechanism to one command is longer than a block, so no block contains
+all of it.
 """
 
 from __future__ import annotations
@@ -20,32 +24,26 @@ from anglecam.data.typing import Floats
 from anglecam.errors import RigError
 from anglecam.identification.fit import Fit, whiten
 from anglecam.identification.output_error import fit_output_error, predict_output_error, predicted_angle
+from anglecam.loop.policy import DEFAULT, Policy
 
 DRAWS = 999
-BLOCK = 0.5
-"""s; prediction errors further apart than this count as independent."""
-TURNS = 5
-"""Times that a model is fitted to what is left."""
-LEFT_OUT = 0.25
-"""s; of every recording a block of this length in `TURNS` is left out at a time. As predictions run free, a block's
-neighbours tell of it only by way of the parameters; a head's answer to one command is longer, so that no block takes
-all of it."""
-
-
+"""Bootstrap draws."""
 FIRST_FRAMES = 8
-"""Frames that are never left out: without them nothing tells the rate that a recording starts with."""
-KEPT = -1
+"""Frames at the start of a recording that are never left out, because they determine its initial velocity."""
+NEVER_LEFT_OUT = -1
+"""Fold number of those frames."""
 MAD = 1.4826
-"""Standard deviation of normal noise over its median absolute value."""
+"""Ratio of the standard deviation of normal noise to its median absolute value."""
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Recordings predicted by a model that was not fitted to them."""
+    """Prediction of recordings by a model that was not fitted to them."""
 
     records: tuple[Record, ...]
+    """The predicted frames of each recording."""
     residuals: tuple[Floats, ...]
-    """Measured minus predicted angle of each, rad."""
+    """Measured minus predicted angle of each recording, (n,) each, rad."""
     cost: float
     """Sum of squared whitened residuals, rad²."""
 
@@ -62,19 +60,27 @@ class Prediction:
 
 @dataclass(frozen=True)
 class Gain:
-    """By how much the error on what was not fitted falls: 1 − after/before."""
+    """Relative reduction of the RMS prediction error, 1 − after/before."""
 
     ratio: float
     interval_95: tuple[float, float]
+    """Bootstrap interval of ``ratio``."""
+    lower_bound: float
+    """Quantile of the bootstrapped ``ratio`` at the policy's ``false_gain_rate``."""
+
+    @property
+    def significant(self) -> bool:
+        """Whether the prediction is better by more than the policy's ``false_gain_rate`` allows for chance."""
+        return self.lower_bound > 0.0
 
 
 def robust_sigma(residuals: Sequence[Floats]) -> float:
-    """Return the standard deviation that the median absolute residual speaks of: a few frames far off do not count."""
+    """Return the standard deviation, rad, from the median absolute residual; a few outliers do not affect it."""
     return float(MAD * np.median(np.abs(np.concatenate(residuals))))
 
 
 def split_records(records: Sequence[Record], held_out: Sequence[str]) -> tuple[list[Record], list[Record]]:
-    """Divide recordings into those to fit and those that are declared to be predicted only.
+    """Divide recordings into those to fit and those to predict only.
 
     Parameters
     ----------
@@ -86,12 +92,12 @@ def split_records(records: Sequence[Record], held_out: Sequence[str]) -> tuple[l
     Returns
     -------
     fitted, predicted : list of Record
-        The first is not empty; the second is where nothing is declared.
+        The first is never empty; the second is empty if ``held_out`` is.
 
     Raises
     ------
     RigError
-        Where nothing would be left to fit.
+        If nothing is left to fit.
     """
     fitted = [r for r in records if r.name not in held_out]
     if not fitted:
@@ -99,62 +105,69 @@ def split_records(records: Sequence[Record], held_out: Sequence[str]) -> tuple[l
     return fitted, [r for r in records if r.name in held_out]
 
 
-def predict_held_out(fit: Fit, fitted: Sequence[Record], held_out: Sequence[Record]) -> tuple[Prediction, Prediction]:
+def predict_held_out(
+    fit: Fit, fitted: Sequence[Record], held_out: Sequence[Record], policy: Policy = DEFAULT
+) -> tuple[Prediction, Prediction]:
     """Predict every recording by a model that was not fitted to it.
 
     Parameters
     ----------
     fit : Fit
         Of all of ``fitted``.
-    fitted, held_out : sequence of Record
-        To predict block by block, and by ``fit`` itself.
+    fitted : sequence of Record
+        Recordings to cross-validate block by block.
+    held_out : sequence of Record
+        Recordings that ``fit`` predicts; may be empty.
+    policy : Policy
+        Thresholds.
 
     Returns
     -------
-    told, whole : Prediction
-        Of what is held out by declaration (of all where nothing is), and of all.
+    held_out, cross_validated : Prediction
+        Of the held-out recordings (of all frames if there are none), and of all frames.
     """
-    told = predict_output_error(fit, held_out) if held_out else None
-    declared = Prediction(tuple(held_out), told.residuals, told.cost) if told else None
-    turns = _in_turns(fit, fitted)
-    if declared is None:
-        return turns, turns
-    whole = Prediction(
-        declared.records + turns.records, declared.residuals + turns.residuals, declared.cost + turns.cost
+    folds = _cross_validate(fit, fitted, policy)
+    if not held_out:
+        return folds, folds
+    predicted = predict_output_error(fit, held_out)
+    declared = Prediction(tuple(held_out), predicted.residuals, predicted.cost)
+    all_frames = Prediction(
+        declared.records + folds.records, declared.residuals + folds.residuals, declared.cost + folds.cost
     )
-    return declared, whole
+    return declared, all_frames
 
 
-def _in_turns(fit: Fit, records: Sequence[Record]) -> Prediction:
-    """Predict every recording but for its first frames, where the model starts, by fits without what they predict."""
+def _cross_validate(fit: Fit, records: Sequence[Record], policy: Policy) -> Prediction:
+    """Predict every recording except its first frames, each fold by a fit to the other folds."""
     errors = [np.zeros(len(r.time)) for r in records]
-    left_out = [_turns(r) for r in records]
-    for turn in range(TURNS):
-        train = [record.only(frames != turn) for record, frames in zip(records, left_out, strict=True)]
-        left = fit_output_error(fit.model, train, [fit.parameters], nuisance=fit.nuisance, phi=fit.phi)
-        for record, frames, own, error in zip(records, left_out, left.nuisance, errors, strict=True):
-            told = predicted_angle(left.model, left.parameters, record, own)
-            error[frames == turn] = (record.angle - told)[frames == turn]
-    tested = tuple(record.only(frames != KEPT) for record, frames in zip(records, left_out, strict=True))
-    residuals = tuple(error[frames != KEPT] for error, frames in zip(errors, left_out, strict=True))
-    with np.errstate(over="ignore"):  # a fit to what is left may run away where nothing was left to hold it
+    fold_of = [_folds(r, policy) for r in records]
+    for fold in range(policy.cross_validation.folds):
+        train = [record.only(folds != fold) for record, folds in zip(records, fold_of, strict=True)]
+        trained = fit_output_error(fit.model, train, [fit.parameters], nuisance=fit.nuisance, phi=fit.phi)
+        for record, folds, nuisance, error in zip(records, fold_of, trained.nuisance, errors, strict=True):
+            predicted = predicted_angle(trained.model, trained.parameters, record, nuisance)
+            error[folds == fold] = (record.angle - predicted)[folds == fold]
+    tested = tuple(record.only(folds != NEVER_LEFT_OUT) for record, folds in zip(records, fold_of, strict=True))
+    residuals = tuple(error[folds != NEVER_LEFT_OUT] for error, folds in zip(errors, fold_of, strict=True))
+    with np.errstate(over="ignore"):  # a prediction may diverge if the training frames do not determine a parameter
         white = [whiten(record, fit.phi, error) for record, error in zip(tested, residuals, strict=True)]
         return Prediction(tested, residuals, float(sum(e @ e for e in white)))
 
 
-def _turns(record: Record) -> NDArray[np.int_]:
-    """Return for each frame the turn in which it is left out; the first few, which tell where it starts, never are."""
+def _folds(record: Record, policy: Policy) -> NDArray[np.int_]:
+    """Return the fold in which each frame is left out, (n,); `NEVER_LEFT_OUT` for the first frames."""
+    count = policy.cross_validation.folds
     first = record.time[min(FIRST_FRAMES, len(record.time) - 1)]
-    length = min(LEFT_OUT, (record.time[-1] - first) / TURNS)
-    turns = np.floor((record.time - first) / length).astype(int)
-    return np.where(turns < 0, KEPT, turns % TURNS)
+    length = min(policy.cross_validation.left_out_s, (record.time[-1] - first) / count)
+    blocks = np.floor((record.time - first) / length).astype(int)
+    return np.where(blocks < 0, NEVER_LEFT_OUT, blocks % count)
 
 
-def compare(before: Prediction, after: Prediction, rng: np.random.Generator) -> Gain:
+def compare(before: Prediction, after: Prediction, rng: np.random.Generator, policy: Policy = DEFAULT) -> Gain:
     """Compare two predictions of the same recordings by a paired wild bootstrap of blocks.
 
-    With e the errors after and δ by how much those before differ, the energy falls by Σ(δ² + 2δe). The motion is what
-    it was, and so is δ; what is random is the noise in e, whose part in every block takes either sign.
+    Let e be the errors after and e + δ those before. The sum of squares then falls by Σ(δ² + 2δe). The motion, and with
+    it δ, is fixed; the noise in e is random, and the bootstrap gives its contribution in each block a random sign.
 
     Parameters
     ----------
@@ -162,6 +175,8 @@ def compare(before: Prediction, after: Prediction, rng: np.random.Generator) -> 
         Of the same recordings.
     rng : numpy.random.Generator
         For the signs (Wu, Ann. Statist. 14, 1986).
+    policy : Policy
+        Thresholds.
 
     Returns
     -------
@@ -170,16 +185,19 @@ def compare(before: Prediction, after: Prediction, rng: np.random.Generator) -> 
     """
     cross = []
     for record, old, new in zip(before.records, before.residuals, after.residuals, strict=True):
-        size = max(1, round(BLOCK / record.interval))
+        size = max(1, round(policy.cross_validation.independence_s / record.interval))
         product = (old - new) * new
         cross += [np.sum(product[i : i + size]) for i in range(0, len(new), size)]
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is no gain, or over a runaway all of it
+    # errors of a diverging prediction are not finite; its gain is then nothing, or everything over a diverging one
+    with np.errstate(over="ignore", invalid="ignore"):
         left = sum(float(new @ new) for new in after.residuals)
         fall = sum(float(old @ old) for old in before.residuals) - left
     falls = fall + 2.0 * rng.choice([-1.0, 1.0], size=(DRAWS, len(cross))) @ np.array(cross)
     low, high = np.quantile(falls, [0.025, 0.975])
+    lower_bound = np.quantile(falls, policy.cross_validation.false_gain_rate)
 
     def ratio(by: float) -> float:
+        """Return the ratio of a fall of the sum of squares."""
         return float(1.0 - np.sqrt(left / max(left + by, 1e-3 * left))) if left > 0.0 else float(by > 0.0)
 
-    return Gain(ratio(fall), (ratio(low), ratio(high)))
+    return Gain(ratio(fall), (ratio(low), ratio(high)), ratio(lower_bound))

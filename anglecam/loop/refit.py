@@ -1,4 +1,4 @@
-"""The same plant fitted again: under another colour of the noise, without one of its effects, or in another order."""
+"""Variants of a fitted plant: with another AR(1) coefficient, without one of its effects, or with reordered effects."""
 
 from __future__ import annotations
 
@@ -13,39 +13,39 @@ from anglecam.models.plant import Plant
 
 
 def effects_of(fit: Fit) -> tuple[Effect, ...]:
-    """Return the effects that a fitted plant has, in the order in which they were added."""
+    """Return the effects of a fitted plant, in the order in which they were added."""
     return plant_of(fit).effects
 
 
 def effects_left(ledger: Sequence[Effect], fit: Fit) -> list[Effect]:
-    """Return the effects that a fitted plant does not have."""
+    """Return the effects of a ledger that a fitted plant does not have."""
     ids = [e.id for e in effects_of(fit)]
     return [e for e in ledger if e.id not in ids]
 
 
 def refit_with_phi(fit: Fit, records: Sequence[Record], phi: float) -> Fit:
-    """Fit again with the noise's autocorrelation ``phi`` from frame to frame."""
+    """Fit again with the AR(1) coefficient ``phi`` of the noise."""
     return fit_output_error(fit.model, records, [fit.parameters], nuisance=fit.nuisance, phi=phi)
 
 
 def refit_without(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
     """Fit again without one of the plant's effects."""
-    own = [p.name for p in effect.parameters]
-    keep = [i for i, name in enumerate(fit.model.names) if name not in own]
+    removed = [p.name for p in effect.parameters]
+    keep = [i for i, name in enumerate(fit.model.names) if name not in removed]
     smaller = replace(plant_of(fit), effects=tuple(e for e in effects_of(fit) if e is not effect))
     return fit_output_error(smaller, records, [fit.parameters[keep]], nuisance=fit.nuisance, phi=fit.phi)
 
 
 def refit_with_last(fit: Fit, effect: Effect, records: Sequence[Record]) -> Fit:
-    """Return the same fit with one of its effects after all others, where a candidate's parameters are."""
-    own = [p.name for p in effect.parameters]
-    order = sorted(range(len(fit.model.names)), key=lambda i: fit.model.names[i] in own)
-    moved = replace(plant_of(fit), effects=tuple(sorted(effects_of(fit), key=lambda e: e is effect)))
-    return fit_output_error(moved, records, [fit.parameters[order]], nuisance=fit.nuisance, phi=fit.phi)
+    """Fit again with one of the effects in last place, where a candidate's parameters are."""
+    last = [p.name for p in effect.parameters]
+    order = sorted(range(len(fit.model.names)), key=lambda i: fit.model.names[i] in last)
+    reordered = replace(plant_of(fit), effects=tuple(sorted(effects_of(fit), key=lambda e: e is effect)))
+    return fit_output_error(reordered, records, [fit.parameters[order]], nuisance=fit.nuisance, phi=fit.phi)
 
 
 def plant_of(fit: Fit) -> Plant:
-    """Return the fitted plant; raises `TypeError` where another model was fitted."""
+    """Return the fitted plant, or raise `TypeError` if another model was fitted."""
     if not isinstance(fit.model, Plant):
         raise TypeError("only a Plant has effects")
     return fit.model

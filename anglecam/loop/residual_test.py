@@ -1,12 +1,12 @@
-"""The gate: is there structure in the residual that noise would not leave there.
+"""The residual test: does the residual contain structure that noise would not leave.
 
-Several tests look at the whitened residual of a fitted model: along what each effect that could be added would change,
-along functions of angle, velocity, command and time, along what any torque over angle or speed would change, and at its
-autocorrelation. Every statistic is a share of the
-residual's own energy, so none of them needs the noise's size. The smallest of the tests' p-values is the gate's
-statistic; its null distribution comes from a parametric bootstrap: white noise, from which what the fit absorbs (the
-space of its Jacobian) is taken out as the fit takes it out. So neither the number of tests nor what they share has to
-be known. Davison and Hinkley, Bootstrap Methods and their Application, 1997, sec. 4.2 and 4.4.
+Several tests examine the whitened residual of a fitted model: its component along the change that each possible effect
+would make, along functions of angle, velocity, command and time, along the changes that any torque over angle or speed
+would make, and its autocorrelation. Every statistic is a share of the residual's energy, so no test needs the size of
+the noise. The smallest p-value of all tests is the statistic of the residual test. Its null distribution comes from a
+parametric bootstrap: white noise, from which the column space of the fit's Jacobian is projected out, as the fit
+projects it out. So neither the number of tests nor their correlation has to be known. Davison and Hinkley, Bootstrap
+Methods and their Application, 1997, sec. 4.2 and 4.4.
 """
 
 from __future__ import annotations
@@ -22,62 +22,77 @@ from scipy import special
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit, whiten
+from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.screen import Direction, absorbed_space
 from anglecam.loop.torque_basis import torque_responses
 
 DRAWS = 999
+"""Bootstrap draws; with the data's statistic among them p-values are multiples of 1/1000."""
 LAGS = 15
-LEVEL = 0.05
+"""Lags of the autocorrelation test, in frames."""
 
 
 @dataclass(frozen=True)
 class StructureTest:
-    """One test of the gate."""
+    """One of the tests for structure."""
 
     name: str
+    """``effect ID``, ``residual against X``, ``torque against X`` or ``autocorrelation``."""
     p_value: float
+    """Of this test alone, not corrected for the number of tests."""
 
 
 @dataclass(frozen=True)
 class ResidualTest:
-    """The outcome of all tests together."""
+    """Result of all tests together."""
 
     p_value: float
-    """That noise alone leaves a residual at least as striking in any of the tests."""
+    """Probability that noise alone gives at least one test a p-value as small as the smallest one here."""
     tests: tuple[StructureTest, ...]
     torque_gain: float
-    """Log-likelihood that a torque over angle or speed of any curve would gain, less what noise would give it."""
+    """Log-likelihood gain of the better of two arbitrary torque curves, over angle or over speed, less its expectation
+    for noise."""
     detectable: dict[str, float]
-    """Effect id → smallest magnitude of its first parameter, SI, that would have been seen with probability 0.95."""
+    """Effect id → smallest magnitude of its first parameter, SI, that the test would have detected; the policy's
+    ``missed_detection_rate`` is the probability of overlooking it."""
+    false_alarm_rate: float = DEFAULT.residual_test.false_alarm_rate
+    """The policy's; p-values below it indicate structure."""
 
     @property
     def passed(self) -> bool:
-        """Whether nothing is missing, as far as the residual tells."""
-        return self.p_value >= LEVEL
+        """Whether the residual shows no structure."""
+        return self.p_value >= self.false_alarm_rate
 
 
 def run_residual_test(
-    fit: Fit, records: Sequence[Record], ways: Sequence[Direction], rng: np.random.Generator, finest: float
+    fit: Fit,
+    records: Sequence[Record],
+    effect_directions: Sequence[Direction],
+    rng: np.random.Generator,
+    smallest_rms: float,
+    policy: Policy = DEFAULT,
 ) -> ResidualTest:
-    """Test the residual of a fitted plant.
+    """Test the residual of a fitted plant for structure.
 
     Parameters
     ----------
     fit : Fit
-        Of a `Plant`, whitened with the noise's colour.
+        Of a `Plant`, whitened with the AR(1) coefficient of the noise.
     records : sequence of Record
-        Those that were fitted.
-    ways : sequence of Direction
-        From `anglecam.loop.screen.directions` of the same fit: of what could be added.
+        The fitted recordings.
+    effect_directions : sequence of Direction
+        From `anglecam.loop.screen.directions` of the same fit, for every effect that could be added.
     rng : numpy.random.Generator
         For the bootstrap.
-    finest : float
-        Structure smaller than this, rad RMS, is not traced, however sure it is: no smaller effect counts as detectable.
+    smallest_rms : float
+        RMS, rad, below which the loop ignores structure however significant; no smaller effect counts as detectable.
+    policy : Policy
+        Thresholds.
 
     Returns
     -------
     ResidualTest
-        Calibrated at `DRAWS` draws.
+        With a p-value from `DRAWS` bootstrap draws.
     """
     absorbed = absorbed_space(fit)
     n, free = len(fit.white), len(fit.white) - absorbed.shape[1]
@@ -87,7 +102,7 @@ def run_residual_test(
     energy = np.sum(both**2, axis=0)
     energy[energy == 0.0] = 1.0
 
-    p_each = _p_of_effects(ways, both, energy, free)
+    p_each = _p_of_effects(effect_directions, both, energy, free)
     torque_gain = 0.0
     for name, basis in _shapes(fit, records).items():
         p_each[f"residual against {name}"], _, _ = _p_of_space(basis, absorbed, both, energy, free)
@@ -96,47 +111,50 @@ def run_residual_test(
         torque_gain = max(torque_gain, -0.5 * free * float(np.log(max(1.0 - share, 1e-6))) - 0.5 * k)
     p_each["autocorrelation"] = special.chdtrc(LAGS, _portmanteau(both, energy, records))
 
-    # under the null the data are one more draw: the smallest of its p-values is ranked among all draws'
+    # under the null hypothesis the data are one more draw, so their smallest p-value is ranked among those of all draws
     smallest = np.min(list(p_each.values()), axis=0)
     p_value = np.mean(smallest <= smallest[0])
-    critical = float(np.quantile(smallest[1:], LEVEL))
-    needed = float(-(special.ndtri(critical) + special.ndtri(0.05)) * np.sqrt(fit.cost / free))
-    needed = max(needed, finest * math.sqrt(n))
+    rates = policy.residual_test
+    critical = float(np.quantile(smallest[1:], rates.false_alarm_rate))
+    sigmas = -(special.ndtri(critical) + special.ndtri(rates.missed_detection_rate))
+    needed = float(sigmas * np.sqrt(fit.cost / free))
+    needed = max(needed, smallest_rms * math.sqrt(n))
     tests = tuple(StructureTest(name, float(p[0])) for name, p in p_each.items())
-    return ResidualTest(float(p_value), tests, torque_gain, _detectable(ways, needed))
+    detectable = _detectable(effect_directions, needed)
+    return ResidualTest(float(p_value), tests, torque_gain, detectable, rates.false_alarm_rate)
 
 
-def _p_of_effects(ways: Sequence[Direction], residuals: Floats, energy: Floats, free: int) -> dict[str, Floats]:
-    """Return, for each effect and residual (columns), the least p-value of its directions.
+def _p_of_effects(each: Sequence[Direction], residuals: Floats, energy: Floats, free: int) -> dict[str, Floats]:
+    """Return, for each effect, the smallest p-value over its directions, one for each residual (column).
 
-    Of white noise in n dimensions the share of the energy that falls into one of them is Beta(1/2, (n − 1)/2).
+    For white noise in n dimensions the share of the energy in one of them has the distribution Beta(1/2, (n − 1)/2).
     """
-    if not ways:
+    if not each:
         return {}
-    along = np.stack([way.change / way.size for way in ways]) @ residuals
+    along = np.stack([direction.change / direction.size for direction in each]) @ residuals
     share = np.minimum(along**2 / energy, 1.0)
     p = special.betaincc(0.5, 0.5 * (free - 1), share)
-    for i, way in enumerate(ways):
-        if way.one_sided:
+    for i, direction in enumerate(each):
+        if direction.one_sided:
             p[i] = np.where(along[i] > 0.0, 0.5 * p[i], 1.0 - 0.5 * p[i])
-    ids = np.array([way.effect.id for way in ways])
+    ids = np.array([direction.effect.id for direction in each])
     return {f"effect {name}": p[ids == name].min(axis=0) for name in dict.fromkeys(ids)}
 
 
-def _detectable(ways: Sequence[Direction], needed: float) -> dict[str, float]:
-    """Find each effect's magnitude at which its change is as long as needed, on logarithmic scales."""
+def _detectable(each: Sequence[Direction], needed: float) -> dict[str, float]:
+    """Return the magnitude of each effect at which its change has the norm ``needed``, by log-log interpolation."""
     found: dict[str, float] = {}
-    for name in dict.fromkeys(way.effect.id for way in ways):
-        own = [way for way in ways if way.effect.id == name]
-        shape = own[0].start[1:]
-        sizes = {abs(w.start[0] - w.effect.null[0]): w.size for w in own if np.array_equal(w.start[1:], shape)}
+    for name in dict.fromkeys(direction.effect.id for direction in each):
+        same = [direction for direction in each if direction.effect.id == name]
+        shape = same[0].start[1:]
+        sizes = {abs(d.start[0] - d.effect.null[0]): d.size for d in same if np.array_equal(d.start[1:], shape)}
         magnitude = np.log(sorted(sizes))
         length = np.log([sizes[m] for m in sorted(sizes)])
         wanted = np.log(needed)
-        if own[0].effect.parameters[0].inverse:  # a limit does nothing until it is reached: no line leads there
-            seen = magnitude[length >= wanted]
-            found |= {name: float(np.exp(seen[0]))} if len(seen) else {}
-        elif len(magnitude) > 1 and wanted < length[0]:  # below the smallest that was tried: in proportion
+        if same[0].effect.parameters[0].inverse:  # a limit changes nothing until it is reached, so do not interpolate
+            reached = magnitude[length >= wanted]
+            found |= {name: float(np.exp(reached[0]))} if len(reached) else {}
+        elif len(magnitude) > 1 and wanted < length[0]:  # below the smallest magnitude tried the change is proportional
             found[name] = float(np.exp(magnitude[0] + wanted - length[0]))
         elif wanted <= length.max():
             found[name] = float(np.exp(np.interp(wanted, np.maximum.accumulate(length), magnitude)))
@@ -144,7 +162,7 @@ def _detectable(ways: Sequence[Direction], needed: float) -> dict[str, float]:
 
 
 def _shapes(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
-    """Functions of angle, velocity, command and time that a residual may depend on, whitened."""
+    """Return whitened functions of angle, velocity, command and time, (N, k) each, on which a residual may depend."""
     groups: dict[str, list[Floats]] = {"angle": [], "velocity": [], "command": [], "time": []}
     predicted = [r.angle - e for r, e in zip(records, fit.residuals, strict=True)]
     rates = [np.gradient(p, r.time) for p, r in zip(predicted, records, strict=True)]
@@ -169,10 +187,10 @@ def _shapes(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
 def _p_of_space(
     basis: Floats, absorbed: Floats, residuals: Floats, energy: Floats, free: int
 ) -> tuple[Floats, float, int]:
-    """Return the p-value of each residual's (columns) share of energy in a space that the fit cannot follow.
+    """Return the p-value of each residual's (column's) energy share in the part of a space that the fit cannot follow.
 
-    Of white noise in n dimensions the share that falls into k of them is Beta(k/2, (n − k)/2). The first residual's
-    share and k come with it.
+    For white noise in n dimensions the share in k of them has the distribution Beta(k/2, (n − k)/2). The share of the
+    first residual and k are returned, too.
     """
     u, size, _ = np.linalg.svd(basis - absorbed @ (absorbed.T @ basis), full_matrices=False)
     u = u[:, size > 1e-6 * max(float(np.linalg.norm(basis)), 1e-300)]
@@ -184,7 +202,7 @@ def _p_of_space(
 
 
 def _portmanteau(residuals: Floats, energy: Floats, records: Sequence[Record]) -> Floats:
-    """Ljung and Box's sum of squared autocorrelations, within recordings (Biometrika 65, 1978)."""
+    """Return the Ljung-Box sum of squared autocorrelations within recordings (Biometrika 65, 1978), (columns,)."""
     edges = np.cumsum([0, *(len(r.time) for r in records)])
     n = len(residuals)
     total = np.zeros(residuals.shape[1])

@@ -1,12 +1,12 @@
-"""What is left over as a torque: the residual angle, put through the plant that it is left over from.
+"""Residual torque: the torque that would have caused the residual angle, by inverse dynamics of the base model.
 
     τ = ë + a·ė + b·e
 
-A torque τ that the plant θ̈ = c·u − a·θ̇ − b·θ lacks moves its angle by the e for which this holds, whatever was
-commanded. The derivatives are those of local quadratics (Savitzky and Golay, Anal. Chem. 36, 1964; Cleveland, J. Am.
-Stat. Assoc. 74, 1979), over the longest stretch whose torque still agrees within the noise with that of every shorter
-one (Lepski, Theory Probab. Appl. 35, 1990). They are linear in the residual, so what noise alone would make of the
-torque is known frame by frame.
+A torque τ that the plant θ̈ = c·u − a·θ̇ − b·θ lacks changes its angle by the e that solves this equation, whatever the
+command. The derivatives are those of local quadratics (Savitzky and Golay, Anal. Chem. 36, 1964; Cleveland, J. Am.
+Stat. Assoc. 74, 1979), over the longest window whose torque still agrees within the noise with that of every shorter
+one (Lepski, Theory Probab. Appl. 35, 1990). They are linear in the residual, so the standard deviation of the torque
+follows from the noise in every frame.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from anglecam.identification.fit import Fit
 from anglecam.identification.noise import Noise
 
 REACHES = (3, 4, 6, 8, 11, 15, 20)
-"""Half-lengths, in frames, of the stretches that are tried."""
-PARTS = 8
-"""A stretch is no longer than this part of a recording."""
+"""Half-lengths, in frames, of the windows that are tried."""
+WINDOWS_PER_RECORDING = 8
+"""A window is at most one part in this many of the shortest recording."""
 
 
 @dataclass(frozen=True)
 class ResidualTorque:
-    """The torque that one recording leaves over, and what it may depend on; arrays of length n."""
+    """The residual torque of one recording, and the quantities on which it may depend; arrays of length n."""
 
     name: str
     time: Floats
@@ -38,49 +38,49 @@ class ResidualTorque:
     torque: Floats
     """Per moment of inertia, rad/s²."""
     sigma: Floats
-    """Its standard deviation from the angle's noise alone, rad/s²."""
+    """Standard deviation of ``torque`` due to the noise of the angle, rad/s²."""
     angle: Floats
-    """Of the model, rad."""
+    """Angle that the model predicts, rad."""
     velocity: Floats
-    """Of the model, rad/s."""
+    """Velocity that the model predicts, rad/s."""
     command: Floats | None
     """rad; ``None`` for a free swing."""
 
 
 def estimate_residual_torque(fit: Fit, records: Sequence[Record], noise: Noise) -> list[ResidualTorque]:
-    """Turn a fitted plant's residual into the torque that would have made it.
+    """Return the torque that would have caused the residual of a fitted plant.
 
     Parameters
     ----------
     fit : Fit
-        Of a plant without effects, of which a and b are used.
+        Of a plant without effects; its a and b are used.
     records : sequence of Record
-        Those that were fitted.
+        The fitted recordings.
     noise : Noise
         Of the angle.
 
     Returns
     -------
     list of ResidualTorque
-        One a recording, without the frames at its ends that have no full stretch about them.
+        One for each recording, without the frames at its ends that have no full window around them.
     """
     operator = np.array([fit.parameters[1], fit.parameters[0], 1.0])
     shortest = min(len(r.time) for r in records)
     tried: list[list[tuple[Floats, Floats]]] = []
-    for reach in [r for r in REACHES if r == REACHES[0] or 2 * r + 1 <= shortest / PARTS]:
+    for reach in [r for r in REACHES if r == REACHES[0] or 2 * r + 1 <= shortest / WINDOWS_PER_RECORDING]:
         torques = [_torque(r, e, operator, reach, noise) for r, e in zip(records, fit.residuals, strict=True)]
         if not all(_agree(torques, shorter) for shorter in tried):
             break
         tried.append(torques)
     reach = REACHES[len(tried) - 1]
     return [
-        _against(record, error, torque, sigma, slice(reach, -reach))
+        _with_motion(record, error, torque, sigma, slice(reach, -reach))
         for record, error, (torque, sigma) in zip(records, fit.residuals, tried[-1], strict=True)
     ]
 
 
 def _torque(record: Record, error: Floats, operator: Floats, reach: int, noise: Noise) -> tuple[Floats, Floats]:
-    """Return torque and standard deviation at every frame; at the ends they are one-sided."""
+    """Return torque and standard deviation at every frame, (n,) each; at the ends the windows are one-sided."""
     torque, sigma = np.empty(len(error)), np.empty(len(error))
     frames = record.time / record.interval
     for i in range(len(error)):
@@ -92,13 +92,13 @@ def _torque(record: Record, error: Floats, operator: Floats, reach: int, noise: 
 
 
 def _agree(longer: Sequence[tuple[Floats, Floats]], shorter: Sequence[tuple[Floats, Floats]]) -> bool:
-    """Say whether two torques differ by no more than the noise of the less certain one."""
+    """Return whether two torques differ by no more than the noise of the shorter window's, which is the larger."""
     off = np.concatenate([new - old for (new, _), (old, _) in zip(longer, shorter, strict=True)])
     sigma = np.concatenate([sigma for _, sigma in shorter])
     return bool(np.sum(off**2) <= np.sum(sigma**2))
 
 
-def _against(record: Record, error: Floats, torque: Floats, sigma: Floats, kept: slice) -> ResidualTorque:
+def _with_motion(record: Record, error: Floats, torque: Floats, sigma: Floats, kept: slice) -> ResidualTorque:
     path = record.angle - error
     return ResidualTorque(
         record.name,
@@ -112,7 +112,7 @@ def _against(record: Record, error: Floats, torque: Floats, sigma: Floats, kept:
 
 
 def _quadratic(time: Floats, at: int, reach: int) -> tuple[NDArray[np.intp], Floats]:
-    """Return the frames about one, and the (3, k) weights with which they make value, slope and curvature there."""
+    """Return the k frames around one, and the (3, k) weights that give value, slope and curvature there."""
     near = np.arange(max(0, at - reach), min(len(time), at + reach + 1))
     off = time[near] - time[at]
     unit = np.max(np.abs(off))

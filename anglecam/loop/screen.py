@@ -1,10 +1,10 @@
-"""The screen: in which direction each effect would move the predictions, and how far the residual goes that way.
+"""The screen: a linear forecast of how much of the residual each effect would explain.
 
-An effect at one of its starts changes the predictions. What the fit so far cannot follow of that change, and the
-residual shows, is what the effect could explain: with d the change and r the residual, both whitened and free of what
-the Jacobian spans, the best multiple of d lowers the cost by (d·r)²/d·d. That is exact where the effect is small and
-acts in proportion, and good enough to choose by elsewhere: backlash, limits and dead zones have no derivative at their
-null, but a change at a start they have.
+An effect with start values for its parameters changes the predictions. Let d be this change and r the residual, both
+whitened and projected onto the orthogonal complement of the fit's Jacobian. The best multiple of d lowers the cost by
+(d·r)²/d·d. This is exact for a small effect whose change is proportional to its parameter, and accurate enough to rank
+the others: backlash, limits and dead zones have no derivative at their null, but they change the predictions at a start
+value.
 """
 
 from __future__ import annotations
@@ -19,100 +19,99 @@ from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit, whiten
+from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import plant_of
 from anglecam.models.plant import Plant
 
-STEPS = (0.0003, 0.003, 0.03, 0.3)
-"""Shares of a start at which an effect is also tried: small ones are far from their starts."""
-LEAST = 1e-6
-"""A change of which the fit follows all but this share is no direction of its own."""
+START_SHARES = (0.0003, 0.003, 0.03, 0.3)
+"""Shares of a start value at which an effect is tried as well, because a small effect is far from its start value."""
 
 
 @dataclass(frozen=True)
 class Change:
-    """What an effect does to the predictions at one set of its parameters."""
+    """Change that an effect with given parameters makes to the predictions."""
 
     effect: Effect
     start: Floats
-    """Its parameters, SI."""
+    """Parameters of the effect, SI."""
     parts: tuple[Floats, ...] = field(repr=False)
-    """Change of each recording's prediction, rad."""
+    """Change of the prediction of each recording, (n,) each, rad."""
 
 
 @dataclass(frozen=True)
 class Direction:
-    """The part of a change that no parameter of the fit could bring about."""
+    """The part of a change that no parameter of the fit can reproduce."""
 
     effect: Effect
     start: Floats
-    """Its parameters, SI."""
+    """Parameters of the effect, SI."""
     change: Floats = field(repr=False)
-    """(N,) change of the whitened predictions, free of what the fit can follow, rad."""
+    """(N,) change of the whitened predictions, orthogonal to the fit's Jacobian, rad."""
 
     @property
     def size(self) -> float:
-        """Length of ``change``, rad."""
+        """Euclidean norm of ``change``, rad."""
         return float(np.linalg.norm(self.change))
 
     @property
     def one_sided(self) -> bool:
-        """Whether the effect exists on one side of its null only."""
+        """Whether the first parameter can lie on one side of its null only."""
         first = self.effect.parameters[0]
         return first.null in (first.lower, first.upper)
 
 
 @dataclass(frozen=True)
 class Forecast:
-    """What one effect promises."""
+    """How much one effect is expected to explain."""
 
     effect: Effect
     start: Floats
-    """Its parameters, SI, scaled to what the residual asks for where they can be scaled."""
+    """Parameters of the effect, SI; the first is scaled to the best multiple of the change."""
     tried: Floats
-    """The same as they were tried."""
+    """The same parameters before scaling."""
     gain: float
-    """Log-likelihood that the fit would gain."""
+    """Expected log-likelihood gain, nat."""
     share: float = 1.0
-    """Of the most that is forecast to any effect."""
+    """``gain`` as a share of the largest forecast of any effect."""
 
 
 def absorbed_space(fit: Fit) -> Floats:
-    """Return an orthonormal basis, (N, k), of the changes that the fit follows with its own parameters."""
-    used = np.linalg.norm(fit.jacobian, axis=0) > 0.0  # a parameter held by its bound may move nothing
+    """Return an orthonormal basis, (N, k), of the column space of the fit's Jacobian."""
+    used = np.linalg.norm(fit.jacobian, axis=0) > 0.0  # the column of a parameter at its bound may be zero
     basis, _ = np.linalg.qr(fit.jacobian[:, used])
     return basis
 
 
 def changes(fit: Fit, records: Sequence[Record], effects: Sequence[Effect]) -> list[Change]:
-    """Return what each effect at each of its starts does to the predictions of a fitted plant.
+    """Return the change that each effect, at each of its start values, makes to the predictions of a fitted plant.
 
     Parameters
     ----------
     fit : Fit
         Of a `Plant`, the model so far.
     records : sequence of Record
-        Those that it was fitted to.
+        The recordings that it was fitted to.
     effects : sequence of Effect
-        What could be added.
+        Effects that could be added.
 
     Returns
     -------
     list of Change
-        Grouped by effect; those with which the plant runs away left out.
+        Grouped by effect, without those that make the plant's motion diverge.
     """
     plant = plant_of(fit)
     found = []
     for effect in effects:
         richer = plant.with_effect(effect)
 
-        def predict(own_parameters: Floats, richer: Plant = richer) -> list[Floats]:
-            values = np.append(fit.parameters, own_parameters)
+        def predict(effect_parameters: Floats, richer: Plant = richer) -> list[Floats]:
+            values = np.append(fit.parameters, effect_parameters)
             return [
-                richer.predict(values, record.time, record.command, own[: plant.states], record.view)
-                for record, own in zip(records, fit.nuisance, strict=True)
+                richer.predict(values, record.time, record.command, nuisance[: plant.states], record.view)
+                for record, nuisance in zip(records, fit.nuisance, strict=True)
             ]
 
-        base = predict(effect.null)  # with the effect in place: what the integrator errs by is the same then
+        base = predict(effect.null)  # with the effect in the model, so that errors of the integrator cancel
         for start in starts_of(effect):
             parts = tuple(after - before for after, before in zip(predict(start), base, strict=True))
             if all(np.all(np.isfinite(part)) for part in parts):
@@ -120,89 +119,94 @@ def changes(fit: Fit, records: Sequence[Record], effects: Sequence[Effect]) -> l
     return found
 
 
-def directions(fit: Fit, records: Sequence[Record], moved: Sequence[Change]) -> list[Direction]:
-    """Return the changes as the fit sees them: whitened with its noise, and free of what it can follow.
+def directions(
+    fit: Fit, records: Sequence[Record], prediction_changes: Sequence[Change], policy: Policy = DEFAULT
+) -> list[Direction]:
+    """Whiten the changes as the fit whitens its residual, and remove the part that its parameters can reproduce.
 
     Parameters
     ----------
     fit : Fit
         The model so far.
     records : sequence of Record
-        Those that it was fitted to.
-    moved : sequence of Change
-        From `changes` of the same fit, or of one before that whitened with another colour.
+        The recordings that it was fitted to.
+    prediction_changes : sequence of Change
+        From `changes` of the same fit, or of a previous one with another AR(1) coefficient.
+    policy : Policy
+        Thresholds.
 
     Returns
     -------
     list of Direction
-        Those left out of which the fit follows everything.
+        Without changes that the fit can reproduce completely.
     """
     absorbed, found = absorbed_space(fit), []
-    for one in moved:
+    for one in prediction_changes:
         change = np.concatenate([whiten(r, fit.phi, part) for r, part in zip(records, one.parts, strict=True)])
         whole = float(np.linalg.norm(change))
         change = change - absorbed @ (absorbed.T @ change)
-        if np.linalg.norm(change) > LEAST * whole:
+        if np.linalg.norm(change) > policy.screen.smallest_free_share * whole:
             found.append(Direction(one.effect, one.start, change))
     return found
 
 
 def starts_of(effect: Effect) -> list[Floats]:
-    """List the parameters that an effect is tried with: its size at every start, its shape with the first of them.
+    """List the parameters at which an effect is tried.
 
-    Late ones stay at their null.
+    The first parameter takes every start value, and each other one its start values with the first at its first start
+    value. Staged parameters stay at their null.
     """
     size = effect.parameters[0]
     first = size.starts[0]
     starts = []
     for i, parameter in enumerate(effect.parameters):
         for value in () if parameter.staged else parameter.starts:
-            own = effect.null
-            own[0], own[i] = first, value
-            starts.append(own)
-    for share in STEPS:
+            values = effect.null
+            values[0], values[i] = first, value
+            starts.append(values)
+    for share in START_SHARES:
         small = effect.null
         small[0] = size.null + share * (first - size.null)
         starts.append(small)
     return starts
 
 
-def forecasts(fit: Fit, ways: Sequence[Direction]) -> list[Forecast]:
-    """Forecast what each effect would explain, from its most promising direction.
+def forecasts(fit: Fit, effect_directions: Sequence[Direction]) -> list[Forecast]:
+    """Forecast the log-likelihood gain of each effect from its best direction.
 
     Parameters
     ----------
     fit : Fit
         The model so far.
-    ways : sequence of Direction
+    effect_directions : sequence of Direction
         From `directions` of the same fit.
 
     Returns
     -------
     list of Forecast
-        One an effect, most promising first.
+        One for each effect, largest gain first.
     """
     absorbed = absorbed_space(fit)
     left = fit.white - absorbed @ (absorbed.T @ fit.white)
     energy = float(left @ left)
     best: dict[str, Forecast] = {}
-    for way in ways:
-        one = _forecast(way, left, energy)
-        if way.effect.id not in best or one.gain > best[way.effect.id].gain:
-            best[way.effect.id] = one
+    for direction in effect_directions:
+        one = _forecast(direction, left, energy)
+        if direction.effect.id not in best or one.gain > best[direction.effect.id].gain:
+            best[direction.effect.id] = one
     most = max((forecast.gain for forecast in best.values()), default=0.0)
     shares = [replace(forecast, share=forecast.gain / most if most > 0.0 else 1.0) for forecast in best.values()]
     return sorted(shares, key=lambda forecast: -forecast.gain)
 
 
-def _forecast(way: Direction, left: Floats, energy: float) -> Forecast:
-    size, along = way.size**2, float(way.change @ left)
-    null, first = way.effect.null, way.effect.parameters[0]
-    reach = way.start[0] - null[0]
-    wanted = float(np.clip(null[0] + along / size * reach, first.lower, first.upper))
-    share = (wanted - null[0]) / reach
+def _forecast(direction: Direction, left: Floats, energy: float) -> Forecast:
+    size, along = direction.size**2, float(direction.change @ left)
+    null, first = direction.effect.null, direction.effect.parameters[0]
+    reach = direction.start[0] - null[0]
+    best_first = float(np.clip(null[0] + along / size * reach, first.lower, first.upper))
+    share = (best_first - null[0]) / reach
     lowered = energy - 2.0 * share * along + share**2 * size
     gain = 0.5 * len(left) * math.log(energy / max(lowered, 1e-6 * energy)) if energy > 0.0 else 0.0
-    scaled = way.start.copy()
-    scaled[0] = wanted if wanted != null[0] else way.start[0]
-    return Forecast(way.effect, scaled, way.start, gain)
+    scaled = direction.start.copy()
+    scaled[0] = best_first if best_first != null[0] else direction.start[0]
+    return Forecast(direction.effect, scaled, direction.start, gain)

@@ -1,9 +1,9 @@
-"""The rounds of the loop: what a model leaves over, what could be added to it, and whether that proves itself.
+"""Stepwise selection: test a model's residual, fit candidates, cross-validate them, add the best one, and repeat.
 
-    residual → gate → candidates → prediction of what was not fitted → accept → residual → …
+    residual → residual test → candidates → cross-validation → accept → residual → …
 
-An effect is added only where the gate says that something is missing *and* the error on what the model was not fitted
-to falls with a 95 % interval above zero.
+An effect is added only if the residual test shows structure *and* the prediction error falls by more than chance
+allows: the lower end of its bootstrap interval must be above zero.
 """
 
 from __future__ import annotations
@@ -30,27 +30,10 @@ from anglecam.loop.candidates import (
     rms_difference,
 )
 from anglecam.loop.cross_validation import Prediction, compare, predict_held_out
+from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_left, effects_of, refit_with_phi, refit_without
 from anglecam.loop.residual_test import ResidualTest, run_residual_test
 from anglecam.loop.screen import Change, Forecast, changes, directions, forecasts
-
-MOST_EFFECTS = 3
-LIKELIEST = 2
-"""Effects that are fitted to see what colour the noise has."""
-NEGLIGIBLE = 2.0
-"""In a film, structure smaller than this many times the angle's stated uncertainty is neither traced further nor called
-unexplained: it may be the measurement's own."""
-DECISIVE = 10.0
-"""Log-likelihood from which on evidence chooses between effects whose predictions a film's angle hardly tells apart."""
-SURE = 0.01
-"""What an effect explains must be this improbable as noise; and so must what remains once one has proven itself, to be
-traced further or to take the verdict back."""
-WORTH_A_LOOK = 1.0
-"""Log-likelihood by which a better fit of the same model makes its residual worth testing anew."""
-FAITHFUL = 0.005
-"""No structure smaller than this share of what the base model leaves is traced: no model of an effect is truer."""
-FINEST = math.radians(1e-3)
-"""No structure smaller than this is traced: forward models and files are not much finer."""
 
 
 @dataclass(frozen=True)
@@ -59,108 +42,127 @@ class Task:
 
     fitted: tuple[Record, ...]
     predicted: tuple[Record, ...]
-    """Held out by declaration; may be none."""
+    """Held-out recordings; may be empty."""
     ledger: tuple[Effect, ...]
-    """What these recordings can show."""
+    """Effects that these recordings can show."""
     floor: Noise | None
+    """Noise of the angle, apart from any model."""
     rng: np.random.Generator
     progress: Callable[[str], None]
+    policy: Policy = DEFAULT
 
     @property
     def camera(self) -> float:
-        """Noise of a film's angle, rad; 0 for a series from elsewhere."""
+        """Stated standard uncertainty of a film's angle, rad; 0 for angle series from elsewhere."""
         return self.floor.sigma if self.floor and self.floor.filmed else 0.0
 
 
 @dataclass(frozen=True)
 class Assessment:
-    """A model and what its residual says."""
+    """A fitted model, its predictions and the test of its residual."""
 
     fit: Fit
     held_out: Prediction
-    """Of what is held out by declaration, or of all block by block where nothing is."""
+    """Prediction of the held-out recordings, or of all frames by cross-validation if no recording is held out."""
     cross_validated: Prediction
-    """Of every frame by a model that was not fitted to it."""
+    """Prediction of every frame by a model that was not fitted to it."""
     residual_test: ResidualTest
     forecasts: tuple[Forecast, ...]
-    """What is worth a fit, most promising first."""
+    """Effects to fit next, largest forecast first."""
 
 
 def assess(task: Task, fit: Fit) -> Assessment:
-    """Test what a fitted plant leaves over, whitened with the noise's colour as far as that can be told by now."""
-    moved = changes(fit, task.fitted, effects_left(task.ledger, fit))
-    fit = refit_with_phi(fit, task.fitted, _colour(task, fit, moved))
-    ways = directions(fit, task.fitted, moved)
-    told, unseen = predict_held_out(fit, task.fitted, task.predicted)
-    gate = run_residual_test(fit, task.fitted, ways, task.rng, NEGLIGIBLE * task.camera)
-    return Assessment(fit, told, unseen, gate, tuple(promising(forecasts(fit, ways))))
+    """Estimate the noise's AR(1) coefficient, fit the plant again with it, predict and test the residual."""
+    policy = task.policy
+    prediction_changes = changes(fit, task.fitted, effects_left(task.ledger, fit))
+    fit = refit_with_phi(fit, task.fitted, _noise_phi(task, fit, prediction_changes))
+    effect_directions = directions(fit, task.fitted, prediction_changes, policy)
+    held_out, cross_validated = predict_held_out(fit, task.fitted, task.predicted, policy)
+    smallest_rms = policy.stepwise.film_error_sigmas * task.camera
+    tested = run_residual_test(fit, task.fitted, effect_directions, task.rng, smallest_rms, policy)
+    chosen = promising(forecasts(fit, effect_directions), policy)
+    return Assessment(fit, held_out, cross_validated, tested, tuple(chosen))
 
 
-def smallest_traced(task: Task, first: Assessment) -> float:
-    """Return the smallest structure that is traced, rad RMS."""
-    return max(FINEST, NEGLIGIBLE * task.camera, FAITHFUL * first.cross_validated.rmse)
+def smallest_structure(task: Task, first: Assessment) -> float:
+    """Return the RMS, rad, below which structure is not searched."""
+    limits = task.policy.stepwise
+    return max(
+        limits.numerical_error_rad,
+        limits.film_error_sigmas * task.camera,
+        limits.model_error_share * first.cross_validated.rmse,
+    )
 
 
 def smallest_first_effect(task: Task, first: Assessment, best: Fit) -> float:
-    """Return the smallest doing of a first effect, rad RMS.
+    """Return the RMS change, rad, that a first effect must make to be accepted.
 
-    In a film it must be as large as the angle's stated uncertainty, and `NEGLIGIBLE` times that part of it which does
-    not scatter from frame to frame once the effect is in: only that can follow the motion as an effect does.
+    In a film this is at least the stated uncertainty of the angle, and at least twice the part of it that does not
+    scatter from frame to frame once the effect is in the model, because only that part can follow the motion as an
+    effect does. (Both factors are the policy's.)
     """
+    limits = task.policy.stepwise
     scatter = math.sqrt(1.0 - best.phi**2) * min(best.rmse, task.camera)
     common = math.sqrt(task.camera**2 - scatter**2)
-    return max(FINEST, task.camera, NEGLIGIBLE * common, FAITHFUL * first.cross_validated.rmse)
+    return max(
+        limits.numerical_error_rad,
+        limits.film_error_first_sigmas * task.camera,
+        limits.film_common_error_first_sigmas * common,
+        limits.model_error_share * first.cross_validated.rmse,
+    )
 
 
 def rank_candidates(task: Task, now: Assessment) -> list[Candidate]:
-    """Fit what is promising beside what the model has, strongest evidence first.
+    """Fit the forecast effects, each in addition to those of the model, and rank them by evidence.
 
-    Of those whose predictions differ from the best's by less than a film's angle is uncertain, and whose evidence is
-    nearly as strong, the one with fewest parameters comes first.
+    In a film, of effects whose predictions differ from the best one's by less than the angle's uncertainty and whose
+    evidence is nearly as strong, the one with the fewest parameters comes first.
     """
-    found = fit_candidates(now.fit, now.cross_validated, task.fitted, task.predicted, now.forecasts, task.camera)
+    found = fit_candidates(
+        now.fit, now.cross_validated, task.fitted, task.predicted, now.forecasts, task.camera, task.policy
+    )
     if not found or task.camera == 0.0:
         return found
-    near = [one for one in found if found[0].evidence - one.evidence <= DECISIVE]
+    near = [one for one in found if found[0].evidence - one.evidence <= task.policy.stepwise.alias_evidence_nat]
     alike = [one for one in near if rms_difference(one.fit, found[0].fit) <= task.camera]
     first = min(alike, key=lambda one: len(one.effect.parameters))
     return [first, *(one for one in found if one is not first)]
 
 
 def add_effects(task: Task, first: Assessment, candidates: Sequence[Candidate]) -> Assessment:
-    """Add effects for as long as one proves itself.
+    """Add effects as long as the best candidate is significant.
 
     Parameters
     ----------
     task : Task
-        What there is to explain.
+        Recordings, ledger and policy.
     first : Assessment
-        The base model's.
+        Of the base model.
     candidates : sequence of Candidate
-        Its candidates; none where nothing is missing.
+        For the base model; empty if nothing is missing.
 
     Returns
     -------
     Assessment
-        The best model's.
+        Of the final model.
     """
-    now, negligible, been = first, smallest_traced(task, first), [_names(first)]
+    now, negligible, visited = first, smallest_structure(task, first), [_names(first)]
+    most = task.policy.stepwise.most_effects
     while candidates:
         best = candidates[0]
-        if not _convincing(
-            task, now, best, negligible if effects_of(now.fit) else smallest_first_effect(task, first, best.fit)
-        ):
-            # one effect may mask another: neither helps alone, and both do together
-            if len(effects_of(now.fit)) + 2 > MOST_EFFECTS:
+        least = negligible if effects_of(now.fit) else smallest_first_effect(task, first, best.fit)
+        if not _significant(task, now, best, least):
+            # one effect may mask another: neither improves the prediction alone, but both together do
+            if len(effects_of(now.fit)) + 2 > most:
                 break
-            _, more = _next(task, _added(task, best), negligible)
-            if not more or not _convincing(task, now, more[0], negligible):
+            _, more = _next(task, _add(task, best), negligible)
+            if not more or not _significant(task, now, more[0], negligible):
                 break
             best = more[0]
-        added = _added(task, best)
-        if _names(added) in been:  # what is taken out for it would be put in again without end
+        added = _add(task, best)
+        if _names(added) in visited:  # otherwise an effect could be replaced and added again without end
             break
-        been.append(_names(added))
+        visited.append(_names(added))
         now, candidates = _next(task, added, negligible)
     return now
 
@@ -169,61 +171,76 @@ def _names(one: Assessment) -> set[str]:
     return {effect.id for effect in effects_of(one.fit)}
 
 
-def _convincing(task: Task, now: Assessment, best: Candidate, negligible: float) -> bool:
-    if 2.0 * best.log_likelihood_gain <= special.chdtri(len(best.effect.parameters), SURE):
-        return False  # noise would fit as well; and of two intervals one is easily above zero
-    # a second left out may hold all that tells of a limit, which what was declared then does
+def _significant(task: Task, now: Assessment, best: Candidate, least: float) -> bool:
+    """Return whether a candidate fits better than noise would, and predicts better by at least ``least``, rad RMS."""
+    false_effect_rate = task.policy.stepwise.false_effect_rate
+    if 2.0 * best.log_likelihood_gain <= special.chdtri(len(best.effect.parameters), false_effect_rate):
+        return False  # noise would fit as well; and of two bootstrap intervals one is easily above zero
+    # a left-out block may contain everything that determines a limit; held-out recordings then still show it
     pairs = ((now.held_out, best.held_out), (now.cross_validated, best.cross_validated))
     return any(
         after is not None
-        and before.rmse**2 - after.rmse**2 > negligible**2
-        and compare(before, after, task.rng).interval_95[0] > 0.0
+        and before.rmse**2 - after.rmse**2 > least**2
+        and compare(before, after, task.rng, task.policy).significant
         for before, after in pairs[0 if task.predicted else 1 :]
     )
 
 
-def _added(task: Task, best: Candidate) -> Assessment:
-    """Take the candidate's model, less each earlier effect without which the unseen is predicted as well."""
+def _add(task: Task, best: Candidate) -> Assessment:
+    """Assess the candidate's model without each earlier effect that does not improve its prediction."""
     task.progress(f"adding {best.effect.id}")
-    fit, unseen = best.fit, best.cross_validated
+    fit, cross_validated = best.fit, best.cross_validated
     for effect in effects_of(fit)[:-1]:
-        if unseen is None:
+        if cross_validated is None:
             break
         reduced = refit_without(fit, effect, task.fitted)
-        _, less = predict_held_out(reduced, task.fitted, task.predicted)
-        if compare(less, unseen, task.rng).interval_95[0] <= 0.0:
-            fit, unseen = reduced, less
+        _, fewer = predict_held_out(reduced, task.fitted, task.predicted, task.policy)
+        if not compare(fewer, cross_validated, task.rng, task.policy).significant:
+            fit, cross_validated = reduced, fewer
     return assess(task, fit)
 
 
 def _next(task: Task, now: Assessment, negligible: float, *, again: bool = True) -> tuple[Assessment, list[Candidate]]:
-    """Look for what to add next, and on the way, once, for a better fit of what there is."""
-    if now.residual_test.p_value >= SURE or now.fit.rmse <= negligible or len(effects_of(now.fit)) == MOST_EFFECTS:
+    """Return the candidates to add next, and the model; once, the model is fitted again if a candidate improves it."""
+    limits = task.policy.stepwise
+    if (
+        now.residual_test.p_value >= limits.false_further_search_rate
+        or now.fit.rmse <= negligible
+        or len(effects_of(now.fit)) == limits.most_effects
+    ):
         return now, []
     candidates = rank_candidates(task, now)
-    deeper = fit_from_candidates(now.fit, candidates, task.fitted)
-    if again and log_likelihood_gain(now.fit.cost, deeper.cost, len(deeper.white)) > WORTH_A_LOOK:
-        return _next(task, assess(task, deeper), negligible, again=False)
+    better = fit_from_candidates(now.fit, candidates, task.fitted)
+    if again and log_likelihood_gain(now.fit.cost, better.cost, len(better.white)) > limits.better_minimum_nat:
+        return _next(task, assess(task, better), negligible, again=False)
     return now, candidates
 
 
-def _colour(task: Task, fit: Fit, moved: Sequence[Change]) -> float:
-    """Return the noise's φ: of the best model's residual, but no more than the noise floor's.
+def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> float:
+    """Return the AR(1) coefficient of the noise: that of the best model's residual, limited by the noise floor's.
 
-    What a model lacks makes its residual look coloured; the best candidate's residual looks least so, and a rest or
-    the distance from the pivot, which no model enters, says where colour ends and structure begins.
+    Structure that a model lacks makes its residual look correlated, and the residual of the best candidate looks least
+    so. A rest, or the distance from the pivot, is independent of any model; its AR(1) coefficient limits how much of
+    the correlation can be noise.
     """
-    likely = forecasts(fit, directions(fit, task.fitted, moved))[:LIKELIEST]
-    fits = [fit, *map_in_threads(lambda one: fit_with(fit, task.fitted, one, staged=False), likely)]
+    limits = task.policy.stepwise
+    likely = forecasts(fit, directions(fit, task.fitted, prediction_changes, task.policy))[: limits.noise_models]
+    fits = [
+        fit,
+        *map_in_threads(lambda one: fit_with(fit, task.fitted, one, staged=False, policy=task.policy), likely),
+    ]
     best = min(fits, key=lambda one: one.cost)
     phi = autoregression(best.residuals, "residual").phi
-    return phi if task.floor is None else min(phi, max(0.0, task.floor.phi + 1.645 * task.floor.phi_error))
+    if task.floor is None:
+        return phi
+    return min(phi, max(0.0, task.floor.phi + limits.noise_floor_phi_errors * task.floor.phi_error))
 
 
 def applicable(records: Sequence[Record]) -> list[Effect]:
-    """List the effects that recordings can show: a free swing has no command, a series without marks no rows.
+    """List the effects that recordings can show.
 
-    What is the same as a wrong zero of the angle can be told only where that is known.
+    A free swing has no command, and an angle series without pixels has no rows. An effect that changes the angle as a
+    wrong zero does is listed only if the zero is declared.
     """
     driven = any(r.command is not None for r in records)
     known = all(r.zero_known for r in records)

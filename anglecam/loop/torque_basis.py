@@ -1,10 +1,10 @@
-"""What any torque would change that depends on the angle alone, or on the speed alone, whatever its curve.
+"""Responses to an arbitrary torque that depends on the angle alone, or on the speed alone.
 
     τ(θ) = Σ τₖ·hatₖ(θ),     τ(θ̇) = Σ τₖ·hatₖ(θ̇),     ë + a·ė + b·e = τ
 
-A curve of straight lines between knots stands for any curve: each hat is put through the plant along the path that the
-model takes, and the space of the answers is what such a torque can leave in a residual. No entry of the ledger is
-needed for it, so it also sees what the ledger does not have.
+The curve is piecewise linear: a sum of hat functions with free coefficients. Each hat function, evaluated along the
+path of the model, is a torque that drives the linear plant; the span of the responses e contains every residual that
+such a torque can leave. The effects of the ledger are not used, so torques that the ledger lacks are covered, too.
 """
 
 from __future__ import annotations
@@ -21,33 +21,33 @@ from anglecam.loop.refit import plant_of
 from anglecam.models.plant import Plant
 
 ANGLES = 9
-"""Knots of a curve over the angle, from the lowest to the highest."""
+"""Number of knots of a curve over the angle, evenly spaced from the lowest to the highest angle."""
 SPEEDS = np.array([-1.0, -0.3, -0.1, -0.03, 0.0, 0.03, 0.1, 0.3, 1.0])
-"""Knots of a curve over the speed, of the largest: close about rest, where friction has its kinks."""
-PARTS = 4
-"""Of a frame's interval, in which a torque is held."""
+"""Knots of a curve over the speed, as shares of the largest speed; dense around rest, where friction has kinks."""
+SUBSTEPS = 4
+"""Per frame interval; the torque is constant in each."""
 
 
 def torque_responses(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
-    """Put curves of torque over angle and over speed through a fitted plant.
+    """Return the changes of the whitened residual by each hat function of torque over angle and over speed.
 
     Parameters
     ----------
     fit : Fit
-        Of a `Plant`; a and b are those of its linear part.
+        Of a `Plant`; a and b of its linear part are used.
     records : sequence of Record
-        Those that it was fitted to.
+        The recordings that it was fitted to.
 
     Returns
     -------
     dict
-        ``angle`` and ``velocity`` → (N, k) changes of the whitened residual, a column a knot.
+        ``angle`` and ``velocity`` → (N, k), one column for each knot.
     """
     plant = plant_of(fit)
-    times = [_between(record.time) for record in records]
+    times = [_substeps(record.time) for record in records]
     paths = [
-        plant.run(fit.parameters, time, record.command, own[: plant.states])
-        for time, record, own in zip(times, records, fit.nuisance, strict=True)
+        plant.run(fit.parameters, time, record.command, nuisance[: plant.states])
+        for time, record, nuisance in zip(times, records, fit.nuisance, strict=True)
     ]
     whole = np.concatenate(paths)
     angles = np.linspace(whole[:, 0].min(), whole[:, 0].max(), ANGLES)
@@ -59,15 +59,15 @@ def torque_responses(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
         for record, time, path in zip(records, times, paths, strict=True):
             held = 0.5 * (path[:-1, column] + path[1:, column])
             hats = [np.interp(held, at, hat) for hat in np.eye(len(at))]
-            answers = [
+            responses = [
                 Plant().predict(linear, record.time, Command(time[:-1], hat), np.zeros(plant.states)) for hat in hats
             ]
-            blocks.append(whiten(record, fit.phi, np.column_stack(answers)))
+            blocks.append(whiten(record, fit.phi, np.column_stack(responses)))
         found[name] = np.concatenate(blocks)
     return found
 
 
-def _between(time: Floats) -> Floats:
-    """Divide every interval between frames."""
-    steps = np.arange(PARTS) / PARTS
+def _substeps(time: Floats) -> Floats:
+    """Divide every frame interval into `SUBSTEPS`."""
+    steps = np.arange(SUBSTEPS) / SUBSTEPS
     return np.append((time[:-1, None] + steps * np.diff(time)[:, None]).ravel(), time[-1])

@@ -10,6 +10,7 @@ from anglecam.identification.fit import Fit
 from anglecam.identification.noise import Noise
 from anglecam.loop.candidates import Candidate
 from anglecam.loop.cross_validation import Gain, Prediction
+from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.residual_test import ResidualTest
 
 
@@ -19,33 +20,42 @@ class Accepted:
 
     effect: Effect
     rivals: dict[str, Fit]
-    """What it cannot be told from: the model with each of these in its place, on the fitted recordings."""
+    """Effects that the recordings cannot distinguish from it: id → the model with that effect in its place, on the
+    fitted recordings."""
 
     @property
     def alias_set(self) -> tuple[str, ...]:
-        """Ids, its own first."""
+        """Ids of the effect and of its rivals, the effect first."""
         return (self.effect.id, *self.rivals)
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the loop found."""
+    """The result of the loop, with everything that supports it."""
 
     verdict: str
     """``attributed``, ``nothing_missing`` or ``unexplained``."""
     accepted: tuple[Accepted, ...]
+    """Effects that were added, in the order in which they were added."""
     before: Fit
     """The base model on the fitted recordings."""
     after: Fit
-    """The final model on the same."""
+    """The final model on the fitted recordings."""
     before_held_out: Prediction
+    """Of the held-out recordings by the base model, or of all frames by cross-validation if none is held out."""
     after_held_out: Prediction
+    """The same by the final model."""
     gain: Gain
     first_test: ResidualTest
+    """Of the base model's residual."""
     last_test: ResidualTest
+    """Of the residual of the last model that was tried."""
     candidates: tuple[Candidate, ...]
-    """Those of the first round, strongest evidence first; none where the gate found nothing missing."""
+    """For the base model, strongest evidence first; empty if the residual test shows no structure."""
     noise: Noise
+    """Of the angle."""
     fitted: tuple[Record, ...]
     held_out: tuple[Record, ...]
-    """By declaration; may be none."""
+    """Recordings that were predicted only; may be empty."""
+    policy: Policy = DEFAULT
+    """The thresholds that led to the verdict."""

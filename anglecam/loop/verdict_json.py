@@ -1,4 +1,4 @@
-"""The verdict as ``loop.json`` holds it, and in words."""
+"""The content of ``loop.json``, and the experiment that a verdict proposes."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from anglecam.loop.verdict import Verdict
 MODEL_NAMES = ("a_per_s", "b_per_s2", "c_per_s2")
 NEXT_COMMAND = "next.command.csv"
 UNITS = ("deg", "rad", "s", "s2", "px", "per")
-"""Words that a parameter's name may end in."""
+"""Words of units at the end of a parameter's name."""
 
 
 def next_experiment(verdict: Verdict) -> Experiment | None:
-    """Choose what to record next to tell what was added from what it cannot be told from.
+    """Choose the recording that best distinguishes the added effects from their rivals.
 
     Parameters
     ----------
@@ -32,14 +32,14 @@ def next_experiment(verdict: Verdict) -> Experiment | None:
     Returns
     -------
     Experiment or None
-        One for all that is open; ``None`` where nothing is.
+        One experiment for all alias sets; ``None`` if each contains one effect only.
     """
     rivals = [fit for accepted in verdict.accepted for fit in accepted.rivals.values()]
-    return separating_experiment([verdict.after, *rivals], verdict.fitted, verdict.noise)
+    return separating_experiment([verdict.after, *rivals], verdict.fitted, verdict.noise, verdict.policy)
 
 
 def write_next_command(experiment: Experiment | None, folder: Path) -> None:
-    """Write the command to play next as ``next.command.csv``; where none tells anything apart an older one goes."""
+    """Write the command to play next as ``next.command.csv``; if no command separates any pair, delete an old one."""
     path = folder / NEXT_COMMAND
     if experiment is None or experiment.command is None or not experiment.separated:
         path.unlink(missing_ok=True)
@@ -60,9 +60,9 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
     Returns
     -------
     dict
-        Every candidate has its error on what is held out, those among them that the loop did not try there.
+        Candidates that the loop did not cross-validate are predicted here, so that each has its held-out error.
     """
-    model = dict(zip(verdict.after.model.names, parameter_values(verdict), strict=True))
+    model = fitted_parameters(verdict)
     named = {name for accepted in verdict.accepted for name in accepted.alias_set}
     return {
         "verdict": verdict.verdict,
@@ -104,11 +104,18 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
             }
             for c in verdict.candidates
         ],
+        "policy": verdict.policy.as_list(),
     }
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Part a parameter's name from the unit that it ends in (``dry_friction_deg_per_s2`` → dry friction, deg/s2)."""
+    """Split a parameter's name into words and unit.
+
+    Examples
+    --------
+    >>> split_unit("dry_friction_deg_per_s2")
+    ('dry friction', 'deg/s2')
+    """
     words = name.split("_")
     end = next(i for i in range(1, len(words) + 1) if all(word in UNITS for word in words[i:]))
     units = ["1", *words[end:]] if words[end:][:1] == ["per"] else words[end:]
@@ -116,7 +123,7 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def size_of(effect_id: str) -> Parameter:
-    """Return the parameter that says how large an effect is."""
+    """Return the parameter that states the size of an effect."""
     return effect(effect_id).parameters[0]
 
 
@@ -125,27 +132,31 @@ def _what_to_film(effect: Effect, experiment: Experiment | None) -> str:
         return effect.separating_experiment
     file = "" if experiment.command is None else f" ({NEXT_COMMAND})"
     return (
-        f"{effect.separating_experiment}; what tells soonest on this rig: {experiment.description}, "
+        f"{effect.separating_experiment}; fastest on this rig: {experiment.description}, "
         f"{experiment.duration:g} s{file}"
     )
 
 
 def _held_out_error(candidate: Candidate, verdict: Verdict) -> float:
-    """Return a candidate's error, rad, on what is held out, also where the loop had no hope of it."""
+    """Return a candidate's RMS error on held-out data, rad, also if the loop did not cross-validate it."""
     if candidate.held_out is not None:
         return candidate.held_out.rmse
     if verdict.held_out:
         return predict_output_error(candidate.fit, verdict.held_out).rmse
-    return predict_held_out(candidate.fit, verdict.fitted, ())[0].rmse
+    return predict_held_out(candidate.fit, verdict.fitted, (), verdict.policy)[0].rmse
 
 
-def parameter_values(verdict: Verdict) -> list[dict[str, float]]:
+def fitted_parameters(verdict: Verdict) -> dict[str, dict[str, float]]:
+    """Return each parameter of the final model by name: ``value`` and ``sigma``, in the unit that its name states."""
     fit = verdict.after
-    own = [p for a in verdict.accepted for p in a.effect.parameters]
-    base = len(fit.parameters) - len(own)
+    added = [p for a in verdict.accepted for p in a.effect.parameters]
+    base = len(fit.parameters) - len(added)
     sigma = full_sigma(fit, verdict.fitted, verdict.noise)
     pairs = list(zip(fit.parameters.tolist(), sigma.tolist(), strict=True))
-    # with less than this the recordings do not tell it, as with an asymmetry of friction that hardly acts
-    certain = [(value, s if s < p.upper - p.lower else np.nan) for p, (value, s) in zip(own, pairs[base:], strict=True)]
-    told = pairs[:base] + [p.in_file_unit(*pair) for p, pair in zip(own, certain, strict=True)]
-    return [{"value": value, "sigma": sigma} for value, sigma in told]
+    # a larger uncertainty than the range between the bounds means that the recordings do not determine the parameter,
+    # for instance the asymmetry of a friction that hardly acts
+    effect_pairs = [
+        (value, s if s < p.upper - p.lower else np.nan) for p, (value, s) in zip(added, pairs[base:], strict=True)
+    ]
+    stated = pairs[:base] + [p.in_file_unit(*pair) for p, pair in zip(added, effect_pairs, strict=True)]
+    return {name: {"value": value, "sigma": s} for name, (value, s) in zip(fit.model.names, stated, strict=True)}

@@ -26,15 +26,15 @@ from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, STY
 from anglecam.report.wording import plain
 
 WIDTH = 9.6
-MOST = 8
-"""Recordings that are drawn; those with the largest errors where there are more."""
-BINS, LEAST = 16, 5
-"""Classes of a mean, and frames that one must have."""
+MOST_RECORDINGS = 8
+"""Largest number of recordings in a figure; those with the largest errors are drawn."""
+BINS, FEWEST_FRAMES = 16, 5
+"""Bins of a mean, and the smallest number of frames in a bin that is drawn."""
 COLOURS = {"base model": BEFORE, "before": BEFORE, "after": AFTER}
 
 
 def measured_figure(series: Sequence[AngleSeries], commands: dict[str, Command]) -> str:
-    """Draw every recording's angle over time and its command, frames without an angle marked."""
+    """Draw angle and command of every recording over time, and mark frames without an angle."""
 
     def draw(axes: Axes, i: int) -> None:
         one = series[i]
@@ -48,20 +48,20 @@ def measured_figure(series: Sequence[AngleSeries], commands: dict[str, Command])
 
 
 def prediction_figure(records: Sequence[Record], residuals: Sequence[Floats]) -> str:
-    """Draw the angle that the base model predicts over the one that was measured."""
+    """Draw the measured angle, and the angle that the base model predicts."""
     names = labels(records)
     worst = _worst(residuals)
 
     def draw(axes: Axes, i: int) -> None:
         record, error = records[worst[i]], residuals[worst[i]]
         axes.plot(record.time, np.degrees(record.angle), ".", color=MEASURED, ms=2.5, label="measured")
-        axes.plot(record.time, np.degrees(record.angle - error), color=BEFORE, lw=1.0, label="base model, in free run")
+        axes.plot(record.time, np.degrees(record.angle - error), color=BEFORE, lw=1.0, label="base model, free run")
 
     return _panels([names[i] for i in worst], draw, "angle, °")
 
 
 def residual_figure(records: Sequence[Record], fit: Fit, floor: float) -> str:
-    """Draw what a model leaves over, with the band of the noise (standard deviation ``floor``, rad)."""
+    """Draw the residual of a model, and the band of the noise with standard deviation ``floor``, rad."""
     names, worst = labels(records), _worst(fit.residuals)
 
     def draw(axes: Axes, i: int) -> None:
@@ -74,43 +74,45 @@ def residual_figure(records: Sequence[Record], fit: Fit, floor: float) -> str:
 
 
 def candidate_figure(candidates: Sequence[Candidate], found: Sequence[str]) -> str:
-    """Draw the evidence for every candidate; those that were found stand out."""
+    """Draw the log-likelihood gain of every candidate; the names of attributed effects are bold."""
     with plt.rc_context(STYLE):
         ordered = candidates[::-1]
         figure, ax = plt.subplots(figsize=(7.6, 0.9 + 0.42 * len(ordered)), layout="constrained")
         rows = np.arange(len(ordered))
         fitted = [c.log_likelihood_gain if np.isfinite(c.log_likelihood_gain) else 0.0 for c in ordered]
-        unseen = [c.predictive_gain if np.isfinite(c.predictive_gain) else 0.0 for c in ordered]
-        ax.barh(rows + 0.19, fitted, 0.36, color=COMMAND, label="on the recordings that it was fitted to")
-        ax.barh(rows - 0.19, unseen, 0.36, color=AFTER, label="on recordings that it had not seen")
+        predicted = [c.predictive_gain if np.isfinite(c.predictive_gain) else 0.0 for c in ordered]
+        ax.barh(rows + 0.19, fitted, 0.36, color=COMMAND, label="on fitted frames")
+        ax.barh(rows - 0.19, predicted, 0.36, color=AFTER, label="on predicted frames")
         for row, candidate in zip(rows, ordered, strict=True):
             if candidate.cross_validated is None:
-                ax.annotate("not tried", (0.0, row - 0.19), (4, 0), textcoords="offset points", va="center", fontsize=7)
+                ax.annotate(
+                    "not validated", (0.0, row - 0.19), (4, 0), textcoords="offset points", va="center", fontsize=7
+                )
         ax.set_yticks(rows, [plain(c.effect.id) for c in ordered])
         for tick, candidate in zip(ax.get_yticklabels(), ordered, strict=True):
             tick.set_fontweight("bold" if candidate.effect.id in found else "normal")
-        if max(np.abs([*fitted, *unseen]), default=0.0) > 100.0:
+        if max(np.abs([*fitted, *predicted]), default=0.0) > 100.0:
             ax.set_xscale("symlog", linthresh=10.0)
         ax.axvline(0.0, color=MEASURED, lw=0.8)
         ax.grid(axis="y", visible=False)
-        ax.set_xlabel("log-likelihood gained over the base model")
+        ax.set_xlabel("log-likelihood gain over the base model")
         figure.legend(loc="outside upper left", ncols=2, fontsize=8)
         return _svg(figure)
 
 
-def unseen_figure(before: Prediction, after: Prediction | None) -> str:
-    """Draw the recording that the base model predicts worst, as predicted before and after; it was fitted to neither.
+def held_out_figure(before: Prediction, after: Prediction | None) -> str:
+    """Draw the recording with the largest prediction error, as predicted by the base model and by the final model.
 
-    ``after`` is ``None`` where nothing was added.
+    ``after`` is ``None`` if no effect was added.
     """
     i = _worst(before.residuals, 1)[0]
     record = before.records[i]
-    told = {"base model": before} if after is None else {"before": before, "after": after}
+    shown = {"base model": before} if after is None else {"before": before, "after": after}
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(
-            1, len(told), figsize=(WIDTH, 2.7), sharex=True, sharey=True, squeeze=False, layout="constrained"
+            1, len(shown), figsize=(WIDTH, 2.7), sharex=True, sharey=True, squeeze=False, layout="constrained"
         )
-        for ax, (label, prediction) in zip(axes[0], told.items(), strict=True):
+        for ax, (label, prediction) in zip(axes[0], shown.items(), strict=True):
             ax.plot(record.time, np.degrees(record.angle), ".", color=MEASURED, ms=3, label="measured")
             path = record.angle - prediction.residuals[i]
             ax.plot(record.time, np.degrees(path), color=COLOURS[label], lw=1.2, label="predicted")
@@ -122,7 +124,7 @@ def unseen_figure(before: Prediction, after: Prediction | None) -> str:
 
 
 def error_figure(before: Prediction, after: Prediction | None, floor: float) -> str:
-    """Draw the errors on unseen recordings: before and after on one scale, and after on its own beside it."""
+    """Draw the prediction errors: before and after on the left, and after alone, on a finer scale, on the right."""
     worst = _worst(before.residuals)
     names = labels(before.records)
     columns = 1 if after is None else 2
@@ -149,7 +151,7 @@ def error_figure(before: Prediction, after: Prediction | None, floor: float) -> 
             if after is not None:
                 for ax in row:
                     ax.plot(time, np.degrees(after.residuals[i]), color=AFTER, lw=0.9, label="error after")
-                row[1].set_title("after, on its own scale", loc="left", fontsize=8, color="#5c6670")
+                row[1].set_title("after, on a finer scale", loc="left", fontsize=8, color="#5c6670")
             row[0].set_title(names[i], loc="left", fontsize=9, parse_math=False)
             row[0].set_ylabel("error, °")
         for ax in axes[-1]:
@@ -159,18 +161,18 @@ def error_figure(before: Prediction, after: Prediction | None, floor: float) -> 
         return _svg(figure)
 
 
-def remainder_figure(remainders: Sequence[ResidualTorque]) -> str:
-    """Draw the torque that is left over against angle, velocity, command and time; points, and their means."""
+def residual_torque_figure(torques: Sequence[ResidualTorque]) -> str:
+    """Draw the residual torque against angle, velocity, command and time, with means over bins."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(2, 2, figsize=(WIDTH, 5.4), sharey=True, layout="constrained")
-        torque = np.degrees(np.concatenate([r.torque for r in remainders]))
-        noise = 2.0 * np.degrees(float(np.median(np.concatenate([r.sigma for r in remainders]))))
+        torque = np.degrees(np.concatenate([r.torque for r in torques]))
+        noise = 2.0 * np.degrees(float(np.median(np.concatenate([r.sigma for r in torques]))))
         against = {
-            "angle of the model, °": np.degrees(np.concatenate([r.angle for r in remainders])),
-            "velocity of the model, °/s": np.degrees(np.concatenate([r.velocity for r in remainders])),
+            "angle of the model, °": np.degrees(np.concatenate([r.angle for r in torques])),
+            "velocity of the model, °/s": np.degrees(np.concatenate([r.velocity for r in torques])),
         }
-        if any(r.command is not None for r in remainders):
-            commands = [np.zeros(len(r.time)) if r.command is None else r.command for r in remainders]
+        if any(r.command is not None for r in torques):
+            commands = [np.zeros(len(r.time)) if r.command is None else r.command for r in torques]
             against["command, °"] = np.degrees(np.concatenate(commands))
         else:
             axes[1, 1].set_axis_off()
@@ -181,40 +183,43 @@ def remainder_figure(remainders: Sequence[ResidualTorque]) -> str:
             ax.plot(*_means(x, torque), "o-", color=MEASURED, ms=4, lw=1.2, label="mean")
             ax.set_xlabel(label)
         last = axes.flat[len(against)]
-        for remainder in remainders:
-            last.plot(remainder.time, np.degrees(remainder.torque), lw=0.8, label=remainder.name)
+        for one in torques:
+            last.plot(one.time, np.degrees(one.torque), lw=0.8, label=one.name)
         last.set_xlabel("time, s")
-        if len(remainders) <= MOST:
+        if len(torques) <= MOST_RECORDINGS:
             handles, names = last.get_legend_handles_labels()
             last.legend(handles[1:], names[1:], fontsize=7, ncols=2)
         for ax in axes[:, 0]:
-            ax.set_ylabel("torque left over, °/s²")
+            ax.set_ylabel("residual torque, °/s²")
         handles, names = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, names, loc="outside upper right", ncols=3, fontsize=8)
         return _svg(figure)
 
 
 def experiment_figure(experiment: Experiment, verdict: Verdict) -> str:
-    """Draw the next command, and by how much the rivals' predictions part from the model's own."""
+    """Draw the next command, and the differences between the predictions of the rivals and of the final model."""
     command = experiment.command
     if command is None:
         raise ValueError("a free swing has no command to draw")
     time = np.arange(0.0, experiment.duration, verdict.fitted[0].interval)
-    own = _foretell(verdict.after, command, time, verdict.fitted[0])
+    expected = _predict_from_rest(verdict.after, command, time, verdict.fitted[0])
     with plt.rc_context(STYLE):
         figure, (top, bottom) = plt.subplots(
             2, 1, figsize=(WIDTH, 3.6), sharex=True, height_ratios=(3, 2), layout="constrained"
         )
         _draw_command(top, command, time)
         found = " + ".join(plain(a.effect.id) for a in verdict.accepted)
-        top.plot(time, np.degrees(own), color=AFTER, lw=1.2, label=f"angle expected with {found}")
+        top.plot(time, np.degrees(expected), color=AFTER, lw=1.2, label=f"angle expected with {found}")
         top.set_ylabel("angle, °")
         _draw_band(bottom, verdict.noise.sigma)
         for accepted in verdict.accepted:
             for name, fit in accepted.rivals.items():
-                apart = _foretell(fit, command, time, verdict.fitted[0]) - own
+                difference = _predict_from_rest(fit, command, time, verdict.fitted[0]) - expected
                 bottom.plot(
-                    time, np.degrees(apart), lw=1.0, label=f"{plain(name)} instead of {plain(accepted.effect.id)}"
+                    time,
+                    np.degrees(difference),
+                    lw=1.0,
+                    label=f"{plain(name)} instead of {plain(accepted.effect.id)}",
                 )
         bottom.set(xlabel="time, s", ylabel="difference, °")
         handles, names = top.get_legend_handles_labels()
@@ -224,7 +229,7 @@ def experiment_figure(experiment: Experiment, verdict: Verdict) -> str:
 
 
 def labels(records: Sequence[Record]) -> list[str]:
-    """Name recordings; of parts of one recording also when they are."""
+    """Return the names of recordings; parts of one recording are named with their times."""
     names = [printable(r.name) for r in records]
     return [
         name if names.count(name) == 1 else f"{name}, {r.time[0]:.1f} … {r.time[-1]:.1f} s"
@@ -232,8 +237,8 @@ def labels(records: Sequence[Record]) -> list[str]:
     ]
 
 
-def _foretell(fit: Fit, command: Command, time: Floats, like: Record) -> Floats:
-    """Predict an angle from rest, seen as ``like`` was."""
+def _predict_from_rest(fit: Fit, command: Command, time: Floats, like: Record) -> Floats:
+    """Predict the angle from rest, (n,), as the camera of recording ``like`` shows it, rad."""
     if not isinstance(fit.model, Plant):
         raise TypeError("only a Plant has rivals")
     held = Command(np.zeros(1), command.angle[:1])
@@ -242,15 +247,15 @@ def _foretell(fit: Fit, command: Command, time: Floats, like: Record) -> Floats:
 
 
 def _means(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Average over classes of equal width that have `LEAST` frames."""
+    """Return means of x and y over bins of equal width with at least `FEWEST_FRAMES` frames."""
     edges = np.linspace(x.min(), np.nextafter(x.max(), np.inf), BINS + 1)
     inside = [(x >= low) & (x < high) for low, high in pairwise(edges)]
-    full = [i for i in inside if i.sum() >= LEAST]
+    full = [i for i in inside if i.sum() >= FEWEST_FRAMES]
     return np.array([x[i].mean() for i in full]), np.array([y[i].mean() for i in full])
 
 
-def _worst(residuals: Sequence[Floats], most: int = MOST) -> list[int]:
-    """Return the indices of those with the largest errors, in their own order."""
+def _worst(residuals: Sequence[Floats], most: int = MOST_RECORDINGS) -> list[int]:
+    """Return the indices of the recordings with the largest errors, in ascending order."""
     size = [float(np.sqrt(np.mean(r**2))) for r in residuals]
     return sorted(sorted(range(len(size)), key=lambda i: -size[i])[:most])
 
@@ -266,7 +271,7 @@ def _draw_band(axes: Axes, floor: float) -> None:
 
 
 def _panels(names: Sequence[str], draw: Callable[[Axes, int], None], ylabel: str) -> str:
-    """Draw a panel a recording, in two columns where there are several."""
+    """Draw one panel for each recording, in two columns if there are several."""
     n = len(names)
     columns = 1 if n == 1 else 2
     rows = -(-n // columns)

@@ -1,4 +1,4 @@
-"""``report.html``: the loop's story in the order of the work, one file that opens anywhere."""
+"""``report.html``: data, model, residual, candidates, verdict and next experiment, in one file without references."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from anglecam.effects import effect
 from anglecam.identification.identified import Identified
 from anglecam.io.files import write_atomically
 from anglecam.io.session import CORRECTED
-from anglecam.loop.cross_validation import LEFT_OUT, TURNS
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.refit import plant_of
 from anglecam.loop.residual_test import StructureTest
@@ -29,24 +28,26 @@ from anglecam.report.wording import plain, sentence, with_uncertainty
 
 COLOURS = {"attributed": "#1f6f8b", "nothing_missing": "#3d7a4a", "unexplained": "#b5651d"}
 ESTIMATORS = {"ekf": "extended Kalman filter", "oe2": "output error"}
-WHOSE = {
-    "command": "It acts on what is asked, before anything turns.",
-    "actuator": "It acts between command and head, in servo and linkage.",
-    "load": "It acts on the head itself.",
-    "camera": "It is the camera's, not the mechanism's: the head moves as the model says, the film shows it otherwise.",
+STATION_NOTES = {
+    "command": "It acts on the command, before anything moves.",
+    "actuator": "It acts between the command and the body, in servo and linkage.",
+    "load": "It acts on the body.",
+    "camera": "It is an effect of the camera, not of the mechanism: the body moves as the model predicts, but the film "
+    "shows another angle or time.",
 }
-COLUMNS = {"sigma": "median σ, °", "bound": "6 px bound, °", "lever": "lever arm, px"}
-"""Of the table of recordings, shown where there is something in them."""
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+OPTIONAL_COLUMNS = {"sigma": "median σ, °", "bound": "6 px bound, °", "lever": "lever arm, px"}
+"""Columns of the table of recordings that are shown only if they are not empty."""
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 TESTS = {
-    "residual against angle": "a curve against the angle",
-    "residual against velocity": "a curve against the velocity",
-    "residual against command": "a curve against the command of late",
-    "residual against time": "a slow course over time",
-    "torque against angle": "a torque that depends on the angle",
-    "torque against velocity": "a torque that depends on the velocity",
-    "autocorrelation": "each frame resembling those before it",
+    "residual against angle": "residual as a function of the angle",
+    "residual against velocity": "residual as a function of the velocity",
+    "residual against command": "residual as a function of recent commands",
+    "residual against time": "slow drift of the residual over time",
+    "torque against angle": "torque as a function of the angle",
+    "torque against velocity": "torque as a function of the velocity",
+    "autocorrelation": "autocorrelation of the residual",
 }
+"""Names of the tests that need no effect, in words."""
 
 
 def write_report(
@@ -59,7 +60,7 @@ def write_report(
     models: Sequence[Identified],
     problems: Sequence[Exception],
 ) -> None:
-    """Write the report of one closed loop.
+    """Write the report on a verdict.
 
     Parameters
     ----------
@@ -70,17 +71,17 @@ def write_report(
     verdict : Verdict
         From `anglecam.loop.close.close_records`.
     result : dict
-        The same as ``loop.json`` holds it, from `anglecam.loop.verdict_json.verdict_as_dict`.
+        The content of ``loop.json``, from `anglecam.loop.verdict_json.verdict_as_dict`.
     experiment : Experiment or None
-        What to record next, from `anglecam.loop.verdict_json.next_experiment`.
+        The next recording, from `anglecam.loop.verdict_json.next_experiment`.
     series : sequence of AngleSeries
-        What was measured.
+        The measured angles.
     models : sequence of Identified
-        Base models to show beside each other.
+        Base models to compare.
     problems : sequence of Exception
-        What could not be used.
+        Recordings that could not be used, with the cause.
     """
-    # autoescape: names of files and recordings are the user's, and SVG is marked safe where it is put in
+    # autoescape, because names of files and recordings come from the user; the SVG figures are marked as safe
     environment = Environment(loader=PackageLoader("anglecam.report", "."), autoescape=True, undefined=StrictUndefined)
     decimals = (
         4
@@ -102,15 +103,16 @@ def write_report(
         sentence=sentence(verdict),
         errors=result["rmse_deg"],
         gain=verdict.gain,
-        unseen=unseen_in_words(verdict),
+        policy=verdict.policy,
+        validation=validation_in_words(verdict),
         series=rows,
-        columns=[{"key": key, "head": head} for key, head in COLUMNS.items() if any(row[key] for row in rows)],
+        columns=[{"key": key, "head": head} for key, head in OPTIONAL_COLUMNS.items() if any(row[key] for row in rows)],
         problems=[str(p) for p in problems],
         models=[_model_row(m) for m in models],
         driven=any(r.command is not None for r in verdict.fitted),
         tests=_test_rows(verdict.first_test.tests),
         candidates=_candidate_rows(verdict, result),
-        drawn=figures.MOST,
+        drawn=figures.MOST_RECORDINGS,
         effects=_effect_rows(verdict, result),
         final=_final_rows(verdict, result),
         corrected=CORRECTED if any(a.effect.station == "camera" for a in verdict.accepted) else "",
@@ -125,26 +127,28 @@ def write_report(
 
 
 def p_in_words(p: float) -> str:
-    """Say in how many sessions noise alone would do so much."""
+    """Return a p-value as a number of sessions."""
     if p <= 1e-3:
         return "at most 1 of 1000"
     of = next((n for n in (10, 100) if round(n * p) >= 1), 1000)
     return "nearly all" if round(of * p) == of else f"{round(of * p)} of {of}"
 
 
-def unseen_in_words(verdict: Verdict) -> str:
-    """Say what the errors on unseen recordings were found on."""
+def validation_in_words(verdict: Verdict) -> str:
+    """Return on which frames the prediction error was computed, and by which models."""
     if verdict.held_out:
         held_out = ", ".join(r.name for r in verdict.held_out)
-        return f"Held out by declaration and never fitted to, only predicted: {held_out}."
+        return f"These recordings are declared as held out; they were predicted and never fitted: {held_out}."
+    settings = verdict.policy.cross_validation
     return (
-        f"No recording is held out by declaration. So of every {TURNS * LEFT_OUT:g} s a block of {LEFT_OUT:g} s was"
-        " predicted at a time, by a model that was fitted to all other frames."
+        f"No recording is declared as held out, so the error is that of block cross-validation: blocks of"
+        f" {settings.left_out_s:g} s, one in every {settings.folds * settings.left_out_s:g} s, were predicted by a"
+        f" model that was fitted to the other frames, {settings.folds} times in turn."
     )
 
 
 def _figures(verdict: Verdict, experiment: Experiment | None, series: Sequence[AngleSeries]) -> dict[str, str]:
-    """Draw what the verdict needs."""
+    """Draw the figures for a verdict, as SVG by name."""
     floor = verdict.noise.sigma
     commands = {r.name: r.command for r in [*verdict.fitted, *verdict.held_out] if r.command is not None}
     after = verdict.after_held_out if verdict.accepted else None
@@ -153,13 +157,13 @@ def _figures(verdict: Verdict, experiment: Experiment | None, series: Sequence[A
         "prediction": figures.prediction_figure(verdict.fitted, verdict.before.residuals),
         "residual": figures.residual_figure(verdict.fitted, verdict.before, floor),
         "path": path_figure(verdict),
-        "unseen": figures.unseen_figure(verdict.before_held_out, after),
+        "held_out": figures.held_out_figure(verdict.before_held_out, after),
         "errors": figures.error_figure(verdict.before_held_out, after, floor),
     }
     if verdict.candidates:
         drawn["candidates"] = figures.candidate_figure(verdict.candidates, [a.effect.id for a in verdict.accepted])
     if verdict.verdict == "unexplained":
-        drawn["remainder"] = figures.remainder_figure(
+        drawn["residual_torque"] = figures.residual_torque_figure(
             estimate_residual_torque(verdict.after, verdict.fitted, verdict.noise)
         )
     if experiment is not None and experiment.command is not None and experiment.separated:
@@ -199,12 +203,12 @@ def _model_row(model: Identified) -> dict[str, Any]:
 
 
 def _test_rows(tests: Sequence[StructureTest]) -> dict[str, list[dict[str, Any]]]:
-    """Part the tests that look for anything from those that look for one effect, most striking first."""
+    """Divide the tests into those that need no effect and those for one effect, smallest p-value first."""
     rows: dict[str, list[dict[str, Any]]] = {"any": [], "effect": []}
     for test in sorted(tests, key=lambda t: t.p_value):
-        own = test.name.startswith("effect ")
-        name = plain(test.name.removeprefix("effect ")) if own else TESTS[test.name]
-        rows["effect" if own else "any"].append({"name": name, "p_value": test.p_value})
+        of_effect = test.name.startswith("effect ")
+        name = plain(test.name.removeprefix("effect ")) if of_effect else TESTS[test.name]
+        rows["effect" if of_effect else "any"].append({"name": name, "p_value": test.p_value})
     return rows
 
 
@@ -217,10 +221,10 @@ def _candidate_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, 
             "station": c.effect.station,
             "gain": c.log_likelihood_gain,
             "predictive_gain": None if c.cross_validated is None else c.predictive_gain,
-            "held_out": told["held_out_rmse_deg"],
+            "held_out": stated["held_out_rmse_deg"],
             "relaxes": c.effect.relaxes,
         }
-        for c, told in zip(verdict.candidates, result["candidates"], strict=True)
+        for c, stated in zip(verdict.candidates, result["candidates"], strict=True)
     ]
 
 
@@ -235,18 +239,18 @@ def _effect_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any
                 {
                     "symbol": parameter.symbol,
                     "name": split_unit(parameter.name)[0],
-                    "value": with_uncertainty(told["value"], told["sigma"], _unit(parameter.name)),
+                    "value": with_uncertainty(stated["value"], stated["sigma"], _unit(parameter.name)),
                 }
-                for parameter, told in zip(a.effect.parameters, shown["parameters"].values(), strict=True)
+                for parameter, stated in zip(a.effect.parameters, shown["parameters"].values(), strict=True)
             ],
             "left_out": [p.symbol for p in effect(a.effect.id).parameters[len(a.effect.parameters) :]],
             "relaxes": a.effect.relaxes,
-            "whose": WHOSE[a.effect.station],
+            "station_note": STATION_NOTES[a.effect.station],
             "rivals": [
                 {"name": plain(name), "summary": effect(name).summary, "station": effect(name).station}
                 for name in a.rivals
             ],
-            "mistaken": [plain(name) for name in a.effect.aliases],
+            "aliases": [plain(name) for name in a.effect.aliases],
             "experiment": a.effect.separating_experiment,
         }
         for a, shown in zip(verdict.accepted, result["effects"], strict=True)
@@ -254,11 +258,11 @@ def _effect_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any
 
 
 def _final_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, str]]:
-    """List the final model's own a, b, c."""
+    """List a, b and c of the final model."""
     count = plant_of(verdict.after).base_count
     return [
-        {"name": split_unit(name)[0], "value": with_uncertainty(told["value"], told["sigma"], _unit(name))}
-        for name, told in list(result["model"].items())[:count]
+        {"name": split_unit(name)[0], "value": with_uncertainty(stated["value"], stated["sigma"], _unit(name))}
+        for name, stated in list(result["model"].items())[:count]
     ]
 
 
@@ -276,21 +280,21 @@ def _detectable_rows(result: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _undetectable(verdict: Verdict) -> list[str]:
-    """Name the effects that would not have been seen at any size that was looked at."""
-    told = {*verdict.last_test.detectable, *(name for a in verdict.accepted for name in a.alias_set)}
-    return [plain(e.id) for e in applicable([*verdict.fitted, *verdict.held_out]) if e.id not in told]
+    """Name the effects that the residual test would not have detected at any size that was tried."""
+    detected = {*verdict.last_test.detectable, *(name for a in verdict.accepted for name in a.alias_set)}
+    return [plain(e.id) for e in applicable([*verdict.fitted, *verdict.held_out]) if e.id not in detected]
 
 
 def _unit(name: str) -> str:
-    """Return a parameter's unit as it is written behind a number."""
+    """Return a parameter's unit as it follows a number."""
     words = split_unit(name)[1].replace("deg", "°").replace("s2", "s²")
     return words if words == "°" else " " + words
 
 
 def _number(value: float) -> str:
-    """Write a number to three digits, far powers of ten as such."""
+    """Return a number with three digits, and with a power of ten if it is very large or small."""
     mantissa, _, power = f"{float(f'{value:.3g}'):g}".partition("e")
-    return mantissa + (f"·10{str(int(power)).translate(RAISED)}" if power else "")
+    return mantissa + (f"·10{str(int(power)).translate(SUPERSCRIPT)}" if power else "")
 
 
 def _text(value: float | None, form: str) -> str:

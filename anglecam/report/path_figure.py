@@ -1,7 +1,7 @@
-"""The signal's path, command → actuator → load → camera, with what was looked for and what was found at each station.
+"""The signal path, command → actuator → load → camera, with the effects considered and attributed at each station.
 
-What was found is drawn as it acts: an effect's own function, with its fitted parameters, over what these recordings
-went through.
+Each attributed effect is drawn as the function that it computes, with its fitted parameters, over the range of these
+recordings.
 """
 
 from __future__ import annotations
@@ -27,39 +27,39 @@ from anglecam.report.figures import AFTER, COMMAND, MEASURED, STYLE, _svg
 from anglecam.report.wording import plain
 
 STATIONS = {
-    "command": "what is asked",
-    "actuator": "what servo and linkage make of it",
-    "load": "how the head moves under it",
-    "camera": "what the film shows of that",
+    "command": "position demanded of the servo",
+    "actuator": "torque of servo and linkage",
+    "load": "motion of the body",
+    "camera": "angle and time in the film",
 }
 TICK = 1e-3
-"""s; commands are looked at this finely."""
+"""Sampling interval of commands, s."""
 STRETCHES = (0.6, 0.2, 0.06)
-"""s of a command that are shown: the first in which the effect shows."""
-SHOWS = 0.1
-"""Mean change, as a share of the command's movement, that shows."""
-LEAST_MOVE = 0.05
-"""Share of the command's range by which it moves at least in what is shown."""
+"""Lengths of the part of a command that is drawn, s; the first length at which the effect is visible is used."""
+VISIBLE_SHARE = 0.1
+"""Mean change, as a share of the command's range in that part, that is visible."""
+SMALLEST_RANGE = 0.05
+"""Smallest range of a command in the part that is drawn, as a share of its whole range."""
 
 
 @dataclass(frozen=True)
 class EffectCurve:
-    """An effect's own function."""
+    """The function that an effect computes; arrays of length n, in degrees, seconds or milliseconds."""
 
     x: Floats
     y: Floats
     xlabel: str
     ylabel: str
-    asked: Floats | None = None
-    """Without the effect, where it turns one curve into another."""
+    without: Floats | None = None
+    """``y`` without the effect, for an effect that changes one curve into another."""
 
 
 def path_figure(verdict: Verdict) -> str:
-    """Draw the path as SVG: a box a station, under it what was looked for there, and what was found as it acts."""
-    looked = applicable([*verdict.fitted, *verdict.held_out])
+    """Draw the signal path as SVG: a box for each station, the effects considered, and attributed ones as curves."""
+    considered = applicable([*verdict.fitted, *verdict.held_out])
     found = [a.effect for a in verdict.accepted]
     instead = {name for a in verdict.accepted for name in a.rivals}
-    lists = {station: [e for e in looked if e.station == station] for station in STATIONS}
+    lists = {station: [e for e in considered if e.station == station] for station in STATIONS}
     lines = max(len(listed) for listed in lists.values())
     here = {station: [e for e in found if e.station == station] for station in STATIONS}
     rows = max(len(effects) for effects in here.values())
@@ -70,8 +70,8 @@ def path_figure(verdict: Verdict) -> str:
         path = figure.add_subplot(grid[0, :])
         path.set(xlim=(0.0, 4.0), ylim=(-heights[0] + 0.75, 0.75))
         path.set_axis_off()
-        for i, (station, what) in enumerate(STATIONS.items()):
-            _draw_station(path, i, station, what, bool(here[station]))
+        for i, (station, caption) in enumerate(STATIONS.items()):
+            _draw_station(path, i, station, caption, bool(here[station]))
             for line, effect in enumerate(lists[station]):
                 _draw_name(path, i, line, effect, effect.id in [e.id for e in found], effect.id in instead)
             for row, effect in enumerate(here[station]):
@@ -80,129 +80,130 @@ def path_figure(verdict: Verdict) -> str:
 
 
 def curve_of(effect: Effect, fit: Fit, records: Sequence[Record]) -> EffectCurve:
-    """Evaluate what a fitted effect does over what recordings went through.
+    """Evaluate a fitted effect over the range of the recordings.
 
     Parameters
     ----------
     effect : Effect
-        One of the fitted plant's.
+        An effect of the fitted plant.
     fit : Fit
-        Of a plant with it.
+        Of a plant with that effect.
     records : sequence of Record
-        Those that were fitted.
+        The fitted recordings.
 
     Returns
     -------
     EffectCurve
         In degrees, seconds and milliseconds.
     """
-    own = entry(effect.id).null  # late parameters that the data did not ask for stay at it
+    values = entry(effect.id).null  # staged parameters that the data do not require stay at their null
     fitted = effect.complete(np.array([fit.parameters[fit.model.names.index(p.name)] for p in effect.parameters]))
-    own[: len(fitted)] = fitted
+    values[: len(fitted)] = fitted
     if effect.port in ("command", "lag"):
-        return _command_curve(effect, own, records)
+        return _command_curve(effect, values, records)
     angles = [r.angle - e for r, e in zip(records, fit.residuals, strict=True)]
     if effect.port in ("timing", "observation"):
-        return _camera_curve(effect, own, records, angles)
+        return _camera_curve(effect, values, records, angles)
     angle = np.concatenate(angles)
     rates = [np.gradient(a, r.time) for a, r in zip(angles, records, strict=True)]
     velocity = np.concatenate(rates)
     if effect.port == "friction":
-        up, down, breakaway, speed = effect.friction(own)
+        up, down, breakaway, speed = effect.friction(values)
         omega = np.linspace(velocity.min(), velocity.max(), 400)
         level = np.where(omega > 0.0, up, down)
         if speed > 0.0:
             level = level + np.maximum(breakaway - level, 0.0) * np.exp(-((omega / speed) ** 2))
         return EffectCurve(
-            np.degrees(omega), -np.degrees(np.sign(omega) * level), "velocity, °/s", "torque of friction, °/s²"
+            np.degrees(omega), -np.degrees(np.sign(omega) * level), "velocity, °/s", "friction torque, °/s²"
         )
     if effect.port == "load":
-        torque = np.array([effect.load(t, w, own) for t, w in zip(angle, velocity, strict=True)])
-        turns = np.ptp([effect.load(0.0, w, own) for w in velocity]) > 0.0
-        x, name = (velocity, "velocity, °/s") if turns else (angle, "angle, °")
+        torque = np.array([effect.load(t, w, values) for t, w in zip(angle, velocity, strict=True)])
+        of_velocity = np.ptp([effect.load(0.0, w, values) for w in velocity]) > 0.0
+        x, name = (velocity, "velocity, °/s") if of_velocity else (angle, "angle, °")
         return _ordered(np.degrees(x), np.degrees(torque), name, "torque added, °/s²")
     abc = np.zeros(3)
     abc[: min(3, len(fit.parameters))] = fit.parameters[:3]
     if effect.port == "dynamics":
         pairs = zip(records, angles, strict=True)
-        torque = np.concatenate([added_acceleration(effect, own, abc, r.time, a, r.command) for r, a in pairs])
+        torque = np.concatenate([added_acceleration(effect, values, abc, r.time, a, r.command) for r, a in pairs])
         return _ordered(np.degrees(angle), np.degrees(torque), "angle, °", "torque added, °/s²")
     levels = [np.zeros(len(r.time)) if r.command is None else r.command.at(r.time) for r in records]
-    asked = abc[2] * np.concatenate(levels) - abc[1] * angle
-    given = np.array([effect.servo(q, t, abc, own) for q, t in zip(asked, angle, strict=True)])
-    return _ordered(np.degrees(asked), np.degrees(given), "torque asked for, °/s²", "torque given, °/s²", True)
+    demanded = abc[2] * np.concatenate(levels) - abc[1] * angle
+    applied = np.array([effect.servo(q, t, abc, values) for q, t in zip(demanded, angle, strict=True)])
+    return _ordered(np.degrees(demanded), np.degrees(applied), "torque demanded, °/s²", "torque applied, °/s²", True)
 
 
-def _command_curve(effect: Effect, own: Floats, records: Sequence[Record]) -> EffectCurve:
-    """Pick the stretch of command of whose movement the effect takes the largest share."""
+def _command_curve(effect: Effect, values: Floats, records: Sequence[Record]) -> EffectCurve:
+    """Return the part of a command in which the effect changes the largest share of its range."""
     runs = [(r, r.command, np.arange(r.time[0], r.time[-1], TICK)) for r in records if r.command is not None]
-    pairs = [(r.name, t, c.at(t), _arriving(effect, own, c, t)) for r, c, t in runs]
-    least = LEAST_MOVE * max(float(np.ptp(asked)) for _, _, asked, _ in pairs)
+    pairs = [(r.name, t, c.at(t), _arriving(effect, values, c, t)) for r, c, t in runs]
+    least = SMALLEST_RANGE * max(float(np.ptp(demanded)) for _, _, demanded, _ in pairs)
     best: EffectCurve | None = None
     most = 0.0
     for stretch in STRETCHES:
         size = round(stretch / TICK)
-        for name, time, asked, arriving in pairs:
+        for name, time, demanded, arriving in pairs:
             for start in range(0, len(time) - size, max(1, size // 6)):
                 part = slice(start, start + size)
-                move = float(np.ptp(asked[part]))
-                both = np.concatenate([asked[part], arriving[part]])
-                share = float(np.mean(np.abs(arriving - asked)[part]) / max(np.ptp(both), least))
+                move = float(np.ptp(demanded[part]))
+                both = np.concatenate([demanded[part], arriving[part]])
+                share = float(np.mean(np.abs(arriving - demanded)[part]) / max(np.ptp(both), least))
                 if move >= least and share > most:
                     most = share
-                    told = np.degrees(arriving[part]), f"time in {name}, s", "command, °", np.degrees(asked[part])
-                    best = EffectCurve(time[part], *told)
-        if most >= SHOWS:
+                    drawn = np.degrees(arriving[part]), f"time in {name}, s", "command, °", np.degrees(demanded[part])
+                    best = EffectCurve(time[part], *drawn)
+        if most >= VISIBLE_SHARE:
             break
     if best is None:
-        raise ValueError(f"{effect.id}: no command moves for long enough to draw it")
+        raise ValueError(f"{effect.id}: no command changes for long enough to draw the effect")
     return best
 
 
-def _arriving(effect: Effect, own: Floats, command: Command, time: Floats) -> Floats:
-    """Return the command that arrives, every `TICK`."""
-    asked = command.at(time)
+def _arriving(effect: Effect, values: Floats, command: Command, time: Floats) -> Floats:
+    """Return the command after the effect, sampled every `TICK`."""
+    demanded = command.at(time)
     if effect.lag is not None:
-        from scipy.signal import lfilter  # takes most of a second to load, which other figures are spared
+        from scipy.signal import lfilter  # loading it takes most of a second, so only this figure does
 
-        kept = float(np.exp(-TICK / max(effect.lag(own), 1e-9)))
-        return asked[0] + lfilter([0.0, 1.0 - kept], [1.0, -kept], asked - asked[0])  # from rest at the first level
+        kept = float(np.exp(-TICK / max(effect.lag(values), 1e-9)))
+        # the lag starts at rest at the first level
+        return demanded[0] + lfilter([0.0, 1.0 - kept], [1.0, -kept], demanded - demanded[0])
     if effect.command is None:
         raise TypeError(f"{effect.id} does not act on the command")
-    knots = effect.command(Knots(command.time, command.angle, np.zeros(len(command.time))), own)
+    knots = effect.command(Knots(command.time, command.angle, np.zeros(len(command.time))), values)
     at = np.maximum(np.searchsorted(knots.time, time, side="right") - 1, 0)
     since = np.maximum(time - knots.time[at], 0.0)  # before the first knot its level holds
     return knots.level[at] + knots.slope[at] * since
 
 
-def _camera_curve(effect: Effect, own: Floats, records: Sequence[Record], angles: Sequence[Floats]) -> EffectCurve:
+def _camera_curve(effect: Effect, values: Floats, records: Sequence[Record], angles: Sequence[Floats]) -> EffectCurve:
     act, factor, name = effect.observation, 180.0 / np.pi, "angle shown − true, °"
     if act is None:
         act, factor, name = effect.timing, 1e3, "time shown − true, ms"
 
     def change(record: Record, angle: Floats) -> Floats:
         assert act is not None  # one of the two ports is filled
-        return factor * (act(record.time, angle, own, record.view) - (angle if effect.observation else record.time))
+        return factor * (act(record.time, angle, values, record.view) - (angle if effect.observation else record.time))
 
-    creeps = any(np.ptp(change(r, np.zeros(len(r.time)))) > 0.0 for r in records)
-    x = [r.time - r.time[0] if creeps else np.degrees(a) for r, a in zip(records, angles, strict=True)]
+    drifts = any(np.ptp(change(r, np.zeros(len(r.time)))) > 0.0 for r in records)
+    x = [r.time - r.time[0] if drifts else np.degrees(a) for r, a in zip(records, angles, strict=True)]
     y = [change(r, a) for r, a in zip(records, angles, strict=True)]
     sign = 1.0 if effect.observation else -1.0
-    return _ordered(np.concatenate(x), sign * np.concatenate(y), "time, s" if creeps else "angle, °", name)
+    return _ordered(np.concatenate(x), sign * np.concatenate(y), "time, s" if drifts else "angle, °", name)
 
 
-def _ordered(x: Floats, y: Floats, xlabel: str, ylabel: str, beside_itself: bool = False) -> EffectCurve:
+def _ordered(x: Floats, y: Floats, xlabel: str, ylabel: str, with_identity: bool = False) -> EffectCurve:
     order = np.argsort(x)
-    return EffectCurve(x[order], y[order], xlabel, ylabel, x[order] if beside_itself else None)
+    return EffectCurve(x[order], y[order], xlabel, ylabel, x[order] if with_identity else None)
 
 
-def _draw_station(axes: Axes, i: int, station: str, what: str, found: bool) -> None:
+def _draw_station(axes: Axes, i: int, station: str, caption: str, found: bool) -> None:
     colour = AFTER if found else "white"
     box = FancyBboxPatch((i + 0.06, 0.12), 0.82, 0.5, "round,pad=0,rounding_size=0.05", fc=colour, ec=AFTER, lw=1.2)
     axes.add_patch(box)
     ink = "white" if found else MEASURED
     axes.text(i + 0.47, 0.44, station, ha="center", va="center", color=ink, fontsize=11, fontweight="bold")
-    axes.text(i + 0.47, 0.24, what, ha="center", va="center", color=ink, fontsize=6.8)
+    axes.text(i + 0.47, 0.24, caption, ha="center", va="center", color=ink, fontsize=6.8)
     if i + 1 < len(STATIONS):
         axes.annotate("", (i + 1.06, 0.37), (i + 0.88, 0.37), arrowprops={"arrowstyle": "-|>", "color": AFTER})
 
@@ -216,10 +217,10 @@ def _draw_name(axes: Axes, i: int, line: int, effect: Effect, found: bool, inste
 
 def _draw_curve(axes: Axes, effect: Effect, verdict: Verdict) -> None:
     curve = curve_of(effect, verdict.after, verdict.fitted)
-    if curve.asked is not None:
-        axes.plot(curve.x, curve.asked, color=COMMAND, lw=1.0, ls="--", label="without it")
+    if curve.without is not None:
+        axes.plot(curve.x, curve.without, color=COMMAND, lw=1.0, ls="--", label="without it")
     axes.plot(curve.x, curve.y, color=AFTER, lw=1.5, label="with it")
-    if curve.asked is not None:
+    if curve.without is not None:
         axes.legend(fontsize=7)
     axes.set_xlabel(curve.xlabel, fontsize=8)
     axes.set_ylabel(curve.ylabel, fontsize=8)

@@ -1,4 +1,4 @@
-"""The tables in the terminal."""
+"""Tables for the terminal: measured series, step figures, models and verdicts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from anglecam.report.wording import describe, sentence
 
 
 def series_table(measurements: Sequence[Measurement | MeasuredTracks]) -> Table:
-    """Tabulate measured recordings: frames, range, uncertainty, pivot."""
+    """Tabulate measured recordings: frames, range of angles, uncertainty, pivot and method."""
     table = Table("clip", "measured", "angle, °", "median sigma, °", "6 px bound, °", "pivot", "by")
     for column in table.columns[1:5]:
         column.justify = "right"
@@ -42,7 +42,7 @@ def series_table(measurements: Sequence[Measurement | MeasuredTracks]) -> Table:
 
 
 def response_table(name: str, answers: Sequence[Response]) -> Table:
-    """Tabulate how a clip's angle went from rest to rest."""
+    """Tabulate the steps of a clip's angle from rest to rest."""
     table = Table(
         "start, s", "from → to, °", "rise, s", "overshoot, %", "settled after, s", "peak, °/s", title=printable(name),
         title_justify="left",
@@ -62,12 +62,12 @@ def response_table(name: str, answers: Sequence[Response]) -> Table:
 
 
 def _plain(degrees: float) -> str:
-    """Write an angle; what rounds to zero has no sign."""
+    """Format an angle in degrees; an angle that rounds to zero has no sign."""
     return f"{round(float(degrees), 2) + 0.0:.2f}"
 
 
 def _figure(figure: Figure, factor: float = 1.0) -> str:
-    """Write a figure to the second digit of its uncertainty."""
+    """Format a figure to the second digit of its uncertainty."""
     value, sigma = factor * figure.value, factor * figure.sigma
     if not np.isfinite(value):
         return "–"
@@ -76,7 +76,7 @@ def _figure(figure: Figure, factor: float = 1.0) -> str:
 
 
 def model_table(models: Sequence[Identified]) -> Table:
-    """Tabulate models' parameters and errors."""
+    """Tabulate parameters and errors of models."""
     table = Table("estimator", "parameters", "fit, ° RMS", "held out, ° RMS")
     for model in models:
         parameters = zip(model.names, model.values, model.sigmas, strict=True)
@@ -90,19 +90,19 @@ def model_table(models: Sequence[Identified]) -> Table:
 
 
 def loop_table(verdict: Verdict, experiment: Experiment | None = None) -> Table:
-    """Tabulate a verdict."""
+    """Tabulate a verdict, its errors and the next recording."""
     table = Table("verdict", verdict.verdict.replace("_", " "), title=sentence(verdict), title_justify="left")
     for accepted in verdict.accepted:
         table.add_row(accepted.effect.id, describe(accepted.effect, verdict))
         if len(accepted.alias_set) > 1:
-            table.add_row("not told apart from", ", ".join(accepted.alias_set[1:]))
+            table.add_row("cannot be distinguished from", ", ".join(accepted.alias_set[1:]))
     if experiment is not None and experiment.separated:
         file = "" if experiment.command is None else f": {NEXT_COMMAND}"
-        table.add_row("film this next", f"{experiment.description}, {experiment.duration:g} s{file}")
+        table.add_row("record this next", f"{experiment.description}, {experiment.duration:g} s{file}")
     before, after = np.degrees(verdict.before_held_out.rmse), np.degrees(verdict.after_held_out.rmse)
-    table.add_row("error on unseen recordings, ° RMS", f"{before:.4f} before, {after:.4f} after")
+    table.add_row("prediction error, ° RMS", f"{before:.4f} before, {after:.4f} after")
     table.add_row("noise floor, ° RMS", f"{np.degrees(verdict.noise.sigma):.4f} ({verdict.noise.source})")
-    table.add_row("p of the base model's residual", f"{verdict.first_test.p_value:.3f}")
+    table.add_row("p-value of the base model's residual", f"{verdict.first_test.p_value:.3f}")
     if verdict.verdict != "unexplained" and not verdict.last_test.passed:
-        table.add_row("what still shows", "no more than the angle's uncertainty; not traced")
+        table.add_row("remaining structure", "too small to be investigated further")
     return table

@@ -1,4 +1,4 @@
-"""The whole way on a film that the loop has not seen, and what the expectations of all say."""
+"""One rendered film from pixels to verdict, and the expectations of all cases against their specs."""
 
 from pathlib import Path
 
@@ -9,11 +9,11 @@ from benchmarks.blind.judged import told
 
 CASES = sorted(path.parent for path in Path(__file__).parent.glob("*/spec.yaml"))
 SMALL = ("0029",)
-"""Run every time; a small film with an effect goes the whole way through the command line in tests/test_cli.py."""
+"""Filmed in every run of the tests; tests/cli/test_app.py closes the loop on a small film with an effect."""
 
 
 @pytest.mark.parametrize("name", SMALL)
-def test_a_small_film_gets_the_verdict_that_its_truth_asks_for(name, tmp_path):
+def test_a_small_film_gets_the_expected_verdict(name, tmp_path):
     case = read_case(Path(__file__).parent / name)
     film(case, tmp_path / "kept")
     line = close(case, tmp_path / "kept")
@@ -23,7 +23,7 @@ def test_a_small_film_gets_the_verdict_that_its_truth_asks_for(name, tmp_path):
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.name)
-def test_expectations_are_what_the_truth_of_the_spec_says(path):
+def test_expectations_agree_with_the_truth_of_the_spec(path):
     case = read_case(path)
     values = told(case.spec, case.true)
     assert case.effects == tuple(values)

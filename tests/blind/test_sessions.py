@@ -1,4 +1,4 @@
-"""Sessions without pictures: what the seed decides, how large an effect is, and what number the loop should find."""
+"""Sessions without pictures: dependence on the seed, sizes of effects, and the parameters that the loop should find."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from benchmarks.blind.sessions import RECORDINGS, residual_deg, scaled, session,
 SEED = 4
 
 
-def test_a_seed_decides_everything_and_an_effect_changes_no_command():
+def test_a_seed_determines_everything_and_an_effect_changes_no_command():
     plain, again, late = (session(e, seed=SEED) for e in ({}, {}, {"dead_time": {"tau_s": 0.02}}))
     assert sorted(r.name for r in plain) == sorted(RECORDINGS)
     for one, two, other in zip(plain, again, late, strict=True):
@@ -24,7 +24,7 @@ def test_a_seed_decides_everything_and_an_effect_changes_no_command():
     assert spec_of({}, seed=SEED).plant != spec_of({}, seed=SEED + 1).plant
 
 
-def test_noise_has_the_standard_deviation_and_the_colour_that_were_asked_for():
+def test_noise_has_the_specified_standard_deviation_and_ar1_coefficient():
     exact, noisy = (session({}, seed=SEED, sigma_deg=s, phi=0.6) for s in (0.0, 0.05))
     rest = [n.angle - e.angle for n, e in zip(noisy, exact, strict=True)]
     rest = [r - r.mean() for r in rest]
@@ -32,17 +32,17 @@ def test_noise_has_the_standard_deviation_and_the_colour_that_were_asked_for():
     assert np.mean([np.corrcoef(r[1:], r[:-1])[0, 1] for r in rest]) == pytest.approx(0.6, abs=0.1)
 
 
-def test_the_base_model_alone_leaves_nothing_of_a_plain_session():
+def test_the_base_model_fits_a_session_without_effects_exactly():
     assert residual_deg({}, SEED) < 1e-4
 
 
-def test_an_effect_is_magnified_until_it_shows_as_much_as_was_asked_for():
+def test_an_effect_is_scaled_to_the_specified_residual():
     found = scaled(draw("clock_scale", SEED), SEED, 0.5)
     assert residual_deg(found, SEED) == pytest.approx(0.025, rel=0.02)
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_more_of_an_effect_is_more(name):
+def test_magnifying_an_effect_and_back_restores_it(name):
     keys = draw(name, SEED)[name]
     larger, back = magnified(name, keys, 2.0), magnified(name, magnified(name, keys, 2.0), 0.5)
     assert larger != keys
@@ -50,7 +50,7 @@ def test_more_of_an_effect_is_more(name):
 
 
 @pytest.mark.parametrize("name", ["torque_saturation", "lens_distortion", "rolling_shutter", "clock_scale"])
-def test_the_number_told_is_the_one_that_leaves_nothing_when_the_effect_is_fitted(name):
+def test_the_stated_true_parameter_is_the_one_that_fits_exactly(name):
     effects = draw(name, SEED)
     records = session(effects, seed=SEED, sigma_deg=0.0)
     spec, entry = spec_of(effects, seed=SEED), effect(name)
@@ -63,7 +63,7 @@ def test_the_number_told_is_the_one_that_leaves_nothing_when_the_effect_is_fitte
 
 
 @pytest.mark.parametrize("name", ["constant_torque", "slack_spring"])
-def test_a_drawn_film_is_a_case_that_reads_back_with_what_it_is_drawn_to_leave(name, tmp_path):
+def test_a_drawn_film_is_written_as_a_case_that_reads_back(name, tmp_path):
     write_case(name, SEED, tmp_path)
     case = read_case(tmp_path / f"{name}-{SEED}")
     assert set(case.true) == {name}
@@ -74,7 +74,7 @@ def test_a_drawn_film_is_a_case_that_reads_back_with_what_it_is_drawn_to_leave(n
     assert case.spec == film_spec(name, SEED)
 
 
-def test_a_shutter_that_takes_most_of_a_frame_to_roll_leaves_nothing_when_it_is_fitted():
+def test_a_rolling_shutter_over_most_of_a_frame_is_fitted_exactly():
     effects = {"rolling_shutter": {"row_time_s": 4.7e-5}}
     records = session(effects, seed=SEED, sigma_deg=0.0, fps=40)
     true = spec_of(effects, seed=SEED).plant

@@ -1,4 +1,4 @@
-"""What is said to be the camera's is taken out of the angles."""
+"""Effects that are attributed to the camera are removed from angles and times."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from anglecam.loop.camera_correction import correct_camera_effects
 from anglecam.models.plant import Plant
 
 TIME = np.linspace(0.0, 5.0, 151)
-NOD = np.radians(25.0) * np.sin(3.0 * TIME)
+ANGLE = np.radians(25.0) * np.sin(3.0 * TIME)
 VIEW = View(0.2, 200.0, (-80.0, 60.0))
 BASE = [26.0, 524.0, 508.0]
 
@@ -38,22 +38,22 @@ def series(time, angle):
         [("angle_drift", (0.01,)), ("camera_tilt", (0.3, 0.9, 0.5))],
     ],
 )
-def test_the_angle_is_what_it_was_before_the_camera(found):
+def test_the_corrected_angle_is_the_true_angle(found):
     fit = fitted(*found)
-    shown = NOD
+    shown = ANGLE
     for one, own in fit.model.parameters_by_effect(fit.parameters):
         shown = one.observation(TIME, shown, own, VIEW)
-    assert np.degrees(np.abs(shown - NOD)).max() > 0.05
-    assert correct_camera_effects(series(TIME, shown), fit, VIEW).angle == pytest.approx(NOD, abs=1e-9)
+    assert np.degrees(np.abs(shown - ANGLE)).max() > 0.05
+    assert correct_camera_effects(series(TIME, shown), fit, VIEW).angle == pytest.approx(ANGLE, abs=1e-9)
 
 
-def test_a_clock_that_runs_fast_is_set_right_and_frames_without_an_angle_stay_without():
-    lost = np.where(np.arange(len(NOD)) == 7, np.nan, NOD)
-    told = correct_camera_effects(series(TIME, lost), fitted(("clock_scale", (0.01,))), VIEW)
-    assert told.time == pytest.approx(TIME / 1.01)
-    assert np.isnan(told.angle[7])
-    assert told.angle[8:] == pytest.approx(NOD[8:])
+def test_a_fast_clock_is_corrected_and_frames_without_an_angle_stay_empty():
+    lost = np.where(np.arange(len(ANGLE)) == 7, np.nan, ANGLE)
+    right = correct_camera_effects(series(TIME, lost), fitted(("clock_scale", (0.01,))), VIEW)
+    assert right.time == pytest.approx(TIME / 1.01)
+    assert np.isnan(right.angle[7])
+    assert right.angle[8:] == pytest.approx(ANGLE[8:])
 
 
-def test_a_mechanism_without_effects_of_the_camera_is_left_alone():
-    assert correct_camera_effects(series(TIME, NOD), fitted(("dead_time", (0.02,))), VIEW) is None
+def test_a_series_without_camera_effects_is_not_corrected():
+    assert correct_camera_effects(series(TIME, ANGLE), fitted(("dead_time", (0.02,))), VIEW) is None

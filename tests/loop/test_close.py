@@ -1,4 +1,4 @@
-"""The loop on series whose hidden effect is known: it names it, names nothing, or says that it cannot."""
+"""Verdicts on series with a known hidden effect: attributed, nothing missing or unexplained."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ HELD_OUT = ["random"]
         (TruePlant(quadratic_drag=1.0), "quadratic_drag", "q_per_rad", 1.0),
     ],
 )
-def test_the_hidden_effect_is_named_and_its_size_found(true, effect_id, name, value):
+def test_the_hidden_effect_is_named_with_its_true_size(true, effect_id, name, value):
     result = verdict_as_dict(close_records(session(true, 11), held_out=HELD_OUT))
     assert result["verdict"] == "attributed"
     assert [e["id"] for e in result["effects"]] == [effect_id]
-    assert list(result["effects"][0]["parameters"]) == [name]  # what friction can have beside its size is not asked for
+    assert list(result["effects"][0]["parameters"]) == [name]  # no staged parameter of friction is added
     found = result["effects"][0]["parameters"][name]
     assert abs(found["value"] - value) < 3.0 * found["sigma"]
     assert result["rmse_deg"]["after"]["held_out"] == pytest.approx(0.05, rel=0.15)
@@ -43,8 +43,9 @@ def test_the_hidden_effect_is_named_and_its_size_found(true, effect_id, name, va
 
 
 @pytest.mark.parametrize("seed", [105, 108])
-def test_when_a_head_lets_go_is_told_by_few_frames_and_contradicts_nothing(seed):
-    # at each seed what is fitted leaves the breakaway open, or does not ask for it, and what is held out needs it
+def test_a_wrongly_predicted_breakaway_does_not_contradict_dry_friction(seed):
+    # at each seed the fitted recordings do not determine the breakaway torque, or do not require it, although the
+    # held-out one depends on it
     friction = {"coulomb_friction": {"torque": 1.83, "breakaway": 2.69}}
     verdict = close_records(drawn_session(friction, seed=seed, sigma_deg=0.0005), held_out=HELD_OUT)
     assert [a.effect.id for a in verdict.accepted] == ["coulomb_friction"]
@@ -52,18 +53,18 @@ def test_when_a_head_lets_go_is_told_by_few_frames_and_contradicts_nothing(seed)
 
 
 def test_a_limit_that_is_reached_once_is_named():
-    # it acts for a fraction of a second; with so much left out at a time nothing would tell of it
+    # it acts for a fraction of a second; if a second were left out at a time, the rest would not determine it
     limit = {"torque_saturation": {"limit": 159.7, "share": 0.628}}
     verdict = close_records(drawn_session(limit, seed=0, sigma_deg=0.05), held_out=HELD_OUT)
     assert [a.effect.id for a in verdict.accepted] == ["torque_saturation"]
 
 
-def test_a_driven_head_whose_command_is_missing_is_no_free_swing_with_much_noise():
+def test_a_driven_body_without_its_command_is_unexplained_and_no_noisy_free_swing():
     driven = session(TruePlant(a=5.0, b=60.0, c=55.0), 11)[3]
     assert close_records([replace(driven, command=None)]).verdict == "unexplained"
 
 
-def test_where_zero_is_not_declared_friction_has_no_direction():
+def test_friction_has_no_asymmetry_unless_the_zero_is_declared():
     records = drawn_session({"coulomb_friction": {"torque": 2.0, "downward": 1.6}}, seed=2, sigma_deg=0.005)
     free, known = ([replace(r, zero_known=one) for r in records] for one in (False, True))
     (even,), (uneven,) = ([e for e in applicable(rs) if e.id == "coulomb_friction"] for rs in (free, known))
@@ -79,7 +80,7 @@ def test_two_hidden_effects_are_both_named():
     assert {e["id"] for e in result["effects"]} == {"dead_time", "coulomb_friction"}
 
 
-def test_a_declared_centre_of_mass_is_not_fitted_and_the_weight_is_told_so_much_better():
+def test_a_declared_centre_of_mass_is_not_fitted_and_makes_the_weight_more_certain():
     gravity = {"gravity_geometry": {"strength": 60.0, "gravity_deg": 20.0}}
     records = drawn_session(gravity, seed=4, sigma_deg=0.01)
     found = []
@@ -100,18 +101,18 @@ def clean():
     return [close_records(r, held_out=HELD_OUT, seed=seed) for seed, r in enumerate(records)]
 
 
-def test_nothing_is_named_where_nothing_is_hidden(clean):
+def test_no_effect_is_named_if_none_is_hidden(clean):
     # at 5 % a session the chance of two false alarms in four is 1 %
     assert sum(v.verdict != "nothing_missing" for v in clean) <= 1
     detectable = {d["id"]: d["smallest"] for d in verdict_as_dict(clean[0])["detectable"]}
-    # a series without marks has no rows, and a zero that is not declared hides a steady torque
+    # a series without pixels has no rows, and a constant torque cannot be distinguished from an undeclared zero
     assert set(detectable) >= {"dead_time", "coulomb_friction", "backlash", "clock_scale"}
     assert not set(detectable) & {"rolling_shutter", "constant_torque"}
     assert all(smallest > 0.0 for smallest in detectable.values())
 
 
 def test_an_effect_outside_the_ledger_is_called_unexplained():
-    # here what is found, taken out and found again went on without end
+    # at this seed an effect was once added, replaced and added again without end
     shaken = {"amplitude": 0.7576017691762639, "frequency_hz": 3.99008770018186, "phase": 2.0643579986371647}
     records = drawn_session({"periodic_disturbance": shaken}, seed=8)
     verdict = close_records(records, held_out=HELD_OUT, seed=8)
@@ -139,12 +140,12 @@ def test_a_clock_offset_below_zero_is_found_as_a_dead_time_below_zero():
     assert found["parameters"]["tau_s"]["value"] == pytest.approx(-0.02, abs=0.001)
 
 
-def test_nothing_is_fitted_to_what_it_then_predicts():
+def test_cross_validation_does_not_fit_the_frames_that_it_predicts():
     records = session(TruePlant(), 16)
     start = np.array([26.0, 524.0, 508.0])
     _, unseen = predict_held_out(fit_output_error(Plant(), records, [start]), records, [])
     assert unseen.rmse == pytest.approx(np.radians(0.05), rel=0.1)
-    # half a second of nonsense may not be followed by what predicts it, and by what predicts the rest only a little
+    # the predictions must not follow half a second of nonsense, and those of other frames change only a little
     nonsense = np.radians(3.0) * np.sin(40.0 * records[0].time) * (np.abs(records[0].time - 2.6) < 0.25)
     broken = [replace(records[0], angle=records[0].angle + nonsense), *records[1:]]
     _, spoilt = predict_held_out(fit_output_error(Plant(), broken, [start]), broken, [])
@@ -155,15 +156,15 @@ def test_nothing_is_fitted_to_what_it_then_predicts():
     assert np.degrees(np.abs(off)[~inside]).max() < 0.3
 
 
-def test_what_is_held_out_by_declaration_is_predicted_by_the_fit_of_all_others():
+def test_declared_held_out_recordings_are_predicted_by_the_fit_of_all_others():
     fitted, held_out = split_records(session(TruePlant(), 18), HELD_OUT)
     fit = fit_output_error(Plant(), fitted, [np.array([26.0, 524.0, 508.0])])
-    told, unseen = predict_held_out(fit, fitted, held_out)
-    assert [r.name for r in told.records] == HELD_OUT
-    assert len(unseen.records) == len(fitted) + 1
+    declared, all_frames = predict_held_out(fit, fitted, held_out)
+    assert [r.name for r in declared.records] == HELD_OUT
+    assert len(all_frames.records) == len(fitted) + 1
 
 
-def test_one_wrong_guess_does_not_change_the_typical_error_and_a_wrong_model_does():
+def test_a_wrong_model_changes_the_robust_error_and_a_few_outliers_do_not():
     record = session(TruePlant(), 20)[0]
     noise = np.random.default_rng(0).normal(0.0, 0.001, len(record.time))
     stuck, wrong = noise.copy(), noise + 0.005
@@ -172,10 +173,10 @@ def test_one_wrong_guess_does_not_change_the_typical_error_and_a_wrong_model_doe
     assert Prediction((record,), (wrong,), 0.0).robust_sigma > 0.005
 
 
-def test_a_limit_is_said_to_be_seen_only_where_it_acts(clean):
+def test_a_torque_limit_is_detectable_only_where_it_acts(clean):
     verdict = clean[0]
     (limit,) = [d for d in verdict_as_dict(verdict)["detectable"] if d["id"] == "torque_saturation"]
-    # at most c·u + b·θ is ever asked of the servo
+    # the servo is never required to give more than c·u + b·θ
     asked = max(508.0 * np.abs(r.command.angle).max() + 524.0 * np.abs(r.angle).max() for r in verdict.fitted)
     assert 0.0 < limit["smallest"] < np.degrees(asked)
 

@@ -32,7 +32,7 @@ def _response(time, torque, omega):
 
 
 @pytest.mark.parametrize("omega", [2.0, 8.0])
-def test_a_hidden_torque_is_seen_to_a_tenth(omega):
+def test_a_hidden_torque_is_estimated_within_a_tenth(omega):
     rng = np.random.default_rng(1)
     left = _remainder(_response(TIME, 3.0, omega) + noise(rng, len(TIME), SIGMA))
     off = left.torque - 3.0 * np.sin(omega * left.time)
@@ -40,7 +40,7 @@ def test_a_hidden_torque_is_seen_to_a_tenth(omega):
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.6])
-def test_noise_alone_makes_as_much_torque_as_is_stated(phi):
+def test_noise_alone_gives_as_much_torque_as_its_sigma_states(phi):
     rng = np.random.default_rng(2)
     ratios = []
     for _ in range(10):
@@ -50,7 +50,7 @@ def test_noise_alone_makes_as_much_torque_as_is_stated(phi):
     assert np.sqrt(np.mean(np.concatenate(ratios) ** 2)) == pytest.approx(1.0, abs=0.15)
 
 
-def test_lost_frames_do_no_harm():
+def test_lost_frames_do_not_bias_the_torque():
     rng = np.random.default_rng(3)
     time = np.delete(TIME, rng.choice(len(TIME), 40, replace=False))
     left = _remainder(_response(time, 3.0, 2.0) + noise(rng, len(time), SIGMA), time=time)

@@ -1,4 +1,4 @@
-"""What is small enough in a film to be the measurement's own."""
+"""The smallest first effect in a film exceeds the errors of the measurement."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from anglecam.loop.policy import DEFAULT
 from anglecam.loop.stepwise import smallest_first_effect
 
 CAMERA = 2e-4
@@ -21,8 +22,8 @@ CAMERA = 2e-4
         (5.0 * CAMERA, 0.0, 1.0),
     ],
 )
-def test_a_first_effect_must_do_twice_what_may_follow_the_motion_and_the_whole_uncertainty(left, phi, times):
-    task = SimpleNamespace(camera=CAMERA)
+def test_a_first_effect_must_exceed_the_uncertainty_and_twice_the_part_that_can_follow_the_motion(left, phi, times):
+    task = SimpleNamespace(camera=CAMERA, policy=DEFAULT)
     first = SimpleNamespace(cross_validated=SimpleNamespace(rmse=0.0))
     assert smallest_first_effect(task, first, SimpleNamespace(rmse=left, phi=phi)) == pytest.approx(times * CAMERA)
     coarse = SimpleNamespace(cross_validated=SimpleNamespace(rmse=1e4 * CAMERA))

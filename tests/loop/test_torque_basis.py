@@ -1,4 +1,4 @@
-"""Curves of torque over angle and speed: they hold what any such torque leaves, in the ledger or not."""
+"""Torque curves over angle and speed span the residual of any such torque, in the ledger or not."""
 
 import math
 
@@ -20,7 +20,7 @@ from benchmarks.blind.sessions import HELD_OUT, session
     ("column", "effect_id", "size"),
     [("angle", "stiffening_spring", 60.0), ("velocity", "damping_asymmetry", 0.3), ("velocity", "quadratic_drag", 0.3)],
 )
-def test_what_a_torque_over_angle_or_speed_changes_lies_within_their_curves(column, effect_id, size):
+def test_the_change_by_a_torque_over_angle_or_speed_lies_in_the_span_of_its_basis(column, effect_id, size):
     records = session({}, seed=5)
     fit = fit_output_error(Plant(), records, [np.array([26.0, 524.0, 508.0])])
     richer = Plant((effect(effect_id),))
@@ -42,7 +42,7 @@ def test_what_a_torque_over_angle_or_speed_changes_lies_within_their_curves(colu
     assert left[column] < 0.3 * max(left.values())
 
 
-def test_stribecks_curve_is_found_with_all_its_numbers():
+def test_the_stribeck_curve_is_fitted_with_all_parameters():
     friction = {"torque": 4.0, "breakaway": 10.0, "stribeck_deg_per_s": 3.0}
     records = session({"coulomb_friction": friction}, seed=1, sigma_deg=0.005)
     base = fit_output_error(Plant(), records, [np.array([26.0, 524.0, 508.0])])
@@ -55,12 +55,12 @@ def test_stribecks_curve_is_found_with_all_its_numbers():
     assert np.degrees(fit.parameters[-1]) == pytest.approx(3.0, rel=0.05)
 
 
-def test_the_gate_sees_a_slack_spring_behind_the_gravity_that_comes_nearest_to_it():
+def test_the_residual_test_detects_a_slack_spring_after_the_most_similar_gravity_is_fitted():
     slack = {"slack_spring": {"stiffness": 9.1, "slack_deg": -0.27}}
     fitted, _ = split_records(session(slack, seed=1), HELD_OUT)
     near = np.array([26.1, 622.9, 435.6, math.radians(4625.0), math.radians(40.6)])
     fit = fit_output_error(Plant((effect("gravity_geometry"),)), fitted, [near])
     assert np.degrees(fit.rmse) < 1.05 * 0.05
-    gate = run_residual_test(fit, fitted, [], np.random.default_rng(0), 0.0)
-    assert gate.p_value < 0.01
-    assert min(gate.tests, key=lambda test: test.p_value).name == "torque against angle"
+    result = run_residual_test(fit, fitted, [], np.random.default_rng(0), 0.0)
+    assert result.p_value < 0.01
+    assert min(result.tests, key=lambda test: test.p_value).name == "torque against angle"

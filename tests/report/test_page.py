@@ -20,7 +20,7 @@ from anglecam.loop.close import close_records
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.verdict import Accepted
 from anglecam.loop.verdict_json import next_experiment, split_unit, verdict_as_dict, write_next_command
-from anglecam.report.page import p_in_words, unseen_in_words, write_report
+from anglecam.report.page import p_in_words, validation_in_words, write_report
 from anglecam.report.wording import sentence
 from support.motion import Plant
 from support.series import session
@@ -28,7 +28,7 @@ from support.series import session
 
 @pytest.fixture(scope="module")
 def dragged():
-    """Return the verdict on steps, a triangle and random steps of a head with drag, none of them held out."""
+    """Return the verdict on steps, a triangle and random steps of a body with drag, none of them held out."""
     return close_records(session(Plant(quadratic_drag=2.0), 21)[::2])
 
 
@@ -40,7 +40,7 @@ def model(dragged):
 
 @pytest.fixture
 def write(model, tmp_path):
-    """Return what writes the page of a verdict on those recordings and reads it."""
+    """Return a function that writes the page of a verdict on those recordings and returns its text."""
 
     def page(found, experiment=None, problems=()):
         series = [AngleSeries(r.name, r.time, r.angle, r.sigma, ("ok",) * len(r.time)) for r in found.fitted]
@@ -53,38 +53,40 @@ def write(model, tmp_path):
 
 
 @pytest.mark.parametrize(("verdict", "svgs"), [("nothing_missing", 7), ("unexplained", 8)])
-def test_the_page_tells_the_verdict(write, dragged, verdict, svgs):
+def test_the_page_states_the_verdict(write, dragged, verdict, svgs):
     found = replace(dragged, verdict=verdict, accepted=(), after=dragged.before, after_held_out=dragged.before_held_out)
     text = write(found)
     page = unescape(text)
     assert page.count("<svg") == svgs
     assert f"{np.degrees(found.before_held_out.rmse):.4f}" in page
     assert sentence(found) in page
-    assert "Nothing more needs to be filmed" not in page
-    assert ("comes nearest, but not surely. If it is at work" in page) == (verdict == "unexplained")
-    assert ("What would have been seen" in page) == (verdict == "nothing_missing")
+    assert "No further recording is needed" not in page
+    assert ("but the evidence is not sufficient" in page) == (verdict == "unexplained")
+    assert ("This recording would show whether it acts" in page) == (verdict == "unexplained")
+    assert ("Detectable effects" in page) == (verdict == "nothing_missing")
     assert "a <b> & c" in page
     assert "a <b>" not in text  # a session's name is text, not markup
 
 
 def test_what_is_held_out_is_named(dragged):
-    told = unseen_in_words(replace(dragged, held_out=dragged.fitted[-1:]))
-    assert told == f"Held out by declaration and never fitted to, only predicted: {dragged.fitted[-1].name}."
+    text = validation_in_words(replace(dragged, held_out=dragged.fitted[-1:]))
+    name = dragged.fitted[-1].name
+    assert text == f"These recordings are declared as held out; they were predicted and never fitted: {name}."
 
 
-def test_without_a_declaration_the_page_says_that_blocks_were_predicted_in_turn(write, dragged):
+def test_without_held_out_recordings_the_page_names_block_cross_validation(write, dragged):
     page = unescape(write(dragged, problems=[ValueError("swing.avi: no mouth")]))
     assert sentence(dragged) in page
-    assert "of every 1.25 s a block of 0.25 s was predicted at a time" in page
+    assert "blocks of 0.25 s, one in every 1.25 s, were predicted by a model" in page
     assert page.count("<svg") == 7
     assert "swing.avi: no mouth" in page
     assert re.search(r"− q·θ̇·\|θ̇\|</i> with q = [\d.]+ ± [\d.]+", page)
-    assert "Nothing more needs to be filmed to say what it is." in page
+    assert "No further recording is needed to attribute the error." in page
     for record in dragged.fitted:
         assert f"{record.name}</text>" in page
 
 
-def test_every_candidate_has_its_error_on_what_it_had_not_seen(dragged):
+def test_every_candidate_has_a_prediction_error(dragged):
     result = verdict_as_dict(dragged)
     assert len(result["candidates"]) == len(dragged.candidates)
     assert all(np.isfinite(c["held_out_rmse_deg"]) for c in result["candidates"])
@@ -102,22 +104,22 @@ def test_rivals_are_named_with_the_command_to_play_next(write, dragged):
     pair = ("quadratic_drag", "dead_time")
     experiment = Experiment(command, "one step to 10° and back", 4.0, {pair: 5.0})
     page = unescape(write(doubted, experiment))
-    assert "(or it is dead time, which these recordings cannot tell from it)" in sentence(doubted)
-    assert "Film this next:</b> one step to 10° and back, 4 s in all" in page
+    assert "(or dead time, which these recordings cannot distinguish from it)" in sentence(doubted)
+    assert "Record this next:</b> one step to 10° and back, 4 s in all" in page
     assert "next.command.csv" in page
     assert page.count("<svg") == 8
-    (told,) = verdict_as_dict(doubted, experiment)["effects"]
-    assert told["alias_set"] == list(pair)
-    assert told["separating_experiment"].startswith(found.effect.separating_experiment)
-    assert told["separating_experiment"].endswith("one step to 10° and back, 4 s (next.command.csv)")
-    # nothing to play where no command tells them apart
+    (stated,) = verdict_as_dict(doubted, experiment)["effects"]
+    assert stated["alias_set"] == list(pair)
+    assert stated["separating_experiment"].startswith(found.effect.separating_experiment)
+    assert stated["separating_experiment"].endswith("one step to 10° and back, 4 s (next.command.csv)")
+    # no command is named if none separates them
     helpless = replace(experiment, separations={pair: 1.0})
     assert verdict_as_dict(doubted, helpless)["effects"][0]["separating_experiment"] == (
         found.effect.separating_experiment
     )
 
 
-def test_a_command_that_tells_nothing_apart_is_not_offered_nor_an_old_one_left(tmp_path):
+def test_a_command_that_separates_nothing_is_not_written_and_an_old_one_is_deleted(tmp_path):
     command = Command(np.array([0.0, 0.5]), np.radians([0.0, 10.0]))
     telling = Experiment(command, "one step", 4.0, {("backlash", "dead_zone"): 5.0})
     write_next_command(telling, tmp_path)
@@ -129,14 +131,14 @@ def test_a_command_that_tells_nothing_apart_is_not_offered_nor_an_old_one_left(t
         assert not (tmp_path / "next.command.csv").exists()
 
 
-def test_nothing_is_to_be_filmed_where_nothing_is_in_doubt(dragged):
+def test_no_experiment_is_proposed_without_rivals(dragged):
     assert all(not a.rivals for a in dragged.accepted)
     assert next_experiment(dragged) is None
 
 
-def test_what_the_camera_does_is_said_to_be_the_cameras(dragged):
+def test_a_camera_effect_is_attributed_to_the_camera_and_not_to_the_mechanism(dragged):
     found = replace(dragged, accepted=(Accepted(effect("angle_drift"), {}),))
-    assert "the camera's doing and not the mechanism's" in sentence(found)
+    assert "an effect of the camera and not of the mechanism" in sentence(found)
     assert "camera" not in sentence(dragged)
 
 
@@ -150,12 +152,12 @@ def test_what_the_camera_does_is_said_to_be_the_cameras(dragged):
         ("shortening", ("shortening", "")),
     ],
 )
-def test_a_parameters_name_is_parted_from_its_unit(name, parted):
+def test_a_parameters_name_is_split_from_its_unit(name, parted):
     assert split_unit(name) == parted
 
 
 @pytest.mark.parametrize(
     ("p", "words"), [(0.0, "at most 1 of 1000"), (0.004, "4 of 1000"), (0.03, "3 of 100"), (0.3, "3 of 10")]
 )
-def test_how_often_noise_does_so_much_is_said_in_sessions(p, words):
+def test_a_p_value_is_stated_as_a_number_of_sessions(p, words):
     assert p_in_words(p) == words

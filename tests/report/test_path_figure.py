@@ -1,4 +1,4 @@
-"""What an effect is drawn as, against what it does."""
+"""The drawn curve of an effect is the function that the effect computes."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ def _curve(records, effect_id, *own):
     return curve_of(plant.effects[0], fit, records)
 
 
-def test_play_is_drawn_as_wide_as_it_is(records):
+def test_backlash_is_drawn_with_its_half_width(records):
     curve = _curve(records, "backlash", np.radians(0.8))
-    assert np.max(np.abs(curve.y - curve.asked)) == pytest.approx(0.8, abs=1e-6)
+    assert np.max(np.abs(curve.y - curve.without)) == pytest.approx(0.8, abs=1e-6)
 
 
 @pytest.mark.parametrize("tau", [0.005, 0.06])
-def test_a_dead_time_is_drawn_as_long_as_it_is_and_large_enough_to_see(records, tau):
+def test_a_dead_time_is_drawn_with_its_length_on_a_scale_that_shows_it(records, tau):
     curve = _curve(records, "dead_time", tau)
     late = round(tau / np.median(np.diff(curve.x)))
-    assert np.max(np.abs(curve.y[late:] - curve.asked[:-late])) < 1e-9
+    assert np.max(np.abs(curve.y[late:] - curve.without[:-late])) < 1e-9
     assert tau > 0.05 * np.ptp(curve.x)
 
 

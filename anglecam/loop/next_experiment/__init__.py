@@ -1,1 +1,1 @@
-"""The experiment that would separate models which the recordings cannot tell apart."""
+"""The next experiment: the recording that best distinguishes models which describe the recordings so far alike."""

@@ -1,0 +1,345 @@
+"""Every decision threshold of the loop: what it is, which error it controls, and how its value was set.
+
+A threshold belongs here if another value could change a verdict, an alias set or the experiment that is proposed.
+`Policy` is passed to `anglecam.loop.close.close_records`, and ``loop.json`` lists every threshold under ``policy``.
+"Not calibrated" means that no record exists of how the value was chosen or tested. "Films 0007, 0013 and 0015" are
+cases of ``tests/blind``, and the error rates are those of ``benchmarks/README.md``.
+
+Settings of algorithms that decide nothing stay where they are used: numbers of bootstrap draws and of lags
+(`residual_test`, `cross_validation`), starts of a fit (`screen.START_SHARES`, `candidates.STAGED_STARTS`), knots and
+substeps (`torque_basis`), window lengths of the residual torque (`residual_torque`), fixed-point rounds
+(`camera_correction`), tolerances against rounding, and the family of commands (`next_experiment.commands`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any
+
+NOT_CALIBRATED = "not calibrated"
+
+
+def _threshold(value: float, unit: str, meaning: str, controls: str, calibration: str = NOT_CALIBRATED) -> Any:
+    """Declare a field with its documentation, which ``loop.json`` prints."""
+    documentation = {"unit": unit, "meaning": meaning, "controls": controls, "calibration": calibration}
+    return field(default=value, metadata=documentation)
+
+
+@dataclass(frozen=True)
+class ResidualTestPolicy:
+    """Whether a residual holds structure, and what size of an effect would have been detected."""
+
+    false_alarm_rate: float = _threshold(
+        0.05,
+        "probability",
+        "p-value below which the residual of the base model counts as structure",
+        "how often a session in which nothing is missing is not called nothing_missing",
+        "the usual 5 %; measured 5.0 % of 200 sessions with white noise and of 200 with AR(1) noise of 0.6",
+    )
+    missed_detection_rate: float = _threshold(
+        0.05,
+        "probability",
+        "probability that the test overlooks an effect of the size that loop.json lists under detectable",
+        "how often an effect of the stated detectable size is missed",
+        "not calibrated; the usual 5 %",
+    )
+
+
+@dataclass(frozen=True)
+class ScreenPolicy:
+    """Which effects are fitted, by a linear forecast of what each would explain."""
+
+    smallest_free_share: float = _threshold(
+        1e-6,
+        "share of the change that an effect makes",
+        "an effect is not considered if the parameters of the fit can follow all but this share of its change",
+        "naming an effect that the base model can represent",
+    )
+    most_fitted: int = _threshold(
+        8,
+        "effects",
+        "largest number of effects that are fitted in one round, best forecasts first",
+        "missing an effect because its forecast ranks low",
+    )
+    fewest_fitted: int = _threshold(
+        3,
+        "effects",
+        "this many effects are fitted in one round however small their forecasts are, and one fewer of them, the best, "
+        "are cross-validated however small their gains are",
+        "missing an effect because the linear forecast of it is too small",
+    )
+    smallest_forecast_share: float = _threshold(
+        0.2,
+        "share of the best forecast",
+        "an effect with a smaller forecast is not fitted, or if it is among the fewest, from one start only",
+        "missing an effect because the linear forecast of it is too small",
+    )
+
+
+@dataclass(frozen=True)
+class CandidatePolicy:
+    """How candidates are fitted, and which effects cannot be distinguished from the best."""
+
+    incomplete_fit_share: float = _threshold(
+        0.7,
+        "share of the forecast log-likelihood gain",
+        "a fit of one parameter that gains less is repeated from where the screen tried the effect and from the "
+        "effect's first start",
+        "missing an effect because its fit ended in a local minimum",
+    )
+    failed_fit_share: float = _threshold(
+        0.2,
+        "share of the forecast log-likelihood gain",
+        "a fit that gains less is repeated from half and from twice the forecast parameters",
+        "missing an effect because its fit ended in a local minimum",
+    )
+    smallest_gain_share: float = _threshold(
+        0.2,
+        "share of the best log-likelihood gain",
+        "a candidate that gains less on the fitted recordings is not cross-validated",
+        "missing an effect that fits worse than another one and predicts better",
+    )
+    false_staged_parameter_rate: float = _threshold(
+        0.01,
+        "probability",
+        "p-value of the likelihood ratio below which a staged parameter of an effect is added",
+        "how often noise alone adds a staged parameter, such as the breakaway torque of dry friction",
+    )
+    slow_speed_share: float = _threshold(
+        0.2,
+        "share of the fastest speed in the recordings",
+        "upper bound of parameters that are speeds, such as the Stribeck speed of dry friction",
+        "a friction curve over all speeds that takes the place of another effect of speed",
+        "set with the EMPS drive in view: at 0.5 the friction curve took the place of asymmetric damping",
+    )
+    true_rival_rejection_rate: float = _threshold(
+        0.05,
+        "probability",
+        "an effect stays in the alias set unless the best one is so much more likely that this would be as improbable "
+        "if the other effect were true",
+        "how often the true effect is missing from the alias set of another one",
+        "the usual 5 %; measured on 347 sessions in which one effect as large as the noise acts and one is named: 342 "
+        "alias sets hold it",
+    )
+
+
+@dataclass(frozen=True)
+class CrossValidationPolicy:
+    """How recordings are predicted by models that were not fitted to them, and when a prediction is better."""
+
+    folds: int = _threshold(
+        5,
+        "folds",
+        "every fifth block of a recording is left out at a time",
+        "overfitting: an effect is judged on frames that its model was not fitted to",
+    )
+    left_out_s: float = _threshold(
+        0.25,
+        "s",
+        "length of a block that is left out",
+        "missing an effect that acts briefly, because a longer block holds everything that determines it",
+        "1 s at first: five of seven torque limits with a residual of a quarter of the noise were then unexplained",
+    )
+    independence_s: float = _threshold(
+        0.5,
+        "s",
+        "prediction errors further apart than this count as independent in the bootstrap of the gain",
+        "coverage of the gain's interval: with shorter blocks correlated errors would count several times",
+    )
+    false_gain_rate: float = _threshold(
+        0.025,
+        "probability",
+        "an effect is accepted only if this quantile of the bootstrapped gain is above zero",
+        "how often an effect that predicts no better is accepted",
+        "not calibrated; the lower end of the 95 % interval in held_out_gain",
+    )
+
+
+@dataclass(frozen=True)
+class StepwisePolicy:
+    """When an effect is added, and when the search stops."""
+
+    false_effect_rate: float = _threshold(
+        0.01,
+        "probability",
+        "p-value of the likelihood ratio that an effect must undercut to be added",
+        "how often noise alone adds an effect; of two bootstrap intervals one is easily above zero",
+        "not calibrated alone; an effect was named in 2 and 3 of 200 sessions in which nothing is missing",
+    )
+    false_further_search_rate: float = _threshold(
+        0.01,
+        "probability",
+        "p-value of the residual test from which on no further effect is searched",
+        "how often a further effect is searched although only noise remains",
+    )
+    most_effects: int = _threshold(
+        3,
+        "effects",
+        "largest number of effects in the model",
+        "overfitting by a sum of many effects",
+    )
+    film_error_sigmas: float = _threshold(
+        2.0,
+        "stated standard uncertainties of a film's angle",
+        "in a film, smaller structure (RMS) is neither searched further, nor called unexplained, nor listed as "
+        "detectable",
+        "how often errors of the measurement that follow the motion are taken for structure",
+        "set with films 0007, 0013 and 0015 in view",
+    )
+    film_error_first_sigmas: float = _threshold(
+        1.0,
+        "stated standard uncertainties of a film's angle",
+        "in a film, the first effect must reduce the prediction error by at least this (RMS)",
+        "how often an effect is named where only errors of the measurement act",
+        "at 0.5 one of nine films in which nothing acts was called pivot_offset; at 2, the value before, two lenses "
+        "were missed",
+    )
+    film_common_error_first_sigmas: float = _threshold(
+        2.0,
+        "times the part of a film's stated uncertainty that does not scatter from frame to frame",
+        "in a film, the first effect must also reduce the prediction error by at least this (RMS), because only that "
+        "part can follow the motion as an effect does",
+        "how often an effect is named where only errors of the measurement act",
+        "set together with film_error_first_sigmas",
+    )
+    alias_evidence_nat: float = _threshold(
+        10.0,
+        "nat",
+        "in a film, evidence above which the better of two effects is preferred although their predictions differ by "
+        "less than the angle's uncertainty; below it the one with fewer parameters is named",
+        "naming the wrong one of two effects because of errors that follow the motion",
+        "set with films 0007, 0013 and 0015 in view",
+    )
+    better_minimum_nat: float = _threshold(
+        1.0,
+        "nat",
+        "gain by which a better fit of the same model makes its residual worth testing again",
+        "taking a local minimum of the fit for structure that the model lacks",
+    )
+    model_error_share: float = _threshold(
+        0.005,
+        "share of the base model's cross-validated RMS error",
+        "smaller structure (RMS) is not searched, because no model of an effect is more accurate",
+        "naming the approximation error of an effect's model as a further effect",
+        "set with EMPS and a pendulum in view: at 0.01 the pendulum's drag is missed",
+    )
+    numerical_error_rad: float = _threshold(
+        math.radians(1e-3),
+        "rad",
+        "smaller structure (RMS) is not searched, because forward models and files are not much more accurate",
+        "naming a numerical error as an effect",
+    )
+    noise_models: int = _threshold(
+        2,
+        "effects",
+        "best forecasts that are fitted to estimate the AR(1) coefficient of the noise from the best residual",
+        "an AR(1) coefficient that is too large because structure is taken for correlated noise",
+    )
+    noise_floor_phi_errors: float = _threshold(
+        1.645,
+        "standard errors",
+        "the AR(1) coefficient may exceed that of the noise floor by this much",
+        "an AR(1) coefficient that is too large because structure is taken for correlated noise",
+        "not calibrated; the one-sided 95 % limit of a normal variable",
+    )
+
+
+@dataclass(frozen=True)
+class VerdictPolicy:
+    """When the final model leaves structure, so that the verdict is ``unexplained``."""
+
+    false_unexplained_rate: float = _threshold(
+        0.01,
+        "probability",
+        "once an effect was added, p-value of the residual test below which structure may remain; without an effect "
+        "it is the residual test's false_alarm_rate",
+        "how often noise alone withdraws an effect that was found",
+    )
+    contradiction_ratio: float = _threshold(
+        3.0,
+        "times the fitted RMS error",
+        "a model lacks something if its robust error on held-out recordings is larger and no parameters reduce it",
+        "withdrawing a correct model because of one recording that it predicts badly",
+        "set with films 0007, 0013 and 0015 in view",
+    )
+    unexplained_share: float = _threshold(
+        0.1,
+        "share of the base model's error beyond the noise",
+        "once an effect was added, what remains must exceed this share, or one more cause must be forecast to explain "
+        "more than its square of the log-likelihood, for the verdict unexplained",
+        "withdrawing an effect that explains most of the residual",
+    )
+    undriven_unexplained_share: float = _threshold(
+        0.75,
+        "share of the base model's error beyond the noise",
+        "the same where nothing is commanded or the noise is unknown: most of what remains may then be something that "
+        "no model of a mechanism holds, such as the hand that released it",
+        "withdrawing an effect because of a disturbance outside the mechanism",
+    )
+
+
+@dataclass(frozen=True)
+class NextExperimentPolicy:
+    """Which recording is proposed to distinguish the effects of an alias set."""
+
+    separated_sigmas: float = _threshold(
+        3.0,
+        "standard deviations of the noise",
+        "distance between the predictions of two models from which on a recording separates them",
+        "naming the wrong one of two models after the proposed recording: the log-likelihood ratio is then 4.5 ± 3, "
+        "which is below zero with probability 0.07",
+        "the expected log-likelihood ratio is tested on rigs with known effects; the value is not calibrated",
+    )
+    saturated_sigmas: float = _threshold(
+        6.0,
+        "standard deviations of the noise",
+        "a larger distance counts no more: of recordings that reach it the shorter one is proposed",
+        "proposing a longer recording that adds no information",
+    )
+    angle_excess_share: float = _threshold(
+        0.02,
+        "share of the range of angles that were recorded",
+        "a predicted angle may exceed the recorded range by this much",
+        "proposing a command that moves the rig to where it has not been",
+    )
+    smallest_noise_rad: float = _threshold(
+        math.radians(1e-3),
+        "rad",
+        "the noise is taken to be at least this, because forward models and files are not much more accurate",
+        "calling two models separated by their numerical errors",
+    )
+
+
+@dataclass(frozen=True)
+class Policy:
+    """All thresholds, grouped by the step of the loop that uses them."""
+
+    residual_test: ResidualTestPolicy = ResidualTestPolicy()
+    screen: ScreenPolicy = ScreenPolicy()
+    candidates: CandidatePolicy = CandidatePolicy()
+    cross_validation: CrossValidationPolicy = CrossValidationPolicy()
+    stepwise: StepwisePolicy = StepwisePolicy()
+    verdict: VerdictPolicy = VerdictPolicy()
+    next_experiment: NextExperimentPolicy = NextExperimentPolicy()
+
+    def as_list(self) -> list[dict[str, Any]]:
+        """Return one dict for each threshold, as ``loop.json`` lists it.
+
+        Examples
+        --------
+        >>> Policy().as_list()[0]["name"]
+        'residual_test.false_alarm_rate'
+        >>> Policy(residual_test=ResidualTestPolicy(false_alarm_rate=0.01)).as_list()[0]["value"]
+        0.01
+        """
+        return [
+            {"name": f"{group.name}.{one.name}", "value": values[one.name], **one.metadata}
+            for group in fields(self)
+            for values in [asdict(getattr(self, group.name))]
+            for one in fields(getattr(self, group.name))
+        ]
+
+
+DEFAULT = Policy()
+"""The thresholds that the benchmarks were measured with."""

@@ -1,0 +1,52 @@
+"""Every decision threshold is listed in ``loop.json``, and changing one changes a verdict."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from anglecam.loop.close import close_records
+from anglecam.loop.policy import DEFAULT, Policy, StepwisePolicy, VerdictPolicy
+from anglecam.loop.verdict_json import verdict_as_dict
+from support.motion import Plant
+from support.series import session
+
+HELD_OUT = ["random"]
+
+
+@pytest.fixture(scope="module")
+def contradicted():
+    """Return a session without effects whose held-out recording is disturbed."""
+    *quiet, last = session(Plant(), 17, sigma_deg=0.01)
+    return [*quiet, replace(last, angle=last.angle + np.radians(0.5) * np.sin(9.0 * last.time))]
+
+
+def test_loop_json_lists_every_threshold_with_its_documentation(contradicted):
+    policy = Policy(stepwise=StepwisePolicy(most_effects=2))
+    listed = json.loads(json.dumps(verdict_as_dict(close_records(contradicted, held_out=HELD_OUT, policy=policy))))
+    declared = {
+        f"{group.name}.{one.name}": getattr(getattr(policy, group.name), one.name)
+        for group in fields(policy)
+        for one in fields(getattr(policy, group.name))
+    }
+    assert {entry["name"]: entry["value"] for entry in listed["policy"]} == declared
+    assert declared["stepwise.most_effects"] == 2
+    for entry in listed["policy"]:
+        assert entry.keys() == {"name", "value", "unit", "meaning", "controls", "calibration"}
+        assert all(isinstance(entry[key], str) and entry[key] for key in entry.keys() - {"value"})
+
+
+def test_a_larger_contradiction_ratio_accepts_a_held_out_recording_that_contradicts_the_model(contradicted):
+    tolerant = Policy(verdict=VerdictPolicy(contradiction_ratio=1e6))
+    verdicts = [close_records(contradicted, held_out=HELD_OUT, policy=p).verdict for p in (DEFAULT, tolerant)]
+    assert verdicts == ["unexplained", "nothing_missing"]
+
+
+def test_an_effect_is_named_only_if_its_p_value_is_below_the_policys_rate():
+    records = session(Plant(quadratic_drag=2.0), 21)[::2]
+    strict = Policy(stepwise=StepwisePolicy(false_effect_rate=0.0))
+    assert close_records(records).verdict == "attributed"
+    assert close_records(records, policy=strict).verdict == "unexplained"
