@@ -6,9 +6,10 @@ import pytest
 import yaml
 
 from anglecam.video.frames import read_frames, sample_frames
-from anglecam.vision.stabilise.background_motion import CameraMove, brightness
+from anglecam.vision.stabilise.background_motion import CameraMove
 from anglecam.vision.stabilise.learn import learn_background
 from anglecam.vision.stabilise.scenery import find_scenery
+from anglecam.vision.stabilise.tile_cuts import brightness
 from support.drawn import Look, draw_frames
 from synth.session import render
 
