@@ -1,1 +1,1 @@
-"""What the other rooms do with pixels: transforms, noise, medians, clusters."""
+"""Pixel operations that the other rooms share: transforms, noise, median, clusters, lamp."""

@@ -1,7 +1,7 @@
-"""Points that lie together.
+"""Groups of neighbouring points.
 
-Neighbours err together, as they share a codec's blocks and the light that falls on them: an uncertainty is told from
-how much groups disagree that lie apart.
+Errors of neighbouring points are correlated, because neighbours share the codec's blocks and the light that falls on
+them. An uncertainty is therefore estimated from the disagreement between groups of points, not between single points.
 """
 
 from __future__ import annotations
@@ -12,19 +12,19 @@ from scipy.cluster.vq import kmeans2
 
 
 def group_neighbours(points: NDArray[np.float64], count: int) -> NDArray[np.intp]:
-    """Put points that lie together into groups (k-means, started as by Arthur and Vassilvitskii 2007).
+    """Assign neighbouring points to the same group (k-means, initialised as in Arthur and Vassilvitskii 2007).
 
     Parameters
     ----------
     points : ndarray
         (n, 2) px.
     count : int
-        Of groups; where there are no more than two points for each, every point is a group of its own.
+        Number of groups. With two points or fewer for each group, every point forms a separate group.
 
     Returns
     -------
     ndarray
-        (n,) number of the group that each is in.
+        (n,) group number of each point.
     """
     if len(points) <= 2 * count:
         return np.arange(len(points))

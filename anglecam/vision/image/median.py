@@ -1,4 +1,4 @@
-"""The median of many pictures, pixel by pixel."""
+"""The pixel-wise median of many pictures."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 _STRIP = 1 << 16
-"""Numbers of each picture that are put in order at a time: so many stay in the processor's cache."""
+"""Values of each picture that are sorted at a time: this many fit into the processor's cache."""
 
 
 def median_picture(pile: NDArray[Any]) -> NDArray[Any]:
-    """Find the median over the first axis: what ``np.median(pile, axis=0)`` gives, several times as fast.
+    """Return the median over the first axis, equal to ``np.median(pile, axis=0)`` and several times as fast.
 
-    There are few pictures and many pixels, so that all pixels are put in order at once, by comparing whole pictures:
+    There are few pictures and many pixels. All pixels are therefore sorted at once by comparing whole pictures, with
     a bubble sort that stops in the middle.
 
     Parameters
@@ -25,17 +25,17 @@ def median_picture(pile: NDArray[Any]) -> NDArray[Any]:
     Returns
     -------
     ndarray
-        (…), of the pile's kind where that is a kind of float, else in double precision.
+        (…) of the pile's dtype where that is a floating-point type, otherwise of double precision.
     """
     flat = pile.reshape(len(pile), -1)
-    kind = pile.dtype if np.issubdtype(pile.dtype, np.floating) else np.dtype(float)
-    middle = np.empty(flat.shape[1], kind)
+    dtype = pile.dtype if np.issubdtype(pile.dtype, np.floating) else np.dtype(float)
+    middle = np.empty(flat.shape[1], dtype)
     for start in range(0, flat.shape[1], _STRIP):
-        middle[start : start + _STRIP] = _median(flat[:, start : start + _STRIP], kind)
+        middle[start : start + _STRIP] = _median(flat[:, start : start + _STRIP], dtype)
     return middle.reshape(pile.shape[1:])
 
 
-def _median(rows: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
+def _median(rows: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
     rows, smaller = rows.copy(), np.empty_like(rows[0])
     lower = (len(rows) - 1) // 2
     for last in range(len(rows) - 1, max(lower, 1) - 1, -1):
@@ -44,5 +44,5 @@ def _median(rows: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
             np.maximum(rows[k], rows[k + 1], out=rows[k + 1])
             rows[k] = smaller
     if len(rows) % 2:
-        return rows[lower].astype(kind)
-    return (rows[lower].astype(kind) + rows[lower + 1].astype(kind)) / kind.type(2.0)
+        return rows[lower].astype(dtype)
+    return (rows[lower].astype(dtype) + rows[lower + 1].astype(dtype)) / dtype.type(2.0)

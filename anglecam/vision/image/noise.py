@@ -1,4 +1,4 @@
-"""How noisy the pixels of a clip are."""
+"""The noise of a clip's pixels."""
 
 from __future__ import annotations
 
@@ -11,17 +11,19 @@ from numpy.typing import NDArray
 
 
 def pixel_noise(images: Sequence[NDArray[Any]]) -> float:
-    """Estimate the pixels' standard deviation from what differs between frames where nothing moves.
+    """Estimate the pixels' standard deviation from the difference between consecutive frames.
+
+    The median absolute difference is used, so the still part of the picture determines the result.
 
     Parameters
     ----------
     images : sequence of ndarray
-        (h, w, planes) frames, most of which show scenery.
+        (h, w, planes) frames; most of each picture shows scenery that does not move.
 
     Returns
     -------
     float
-        Grey levels; never below that of rounding to whole ones. 1 where there is nothing to compare.
+        Grey levels, at least the standard deviation of rounding to integers; 1 with fewer than two frames.
     """
     if len(images) < 2:
         return 1.0

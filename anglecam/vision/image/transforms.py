@@ -1,6 +1,6 @@
-"""Rigid motions in the plane of the picture: a turn and a shift, as a 3 × 3 matrix of homogeneous coordinates.
+"""Rigid motions in the picture plane: a rotation and a translation as a 3 × 3 matrix of homogeneous coordinates.
 
-Turns count counter-clockwise as seen, though y points down.
+Rotations are counter-clockwise positive as seen in the picture, although y points down.
 """
 
 from __future__ import annotations
@@ -11,24 +11,29 @@ from anglecam.data.typing import Floats
 
 
 def rotation(turns: float | Floats) -> Floats:
-    """Give the matrices (…, 2, 2) that turn rows of points: v @ M is v turned counter-clockwise as seen, y down.
+    """Return the matrices that rotate row vectors: ``v @ M`` is v rotated counter-clockwise as seen, y down.
 
     Parameters
     ----------
     turns : float or ndarray
         (…) rad.
+
+    Returns
+    -------
+    ndarray
+        (…, 2, 2).
     """
     c, s = np.cos(turns), np.sin(turns)
     return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
 
 
 def fit_rigid(start: Floats, end: Floats) -> Floats:
-    """Fit a turn and a shift by least squares (Umeyama 1991, without scale).
+    """Fit a rotation and a translation by least squares (Umeyama 1991, without scale).
 
     Parameters
     ----------
     start, end : ndarray
-        (n, 2) the same points before and after.
+        (n, 2) the same points before and after the motion.
 
     Returns
     -------
@@ -45,15 +50,15 @@ def fit_rigid(start: Floats, end: Floats) -> Floats:
 
 
 def apply_motion(motion: Floats, points: Floats) -> Floats:
-    """Carry points (n, 2) along with a motion (3, 3)."""
+    """Apply a motion (3, 3) to points (n, 2)."""
     return points @ motion[:2, :2].T + motion[:2, 2]
 
 
 def inverse_motion(motion: Floats) -> Floats:
-    """Give the motion (3, 3) that undoes another."""
+    """Return the inverse (3, 3) of a motion."""
     return np.asarray(np.linalg.inv(motion), dtype=float)
 
 
 def turn_of(motion: Floats) -> float:
-    """Tell by how much a motion (3, 3) turns, rad."""
+    """Return the rotation angle of a motion (3, 3), rad."""
     return float(np.arctan2(motion[0, 1], motion[0, 0]))

@@ -1,1 +1,1 @@
-"""Find and follow the declared mark: colour, segmentation, blobs, tracking."""
+"""Find the declared mark in a clip and follow it: colour, segmentation, blobs, tracking."""

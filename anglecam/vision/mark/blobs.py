@@ -1,4 +1,4 @@
-"""Patches of a picture in which one hue stands out."""
+"""Blobs: connected patches of a picture in which one hue stands out."""
 
 from __future__ import annotations
 
@@ -13,70 +13,70 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Floats
 
 _MIN_AREA_PX2 = 12.0
-"""A smaller patch has no centroid worth the name."""
-_LARGEST_SHARE = 0.04
-"""Of the picture; a mouth is smaller."""
-_PER_FRAME = 12
+"""Smallest blob with a useful centroid, px²."""
+_MAX_AREA_SHARE = 0.04
+"""Largest blob, as a share of the picture's area; a mark is smaller."""
+_MAX_PER_PICTURE = 12
 
 
 @dataclass(frozen=True)
 class Blobs:
-    """The patches of many pictures; arrays of length n."""
+    """The blobs of many pictures; arrays of length n."""
 
     frame: NDArray[np.int64]
-    """Number of the picture."""
-    filmed: Floats
-    """(n, 2) centre in the picture, px."""
-    place: Floats
-    """(n, 2) centre in the plane of motion, px."""
+    """Index of the picture."""
+    picture_px: Floats
+    """(n, 2) centroid in the picture, px."""
+    plane_px: Floats
+    """(n, 2) centroid in the plane of motion, px."""
     area: Floats
     """px²."""
     contrast: Floats
-    """By how much it stands out in hue, units of a*, b*."""
+    """Hue contrast over the picture's usual one, units of a*, b*."""
     label: NDArray[np.int64]
-    """Its number among the picture's patches."""
+    """Label of the connected component in its picture."""
 
 
 def find_blobs(
-    maps: Sequence[NDArray[Any]], level: float, usual: float, placed: Callable[[int, Floats], Floats]
+    maps: Sequence[NDArray[Any]], level: float, usual: float, to_plane: Callable[[int, Floats], Floats]
 ) -> Blobs:
-    """Cut the largest patches out of every picture.
+    """Find the largest blobs of every picture by thresholding its hue contrast.
 
     Parameters
     ----------
     maps : sequence of ndarray
         (h, w) hue contrast of each picture.
     level : float
-        Contrast above which a pixel belongs to a patch.
+        Threshold: contrast above which a pixel belongs to a blob.
     usual : float
         The picture's usual contrast.
-    placed : callable
-        Where a point (2,) of the i-th picture lies in the plane of motion, px.
+    to_plane : callable
+        Maps (i, point), a point (2,) of the i-th picture, to the plane of motion, px.
 
     Returns
     -------
-    Patches
-        Those of no possible size left out.
+    Blobs
+        At most twelve for each picture, without those that are too small or too large for a mark.
     """
-    frame, filmed, place, area, contrast, label = [], [], [], [], [], []
+    frame, picture_px, plane_px, area, contrast, label = [], [], [], [], [], []
     for t, hue in enumerate(maps):
         _, _, stats, centres = cv2.connectedComponentsWithStats((hue > level).astype(np.uint8), connectivity=8)
         sizes = stats[:, cv2.CC_STAT_AREA]
-        largest = _LARGEST_SHARE * hue.size
-        fit = [k for k in np.argsort(-sizes) if k and _MIN_AREA_PX2 <= sizes[k] <= largest][:_PER_FRAME]
-        for k in fit:
+        largest = _MAX_AREA_SHARE * hue.size
+        chosen = [k for k in np.argsort(-sizes) if k and _MIN_AREA_PX2 <= sizes[k] <= largest][:_MAX_PER_PICTURE]
+        for k in chosen:
             x, y, w, h = stats[k, :4]
             part = hue[y : y + h, x : x + w]
             frame.append(t)
-            filmed.append(centres[k])
-            place.append(placed(t, centres[k]))
+            picture_px.append(centres[k])
+            plane_px.append(to_plane(t, centres[k]))
             area.append(sizes[k])
             contrast.append(np.percentile(part[part > level], 75) - usual)
             label.append(k)
     return Blobs(
         np.array(frame, np.int64),
-        np.array(filmed, float).reshape(-1, 2),
-        np.array(place, float).reshape(-1, 2),
+        np.array(picture_px, float).reshape(-1, 2),
+        np.array(plane_px, float).reshape(-1, 2),
         np.array(area, float),
         np.array(contrast, float),
         np.array(label, np.int64),

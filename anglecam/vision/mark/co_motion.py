@@ -1,4 +1,8 @@
-"""Whether a patch moves with what is around it, as lips do with a face, or past it, as a toy does before a wall."""
+"""Whether the surroundings of a blob move with it.
+
+They do for a part of a larger body, as for lips in a face. They do not for a separate body, as for a toy that moves
+past a wall.
+"""
 
 from __future__ import annotations
 
@@ -8,52 +12,59 @@ import numpy as np
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.transforms import rotation
 
-_OWN, _AROUND = 0.8, 1.8
-"""Of the root of its area: within the first a patch is itself, up to the second lie its surroundings."""
+_BLOB_RADIUS, _SURROUNDINGS_RADIUS = 0.8, 1.8
+"""In units of the root of the blob's area: the blob lies within the first, its surroundings between the two."""
 _NOISE = 2.0
-"""Grey levels that any two pictures differ by: where nothing is to be seen around a patch, nothing is to be told."""
+"""Grey levels by which any two pictures differ. Featureless surroundings then score near 0.5, which is undecided."""
 
 
 def co_motion_share(
-    first: Image, second: Image, at_first: Floats, at_second: Floats, stayed: Floats, turn: float, area_px2: float
+    first: Image,
+    second: Image,
+    first_px: Floats,
+    second_px: Floats,
+    static_px: Floats,
+    turn: float,
+    area_px2: float,
 ) -> float:
-    """Compare the surroundings of a patch in two frames, once where the patch went and once where they were.
+    """Compare a blob's surroundings in two frames, once as if they moved with the blob and once as if they stayed.
 
     Parameters
     ----------
     first, second : ndarray
         (h, w, 3) the frames.
-    at_first, at_second : ndarray
-        (2,) centre of the patch in each, px.
-    stayed : ndarray
-        (2,) where the second frame shows what does not move and was at ``at_first``, px.
+    first_px, second_px : ndarray
+        (2,) centre of the blob in each, px.
+    static_px : ndarray
+        (2,) place in the second frame of static scenery that was at ``first_px`` in the first, px.
     turn : float
-        Of the patch from the first to the second about its own centre, rad, counter-clockwise as seen.
+        Rotation of the blob around its centre from the first frame to the second, rad, counter-clockwise as seen.
     area_px2 : float
-        Of the patch.
+        Area of the blob, px².
 
     Returns
     -------
     float
-        Difference of the surroundings that stay, over the sum of that and the difference of those that go along:
-        near 1 for a part of a larger body, about 0.5 or less for a body of its own.
+        D_static / (D_static + D_moving), with D the mean absolute difference of the surroundings under each
+        assumption. It is near 1 for a part of a larger body, and 0.5 or less for a separate body. It is 0.5 where too
+        few of the surroundings are in the picture.
     """
     size = float(np.sqrt(area_px2))
-    half = int(np.ceil(_AROUND * size))
+    half = int(np.ceil(_SURROUNDINGS_RADIUS * size))
     grid = np.stack(np.meshgrid(np.arange(-half, half + 1.0), np.arange(-half, half + 1.0)), axis=-1)
-    away = np.hypot(*(grid - (at_second - stayed)).transpose(2, 0, 1))
-    around = (np.hypot(*grid.transpose(2, 0, 1)) > _OWN * size) & (away > _OWN * size)
-    here = _sampled(first, at_first + grid)
-    gone, left = _sampled(second, at_second + grid @ rotation(turn)), _sampled(second, stayed + grid)
-    inside = around & (here >= 0.0).all(axis=2) & (gone >= 0.0).all(axis=2) & (left >= 0.0).all(axis=2)
+    from_moved_blob = np.hypot(*(grid - (second_px - static_px)).transpose(2, 0, 1))
+    outside = (np.hypot(*grid.transpose(2, 0, 1)) > _BLOB_RADIUS * size) & (from_moved_blob > _BLOB_RADIUS * size)
+    before = _sampled(first, first_px + grid)
+    moving, static = _sampled(second, second_px + grid @ rotation(turn)), _sampled(second, static_px + grid)
+    inside = outside & (before >= 0.0).all(axis=2) & (moving >= 0.0).all(axis=2) & (static >= 0.0).all(axis=2)
     if inside.sum() < area_px2 / 4.0:
         return 0.5
-    moved, stays = (float(np.abs(other[inside] - here[inside]).mean()) + _NOISE for other in (gone, left))
-    return stays / (stays + moved)
+    if_moving, if_static = (float(np.abs(after[inside] - before[inside]).mean()) + _NOISE for after in (moving, static))
+    return if_static / (if_static + if_moving)
 
 
 def _sampled(image: Image, places: Floats) -> Floats:
-    """Sample an image, -1 where there is none."""
+    """Sample an image at places (h, w, 2); -1 outside the image."""
     x, y = places.astype(np.float32).transpose(2, 0, 1)
     outside = (x < 0) | (y < 0) | (x > image.shape[1] - 1) | (y > image.shape[0] - 1)
     picked: Floats = cv2.remap(image, x, y, cv2.INTER_LINEAR).astype(float)

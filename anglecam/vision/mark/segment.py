@@ -1,7 +1,8 @@
-"""One image to the regions that have the mouth's colour: the paper's threshold, Canny, fill, contour (Fig. 8 c–f).
+"""Segment an image into regions of the mark's colour: the paper's threshold, Canny, fill, contour (Fig. 8 c–f).
 
-The contour says which pixels belong together; the place is then read from the grey levels: the centroid of the
-fraction of mouth in each pixel, which knows the edge to a small part of a pixel where a filled outline does not.
+The contour determines which pixels belong together. The position is then computed from the grey levels: it is the
+centroid of the fraction of mark in each pixel. The fraction locates the edge to a small part of a pixel, which a filled
+outline does not.
 """
 
 from __future__ import annotations
@@ -17,27 +18,27 @@ from anglecam.data.typing import Floats, Image
 from anglecam.vision.mark.colour import EMPTY_LEVEL, FULL_LEVEL, ColourModel
 
 _MARGIN_PX = 12
-"""Room around a region for the foot of its edges."""
+"""Margin around a region, px, that contains the foot of its edges."""
 _FOOT_PX = 3
-"""Edges of a film reach this far from the half level: optics, chroma at half resolution, a codec's ringing."""
+"""Reach of a filmed edge from the half level, px: optics, chroma at half resolution, a codec's ringing."""
 _LOCAL_PX = 4.0
-"""Scale on which the values inside and outside of an edge are taken to be constant."""
+"""Scale, px, on which the values inside and outside of an edge are taken to be constant."""
 _PRIOR = np.float32(1e-3)
-"""Weight of the clip's own values (0 outside, 1 inside) where no pixel is near."""
-_FEWEST_EDGE_PX = 8
+"""Weight of the clip's typical values (0 outside, 1 inside) where no pixel is near."""
+_MIN_OUTLINE_PX = 8
 """A patch with a shorter outline is a speck."""
 _SPECK_SHARE = 0.03
-"""Of a region's area: other patches that lie against it and are smaller together do not count."""
-_MOST = 12
-"""Regions of one frame that are looked at, largest first."""
+"""Share of a region's area: touching patches that are smaller in total do not count as another region."""
+_MAX_REGIONS = 12
+"""Patches of one frame that are measured, largest first."""
 
 
 @dataclass(frozen=True)
 class Region:
-    """One connected patch of the mouth's colour in one frame."""
+    """One connected region of the mark's colour in one frame."""
 
     centre_px: Floats
-    """(2,) centroid of the fraction of mouth, px."""
+    """(2,) centroid of the fraction of mark, px."""
     area_px2: float
     """Sum of that fraction, px²."""
     moments_px2: Floats
@@ -51,16 +52,16 @@ class Region:
 
 
 def find_regions(image: Image, model: ColourModel, smallest_px2: float) -> list[Region]:
-    """Find the regions of the mouth's colour in an image.
+    """Find the regions of the mark's colour in an image.
 
     Parameters
     ----------
     image : ndarray
         (h, w, 3) blue, green, red.
     model : ColourModel
-        Which colour.
+        The mark's colour.
     smallest_px2 : float
-        Regions with a smaller area within the half level's contour are left out.
+        Regions with a smaller area within the contour of the half level are left out.
 
     Returns
     -------
@@ -72,37 +73,37 @@ def find_regions(image: Image, model: ColourModel, smallest_px2: float) -> list[
     half = (EMPTY_LEVEL + FULL_LEVEL) / 2.0
     core = (smooth >= half).astype(np.uint8)
     patches, _ = cv2.findContours(core, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    sized = sorted(((cv2.contourArea(p), k) for k, p in enumerate(patches) if len(p) >= _FEWEST_EDGE_PX), reverse=True)
-    large = [patches[k] for area, k in sized[:_MOST] if area >= smallest_px2]
+    sized = sorted(((cv2.contourArea(p), k) for k, p in enumerate(patches) if len(p) >= _MIN_OUTLINE_PX), reverse=True)
+    large = [patches[k] for area, k in sized[:_MAX_REGIONS] if area >= smallest_px2]
     measured = (_measure(fraction, smooth, core, patch, model) for patch in large)
     return [region for region in measured if region is not None]
 
 
 def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], model: ColourModel) -> Region | None:
-    """Measure one patch; ``None`` where its neighbours leave nothing of it."""
+    """Measure one patch; ``None`` where nothing of it remains after its neighbours are excluded."""
     height, width = fraction.shape
     left, top, across, down = cv2.boundingRect(patch)
     right, bottom = left + across, top + down
     cut = left <= 0 or top <= 0 or right >= width or bottom >= height
     x0, y0 = max(left - _MARGIN_PX, 0), max(top - _MARGIN_PX, 0)
     box = np.s_[y0 : min(bottom + _MARGIN_PX, height), x0 : min(right + _MARGIN_PX, width)]
-    own = np.zeros_like(core[box])
-    cv2.drawContours(own, [patch], -1, 1, cv2.FILLED, offset=(-x0, -y0))
-    others = core[box] & (1 - own)
-    outline = _outline(smooth[box], own)
-    filled = cv2.drawContours(np.zeros_like(own), [outline], -1, 1, cv2.FILLED)
+    inner = np.zeros_like(core[box])
+    cv2.drawContours(inner, [patch], -1, 1, cv2.FILLED, offset=(-x0, -y0))
+    others = core[box] & (1 - inner)
+    outline = _outline(smooth[box], inner)
+    filled = cv2.drawContours(np.zeros_like(inner), [outline], -1, 1, cv2.FILLED)
     reach = _reach(smooth[box], filled, model)
     near_others = cv2.dilate(others, _disc(_FOOT_PX))
-    # Specks of the colour do no harm; they come and go with the noise.
-    touched = bool((others & cv2.dilate(reach, _disc(_FOOT_PX))).sum() > _SPECK_SHARE * own.sum())
+    # Specks of the colour are ignored: they come and go with the noise.
+    touched = bool((others & cv2.dilate(reach, _disc(_FOOT_PX))).sum() > _SPECK_SHARE * inner.sum())
     reach &= 1 - near_others
     low = min(0.4, max(0.1, 3.0 * model.noise))
     cover = _cover(fraction[box], filled, reach | near_others)
     weight = np.clip((cover - low) / (1.0 - 2.0 * low), 0.0, 1.0) * reach
-    # A highlight or the teeth inside the outline belong to the mouth: fill, away from the edge.
+    # A highlight or the teeth inside the outline belong to the mark: away from the edge the outline is filled.
     weight[cv2.erode(filled, _disc(_FOOT_PX)) > 0] = 1.0
 
-    y, x = np.mgrid[0 : own.shape[0], 0 : own.shape[1]].astype(np.float64)
+    y, x = np.mgrid[0 : inner.shape[0], 0 : inner.shape[1]].astype(np.float64)
     area = float(weight.sum())
     if area <= 0.0:
         return None
@@ -122,31 +123,31 @@ def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], m
     )
 
 
-def _outline(smooth: Image, own: Image) -> NDArray[Any]:
-    """Join the thresholded patch with the Canny edges that run along it, and take the outer contour."""
+def _outline(smooth: Image, inner: Image) -> NDArray[Any]:
+    """Join the thresholded patch with the Canny edges along it, and return the outer contour."""
     step = (FULL_LEVEL - EMPTY_LEVEL) / 2.0
     edges = cv2.Canny(smooth, step, 2.0 * step) // 255
-    along: Image = cv2.dilate(own, _disc(1))
-    contours, _ = cv2.findContours(own | (edges & along), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    along: Image = cv2.dilate(inner, _disc(1))
+    contours, _ = cv2.findContours(inner | (edges & along), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return max(contours, key=len)
 
 
 def _reach(smooth: Image, filled: Image, model: ColourModel) -> Image:
-    """Return the pixels that may hold some of the region: its foot, and the tail that motion blur draws from it."""
+    """Return the pixels that may contain some of the region: its foot, and the tail that motion blur draws out."""
     low = EMPTY_LEVEL + max(0.25, 4.0 * model.noise) * (FULL_LEVEL - EMPTY_LEVEL)
     tail = ((smooth >= low) | (filled > 0)).astype(np.uint8)
     _, labels = cv2.connectedComponents(tail, connectivity=8)
-    is_own = np.zeros(labels.max() + 1, np.uint8)
-    is_own[labels[filled > 0]] = 1
-    is_own[0] = 0
-    connected = is_own[labels]
+    belongs = np.zeros(labels.max() + 1, np.uint8)
+    belongs[labels[filled > 0]] = 1
+    belongs[0] = 0
+    connected = belongs[labels]
     return cv2.dilate(connected, _disc(_FOOT_PX))
 
 
 def _cover(fraction: Image, filled: Image, reach: Image) -> NDArray[Any]:
-    """Return how much of each pixel is mouth, measured between the values just inside and just outside of there.
+    """Return the covered share of each pixel, scaled between the local values just inside and just outside the region.
 
-    One scale for the whole picture would let the edge wander as bright and dark wallpaper pass behind it.
+    A single scale for the whole picture would shift the edge as bright and dark wallpaper pass behind it.
     """
     value = (fraction.astype(np.float32) - EMPTY_LEVEL) / (FULL_LEVEL - EMPTY_LEVEL)
     inside = cv2.erode(filled, _disc(2)).astype(np.float32)
@@ -157,7 +158,7 @@ def _cover(fraction: Image, filled: Image, reach: Image) -> NDArray[Any]:
 
 
 def _spread(value: NDArray[Any], weight: NDArray[Any]) -> NDArray[Any]:
-    """Smooth known values into where none is known (normalised convolution, Knutsson & Westin 1993)."""
+    """Extend known values smoothly to where none is known (normalised convolution, Knutsson & Westin 1993)."""
     return cv2.GaussianBlur(value, (0, 0), _LOCAL_PX) / cv2.GaussianBlur(weight, (0, 0), _LOCAL_PX)
 
 

@@ -1,7 +1,7 @@
-"""Which of a frame's regions is the mouth, and whether all of it is in sight.
+"""Follow the mark: which of a frame's regions is the mark, and whether all of it is visible.
 
-The mouth keeps its distance from the pivot, its size and, in a frame that turns with it, its shape. What departs
-from the clip's own norm is partly hidden or has grown together with something else.
+The mark keeps its distance from the pivot, its size and, in a frame of reference that rotates with it, its shape. A
+region that departs from the clip's norm is partly hidden or merged with something else.
 """
 
 from __future__ import annotations
@@ -20,68 +20,70 @@ from anglecam.vision.pivot.circle import Circle, fit_circle
 from anglecam.vision.status import AMBIGUOUS, NO_MARK, OCCLUDED
 
 _COARSE_PX = 6.0
-"""ResidualTest about the coarse circle."""
-_LEAST_GATE_PX = 1.5
+"""Largest distance of the mark from the coarse circle, px."""
+_MIN_TOLERANCE_PX = 1.5
+"""Least tolerance around the fitted circle, px."""
 _SPOT_PX = 3.0
-"""A region that comes back within this distance while the mouth is elsewhere is part of the scenery."""
-_SCATTER_TOLD = 8
-"""Places from which on a circle's scatter says how far off it the mouth may be: through four any circle fits."""
+"""A region that is seen again within this distance while the mark is elsewhere belongs to the scenery."""
+_MIN_FOR_SCATTER = 8
+"""Fewest places from which the scatter around a fitted circle limits the mark's distance. Through four places a circle
+always fits closely."""
 _ROBUST = 6.0
-"""Robust standard deviations at which size, shape or distance are off the clip's norm."""
-_LEAST_SHARE = 0.04
-"""Of the mouth's area: where this much is hidden, the centroid moves by up to that share of the mouth's half length,
-some tenths of a pixel."""
+"""Robust standard deviations beyond which size, shape or distance depart from the clip's norm."""
+_HIDDEN_SHARE = 0.04
+"""Share of the mark's area. Where this much is hidden, the centroid moves by up to that share of the mark's half
+length, some tenths of a pixel."""
 _FAST_PX = 4.0
-"""Way from frame to frame that can smear a mouth beyond recognition."""
-_ONE_POSE = 0.05
-"""Turns closer than this are one pose to light and perspective, rad."""
-_LEAST_OFF_PX = 0.4
-"""A distance from the circle that no whole mouth shows."""
+"""Displacement from frame to frame, px, that can smear a mark beyond recognition."""
+_POSE_WIDTH = 0.05
+"""Angles closer than this, rad, count as one pose: light and perspective are the same."""
+_MIN_OFF_PX = 0.4
+"""Largest distance from the circle, px, that a wholly visible mark shows."""
 
 
 @dataclass(frozen=True)
 class MarkTrack:
-    """The mouth through a clip; tuples with an entry a frame."""
+    """The mark through a clip; tuples with one entry for each frame."""
 
     regions: tuple[Region | None, ...]
-    """The mouth's region where ``status`` is ``ok`` or ``occluded``."""
+    """The mark's region where ``status`` is ``ok`` or ``occluded``."""
     status: tuple[str, ...]
     """``ok``, ``no_mouth``, ``occluded`` or ``ambiguous``."""
     circle: Circle | None
-    """Fitted to the places in the frames that are ok; ``None`` where the mouth is at rest."""
+    """Fitted to the places in the frames that are ok; ``None`` where the mark is at rest."""
     smeared: NDArray[np.bool_]
-    """(n,) frames that are ``occluded`` by the looks of the mouth, but it moves so fast that this may be its blur."""
+    """(n,) frames with status ``occluded`` in which the mark moves so fast that motion blur may explain its shape."""
 
 
 def follow_mark(candidates: Sequence[Sequence[Region]], time: Floats, found: FoundMark) -> MarkTrack:
-    """Choose the mouth's region in every frame.
+    """Choose the mark's region in every frame.
 
     Parameters
     ----------
     candidates : sequence of sequence of Region
-        The regions of each frame, none where a frame has no image.
+        The regions of each frame, in the plane of motion; none where a frame has no image.
     time : ndarray
         (n,) s.
-    found : Found
-        What the search knows: size, and circle or place.
+    found : FoundMark
+        Size, and circle or place, from the search.
 
     Returns
     -------
-    Track
+    MarkTrack
         A status for every frame, and the circle.
     """
-    gate, centre, radius = _COARSE_PX, *(found.circle or (found.place_px, 0.0))
-    likely = [_near(regions, centre, radius, gate, 0.5, 2.0, found.area_px2) for regions in candidates]
+    tolerance, centre, radius = _COARSE_PX, *(found.circle or (found.place_px, 0.0))
+    likely = [_near(regions, centre, radius, tolerance, 0.5, 2.0, found.area_px2) for regions in candidates]
     single = [r[0] for r in likely if len(r) == 1 and r[0].whole] or [q for r in likely for q in r]
     if not single:
         return MarkTrack((None,) * len(candidates), (NO_MARK,) * len(candidates), None, np.zeros(len(candidates), bool))
     area = float(np.median([r.area_px2 for r in single]))
     if found.circle is not None:
         circle = fit_circle(np.array([r.centre_px for r in single]), start=found.circle)
-        if circle is not None and circle.fits.sum() >= _SCATTER_TOLD:
+        if circle is not None and circle.fits.sum() >= _MIN_FOR_SCATTER:
             centre, radius = circle.centre_px, circle.radius_px
-            gate = max(_LEAST_GATE_PX, _ROBUST * circle.scatter_px)
-    chosen, status = _choose(candidates, time, centre, radius, gate, area)
+            tolerance = max(_MIN_TOLERANCE_PX, _ROBUST * circle.scatter_px)
+    chosen, status = _choose(candidates, time, centre, radius, tolerance, area)
     circle = None
     for _ in range(2):
         ok = [i for i, s in enumerate(status) if s == OK]
@@ -89,33 +91,33 @@ def follow_mark(candidates: Sequence[Sequence[Region]], time: Floats, found: Fou
             circle = fit_circle(np.array([chosen[i].centre_px for i in ok]), start=(centre, radius))  # type: ignore[union-attr]
             if circle is not None:
                 centre, radius = circle.centre_px, circle.radius_px
-        _mark_hidden(chosen, status, time, centre, radius, circle)
+        _set_occluded(chosen, status, time, centre, radius, circle)
     smeared = _smeared(chosen, status, time)
-    _join_hidden(status)
+    _join_occluded(status)
     return MarkTrack(tuple(chosen), tuple(status), circle, smeared)
 
 
 def _near(
-    regions: Sequence[Region], centre: Floats, radius: float, gate: float, least: float, most: float, area: float
+    regions: Sequence[Region], centre: Floats, radius: float, tolerance: float, least: float, most: float, area: float
 ) -> list[Region]:
     return [
         r
         for r in regions
-        if abs(np.hypot(*(r.centre_px - centre)) - radius) < gate and least * area < r.area_px2 < most * area
+        if abs(np.hypot(*(r.centre_px - centre)) - radius) < tolerance and least * area < r.area_px2 < most * area
     ]
 
 
 def _choose(
-    candidates: Sequence[Sequence[Region]], time: Floats, centre: Floats, radius: float, gate: float, area: float
+    candidates: Sequence[Sequence[Region]], time: Floats, centre: Floats, radius: float, tolerance: float, area: float
 ) -> tuple[list[Region | None], list[str]]:
-    """Take the one region on the circle; of several, the one that is no scenery and continues the motion."""
+    """Choose the only region on the circle; of several, the one that is not scenery and continues the motion."""
     n = len(candidates)
-    # A hidden part pulls the centroid off the circle by up to a part of the mouth's own size.
-    wide = gate + 0.5 * np.sqrt(area)
+    # A hidden part pulls the centroid off the circle by up to a part of the mark's own size.
+    wide = tolerance + 0.5 * np.sqrt(area)
     likely = [_near(regions, centre, radius, wide, 0.2, 3.0, area) for regions in candidates]
-    good = [_near(regions, centre, radius, gate, 0.7, 1.4, area) for regions in candidates]
-    sure = np.array([len(g) == 1 and len(k) == 1 for g, k in zip(good, likely, strict=True)])
-    known = {int(i): good[i][0].centre_px for i in np.flatnonzero(sure)}
+    good = [_near(regions, centre, radius, tolerance, 0.7, 1.4, area) for regions in candidates]
+    certain = np.array([len(g) == 1 and len(k) == 1 for g, k in zip(good, likely, strict=True)])
+    known = {int(i): good[i][0].centre_px for i in np.flatnonzero(certain)}
     scenery = _scenery(candidates, known)
     chosen: list[Region | None] = [None] * n
     status = [NO_MARK] * n
@@ -141,11 +143,11 @@ def _choose(
 
 
 def _scenery(candidates: Sequence[Sequence[Region]], known: dict[int, Floats]) -> list[tuple[Floats, float]]:
-    """List places and sizes of regions that stay where they are while the mouth is elsewhere."""
+    """List places and sizes of regions that stay in place while the mark is elsewhere."""
     spots: list[tuple[Floats, float, int]] = []
-    for i, mouth in known.items():
+    for i, mark in known.items():
         for r in candidates[i]:
-            if np.hypot(*(r.centre_px - mouth)) < _SPOT_PX:
+            if np.hypot(*(r.centre_px - mark)) < _SPOT_PX:
                 continue
             for k, (place, size, count) in enumerate(spots):
                 if np.hypot(*(r.centre_px - place)) < _SPOT_PX and 0.7 < r.area_px2 / size < 1.4:
@@ -165,6 +167,7 @@ def _is_scenery(region: Region, scenery: list[tuple[Floats, float]]) -> bool:
 
 
 def _interpolate(known: dict[int, Floats], time: Floats, i: int) -> Floats | None:
+    """Interpolate the mark's place (2,) in frame i between the nearest frames in which it is known."""
     frames = np.array(sorted(known))
     if not len(frames):
         return None
@@ -174,7 +177,7 @@ def _interpolate(known: dict[int, Floats], time: Floats, i: int) -> Floats | Non
     return np.array([np.interp(time[i], time[ends], places[:, axis]) for axis in (0, 1)])
 
 
-def _mark_hidden(
+def _set_occluded(
     chosen: Sequence[Region | None],
     status: list[str],
     time: Floats,
@@ -182,7 +185,7 @@ def _mark_hidden(
     radius: float,
     circle: Circle | None,
 ) -> None:
-    """Mark the frames in which size, shape or distance are off what the clip's other frames agree on."""
+    """Set the status of frames whose size, shape or distance departs from the norm of the clip's other frames."""
     rows = [i for i, r in enumerate(chosen) if r is not None and status[i] in (OK, OCCLUDED)]
     if not rows:
         return
@@ -199,26 +202,27 @@ def _mark_hidden(
     tangential = np.einsum("ni,nij,nj->n", along, M, along)
     typical = float(np.median(area))
     pose = np.unwrap(turn) if circle is not None else np.zeros(len(turn))
-    # Motion during the exposure draws the mouth out along its path by a length that goes with the speed.
+    # Motion during the exposure stretches the mark along its path by a length proportional to the speed, so its
+    # second moment grows with the square of the speed.
     blur = _speed(place, time[rows]) ** 2
     off = np.zeros(len(rows), bool)
-    # The second moment goes with the square of the length.
-    for value, least in ((area, _LEAST_SHARE), (radial, 2.0 * _LEAST_SHARE), (tangential, 2.0 * _LEAST_SHARE)):
+    # Second moments scale with the square of the length, so their least departure is twice that of the area.
+    for value, least in ((area, _HIDDEN_SHARE), (radial, 2.0 * _HIDDEN_SHARE), (tangential, 2.0 * _HIDDEN_SHARE)):
         departure = _departure(value, pose, blur)
         spread = 1.4826 * float(np.median(np.abs(departure - np.median(departure))))
         off |= np.abs(departure) > max(least * float(np.median(value)), _ROBUST * spread)
     if circle is not None:
-        # A mouth that really leaves the circle (a loose thread, a shaking rig) keeps its size; one that only seems
-        # to has lost or gained an area that can have moved its centroid so far.
+        # A mark that really leaves the circle (a loose thread, a shaking rig) keeps its size. A mark that only
+        # appears to leave it has lost or gained an area large enough to move its centroid that far.
         d = np.abs(np.hypot(*arm.T) - radius)
         moved = np.abs(_departure(area, pose, blur)) / typical * 2.0 * np.sqrt(np.maximum(radial, tangential))
-        off |= (d > max(_ROBUST * circle.scatter_px, _LEAST_OFF_PX)) & (moved > 0.5 * d)
+        off |= (d > max(_ROBUST * circle.scatter_px, _MIN_OFF_PX)) & (moved > 0.5 * d)
     for i, bad in zip(rows, off | ~whole, strict=True):
         status[i] = OCCLUDED if bad else OK
 
 
 def _smeared(chosen: Sequence[Region | None], status: Sequence[str], time: Floats) -> NDArray[np.bool_]:
-    """Tell which whole but ill-shaped mouths move fast."""
+    """Return the frames (n,) in which an occluded mark is whole and moves fast."""
     found = np.zeros(len(chosen), bool)
     rows = [i for i, r in enumerate(chosen) if r is not None and status[i] in (OK, OCCLUDED)]
     if not rows:
@@ -230,8 +234,8 @@ def _smeared(chosen: Sequence[Region | None], status: Sequence[str], time: Float
     return found
 
 
-def _join_hidden(status: list[str]) -> None:
-    """Call a mouth that is partly hidden before or after it is gone hidden in between."""
+def _join_occluded(status: list[str]) -> None:
+    """Change ``no_mouth`` to ``occluded`` in runs of frames before or after which the mark is partly hidden."""
     for order in (range(1, len(status)), range(len(status) - 2, -1, -1)):
         for i in order:
             if status[i] == NO_MARK and status[i - order.step] == OCCLUDED:
@@ -241,14 +245,14 @@ def _join_hidden(status: list[str]) -> None:
 def _departure(value: Floats, pose: Floats, blur: Floats) -> Floats:
     """Return the departure of a value from its robust trend: quadratic in pose (light, perspective), linear in blur.
 
-    Every pose counts alike: after one step from rest to rest most frames are in one of two, and the other is no
-    outlier.
+    Every pose has the same weight. After a single step from rest to rest most frames are in one of two poses, and the
+    less frequent pose must not be treated as an outlier.
     """
     x = pose - np.median(pose)
-    if np.ptp(x) <= _ONE_POSE or len(x) < 12:
+    if np.ptp(x) <= _POSE_WIDTH or len(x) < 12:
         return value - np.median(value)
     A = np.column_stack([np.ones_like(x), x, x**2, blur])
-    _, place, count = np.unique(np.round(x / _ONE_POSE), return_inverse=True, return_counts=True)
+    _, place, count = np.unique(np.round(x / _POSE_WIDTH), return_inverse=True, return_counts=True)
     weight = 1.0 / np.sqrt(count[place])
     keep = np.ones(len(x), bool)
     rest = np.zeros(len(x))
@@ -261,7 +265,7 @@ def _departure(value: Floats, pose: Floats, blur: Floats) -> Floats:
 
 
 def _speed(place: Floats, time: Floats) -> Floats:
-    """Return the way between a frame and its faster neighbour, px per median frame interval."""
+    """Return the displacement (n,) between each frame and its faster neighbour, px per median frame interval."""
     if len(place) < 2:
         return np.zeros(len(place))
     step = np.median(np.diff(time))

@@ -1,1 +1,1 @@
-"""Find the centre of rotation: a round marker, the circle of a mark's path, or both."""
+"""Find the centre of rotation: a round marker, the centre of the mark's circular path, or both."""

@@ -1,4 +1,4 @@
-"""The circle that a mark on a turning body draws: its centre is the centre of rotation."""
+"""The circle on which a mark on a rotating body moves: its centre is the centre of rotation."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ from skimage.measure import CircleModel
 
 from anglecam.data.typing import Floats
 
-_STEPS = 8
-_GATE = 4.0
-"""Robust standard deviations beyond which a point is taken to lie off the circle."""
+_MAX_ROUNDS = 8
+"""Rounds of fitting and rejecting outliers."""
+_OUTLIER = 4.0
+"""Robust standard deviations beyond which a point is rejected as an outlier."""
 _FLOOR_PX = 0.02
-"""No film places a mark better than this; keeps the gate open on exact data."""
+"""Least robust standard deviation, px: no film locates a mark better. Without it, points of exact data are rejected."""
 _SLOW_PX = 0.04
-"""Least standard deviation of a centroid's error that changes slowly along the path, px: what passes behind the
-mark's edge, and chroma at half resolution, shift it by 0.02 to 0.08 px in MJPG films."""
-_FLATTEST = 1e6
-"""Condition of the fit beyond which a path is a line: an arc of less than a tenth of a degree, of whose covariance no
-digit would be left."""
+"""Least standard deviation of the part of a centroid's error that varies slowly along the path, px. The background
+behind the mark's edge and chroma at half resolution shift the centroid by 0.02 to 0.08 px in MJPG films."""
+_MAX_CONDITION = 1e6
+"""Condition number of the fit beyond which the path counts as a line: an arc of less than a tenth of a degree, whose
+covariance would have no correct digit."""
 _SLOW_LENGTHS_PX = (4.0, 16.0)
-"""Ways along the path over which that error changes: what passes behind the edge, a codec's blocks."""
+"""Correlation lengths of that error along the path, px: the background behind the edge, a codec's blocks."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +36,9 @@ class Circle:
     radius_px: float
     """px."""
     scatter_px: float
-    """Standard deviation of the distance from the circle over the points that fit it, px."""
+    """Standard deviation of the distance from the circle over the points used, px."""
     covariance_px2: Floats
-    """(3, 3) covariance of centre and radius, px², robust against errors that neighbouring poses share."""
+    """(3, 3) covariance of centre and radius, px², robust against errors that are common to neighbouring poses."""
     fits: NDArray[np.bool_]
     """(n,) which points were used."""
 
@@ -48,7 +49,7 @@ class Circle:
 
 
 def circle_through(points_px: Floats) -> tuple[Floats, float]:
-    """Fit a circle algebraically, with scikit-image.
+    """Fit a circle algebraically with scikit-image's `CircleModel`.
 
     Parameters
     ----------
@@ -58,9 +59,9 @@ def circle_through(points_px: Floats) -> tuple[Floats, float]:
     Returns
     -------
     centre_px : ndarray
-        (2,), NaN where the points stand on a line or on one spot.
+        (2,) NaN where the points lie on a line or coincide.
     radius_px : float
-        Infinite there.
+        Infinite where the centre is NaN.
     """
     model = CircleModel.from_estimate(points_px)
     if not model:
@@ -69,43 +70,45 @@ def circle_through(points_px: Floats) -> tuple[Floats, float]:
 
 
 def fit_circle(points_px: Floats, *, start: tuple[Floats, float] | None = None) -> Circle | None:
-    """Fit a circle to a path, least squares of the distance, points that lie off it left out.
+    """Fit a circle to a path by least squares of the distance, with outliers rejected.
 
-    The cost is Σ (|p − o| − R)². The covariance is the cluster-robust sandwich (Liang & Zeger 1986) with poses
-    closer than a pixel as one cluster: the error of a centroid depends on where it falls on the pixel grid, so a
-    mark at rest tells the same story a hundred times. To it comes what the residual cannot show, because on a short
-    arc the fit swallows it: an error that changes slowly along the path looks like curvature and moves the centre
-    by its size over 1 − cos of half the arc. It is propagated as a Gaussian process, B·Jᵀ·K·J·B with B = (JᵀJ)⁻¹.
+    The cost is Σ (|p − o| − R)². The covariance is the cluster-robust sandwich (Liang & Zeger 1986) with poses closer
+    than a pixel as one cluster: the error of a centroid depends on its position on the pixel grid, so a mark at rest
+    repeats the same error in every frame.
+
+    A second term is added for errors that the residual cannot show because the fit absorbs them on a short arc. An
+    error that varies slowly along the path resembles curvature and moves the centre by its size divided by 1 − cos of
+    half the arc. It is propagated as a Gaussian process, B·Jᵀ·K·J·B with B = (JᵀJ)⁻¹.
 
     Parameters
     ----------
     points_px : ndarray
         (n, 2) points.
     start : tuple of (ndarray, float), optional
-        Centre and radius to begin with; where they lead nowhere, and without them, the algebraic fit.
+        Initial centre and radius. Without them, or where they lead to no circle, the algebraic fit is the start.
 
     Returns
     -------
     Circle or None
-        ``None`` with fewer than 4 points on fewer than 4 poses, or where they stand on a line.
+        ``None`` with fewer than 4 points or fewer than 4 poses, or where the points lie on a line.
     """
     if len(points_px) < 4:
         return None
-    begun = None if start is None else _fit_from(points_px, *start)
-    return begun or _fit_from(points_px, *circle_through(points_px))
+    from_start = None if start is None else _fit_from(points_px, *start)
+    return from_start or _fit_from(points_px, *circle_through(points_px))
 
 
 def _fit_from(points_px: Floats, centre: Floats, radius: float) -> Circle | None:
     if not np.isfinite(radius):
         return None
-    # near is not there: of a mouth that rests in two places one would lie beyond the gate of the start's own circle
+    # Robust loss first: an inexact start would reject one of the two places in which a mark rests as outliers.
     centre, radius = _solve(points_px, centre, radius, loss="soft_l1")
     fits = np.ones(len(points_px), bool)
-    for _ in range(_STEPS):
+    for _ in range(_MAX_ROUNDS):
         residual = np.hypot(*(points_px - centre).T) - radius
         middle = np.median(residual)
-        wide = _GATE * max(1.4826 * np.median(np.abs(residual - middle)), _FLOOR_PX)
-        now = np.abs(residual - middle) <= wide
+        limit = _OUTLIER * max(1.4826 * np.median(np.abs(residual - middle)), _FLOOR_PX)
+        now = np.abs(residual - middle) <= limit
         if now.sum() < 4:
             return None
         centre, radius = _solve(points_px[now], centre, radius)
@@ -120,14 +123,14 @@ def _fit_from(points_px: Floats, centre: Floats, radius: float) -> Circle | None
     distance = np.hypot(*d.T)
     residual = distance - radius
     J = np.column_stack([-d / distance[:, None], -np.ones(len(used))])
-    if np.linalg.cond(J) > _FLATTEST:
+    if np.linalg.cond(J) > _MAX_CONDITION:
         return None
     bread = np.linalg.inv(J.T @ J)
     scatter = float(np.sqrt((residual**2).sum() / max(len(used) - 3, 1)))
     n_poses = pose.max() + 1
-    told = np.zeros((n_poses, 3))
-    np.add.at(told, pose, J * residual[:, None])
-    meat = told.T @ told * n_poses / max(n_poses - 3, 1) + _slow_error(used, pose, J, scatter)
+    scores = np.zeros((n_poses, 3))
+    np.add.at(scores, pose, J * residual[:, None])
+    meat = scores.T @ scores * n_poses / max(n_poses - 3, 1) + _slow_error(used, pose, J, scatter)
     return Circle(centre, float(radius), scatter, bread @ meat @ bread, fits)
 
 
@@ -145,19 +148,19 @@ def _solve(points: Floats, centre: Floats, radius: float, loss: str = "linear") 
 
 
 def _slow_error(points: Floats, pose: NDArray[np.int64], J: Floats, scatter: float) -> Floats:
-    """Return Jᵀ·K·J for an error that changes slowly along the path and is at least as large as what the fit left."""
+    """Return Jᵀ·K·J for an error that varies slowly along the path, with variance `_SLOW_PX`² plus the scatter's."""
     n_poses = pose.max() + 1
     count = np.bincount(pose)
     place = np.column_stack([np.bincount(pose, points[:, axis]) / count for axis in (0, 1)])
     slope = np.zeros((n_poses, 3))
     np.add.at(slope, pose, J)
-    apart2 = ((place[:, None, :] - place[None, :, :]) ** 2).sum(axis=2)
-    alike = np.mean([np.exp(-apart2 / (2.0 * length**2)) for length in _SLOW_LENGTHS_PX], axis=0)
-    K = (_SLOW_PX**2 + scatter**2) * alike
+    distance2 = ((place[:, None, :] - place[None, :, :]) ** 2).sum(axis=2)
+    correlation = np.mean([np.exp(-distance2 / (2.0 * length**2)) for length in _SLOW_LENGTHS_PX], axis=0)
+    K = (_SLOW_PX**2 + scatter**2) * correlation
     return slope.T @ K @ slope
 
 
 def _poses(points: Floats) -> NDArray[np.int64]:
-    """Give each pose of a path its number: points in the same square pixel share a number."""
+    """Return the pose index (n,) of each point: points in the same square pixel are one pose."""
     _, pose = np.unique(np.round(points).astype(np.int64), axis=0, return_inverse=True)
     return pose.reshape(-1)

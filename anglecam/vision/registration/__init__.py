@@ -1,1 +1,1 @@
-"""The rotation of a rigid body from many small tiles, each learnt from the clip itself."""
+"""The rotation of a rigid body from many small tiles, whose appearance is learnt from the clip itself."""

@@ -1,8 +1,9 @@
-"""The sums over pixels behind a patch's look and its fits, compiled: cubic B-splines and their derivatives.
+"""Compiled sums over pixels for the appearance of tiles and its fit: cubic B-splines and their derivatives.
 
-A pixel at an offset from the centre of rotation is turned onto the tile and weighs the 4 × 4 coefficients about it.
+A pixel at an offset from the centre of rotation is rotated onto the tile, where its value is a weighted sum of the
+4 × 4 coefficients around it.
 
-No compiled function here calls one of another file, so that a cached one is never out of date.
+No compiled function here calls one of another file, so that the compiler's cache is never out of date.
 """
 
 from __future__ import annotations
@@ -46,28 +47,28 @@ def _gain(gains, turn, x, y):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gains):  # type: ignore[no-untyped-def]
-    """Gather the equations for a tile's coefficients from views at known turns and gains.
+    """Accumulate the normal equations for a tile's coefficients from views at known turns and gains.
 
     Parameters
     ----------
     offsets, values, starts : ndarray
-        Of the views, see `anglecam.vision.registration.appearance.Views`.
+        Of the views, see `anglecam.vision.registration.appearance.TileViews`.
     turns : ndarray
         (views,) rad.
     pivot, corner : ndarray
         (2,) centre of rotation and upper left corner of the tile, px.
     side : int
-        Of the tile, px.
+        Side of the tile, px.
     n : int
-        Coefficients along a side.
+        Number of coefficients along a side.
     gains : ndarray
-        (powers, 3) of the gain.
+        (powers, 3) coefficients of the gain.
 
     Returns
     -------
     tuple of ndarray
-        (n², 25) products of each coefficient's spline with its own and with those of its 7 × 7 neighbours that come
-        after it, as the products are the same either way; and (planes, n²) with the pixels' values.
+        (n², 25) products of each coefficient's spline with itself and with the splines of those of its 7 × 7
+        neighbours that come after it (the matrix is symmetric), and (planes, n²) right sides.
     """
     band = np.zeros((n * n, 25))
     planes = values.shape[1]
@@ -102,7 +103,7 @@ def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gai
 
 @njit(cache=True)
 def gain_equations(offsets, values, starts, turns, pivot, corner, side, coefficients):  # type: ignore[no-untyped-def]
-    """Gather the equations for a tile's gain, the coefficients given.
+    """Accumulate the normal equations for a tile's gain, with the coefficients given.
 
     Parameters
     ----------
@@ -114,7 +115,7 @@ def gain_equations(offsets, values, starts, turns, pivot, corner, side, coeffici
     Returns
     -------
     tuple of ndarray
-        Normal matrix (9, 9) and right side (9,), for constant, x and y of the first power of the turn and so on.
+        Normal matrix (9, 9) and right side (9,), for constant, x and y of the first power of the turn, and so on.
     """
     n = coefficients.shape[1]
     terms = 3 * 3
@@ -145,15 +146,15 @@ def gain_equations(offsets, values, starts, turns, pivot, corner, side, coeffici
                     products[entry] = basis[a] * basis[b]
                     entry += 1
             for channel in range(coefficients.shape[0]):
-                look = 0.0
+                level = 0.0
                 for j in range(4):
                     for i in range(4):
-                        look += wx[i] * wy[j] * coefficients[channel, iy + j, ix + i]
-                rest = values[m, channel] - look
+                        level += wx[i] * wy[j] * coefficients[channel, iy + j, ix + i]
+                residual = values[m, channel] - level
                 for a in range(terms):
-                    gradient[a] += basis[a] * look * rest
+                    gradient[a] += basis[a] * level * residual
                 for e in range(len(half)):
-                    half[e] += products[e] * look * look
+                    half[e] += products[e] * level * level
     normal, entry = np.zeros((terms, terms)), 0
     for a in range(terms):
         for b in range(a, terms):
@@ -163,24 +164,24 @@ def gain_equations(offsets, values, starts, turns, pivot, corner, side, coeffici
 
 
 @njit(cache=True)
-def turn_equations(offsets, values, starts, turns, pivots, corners, side, looks, all_gains):  # type: ignore[no-untyped-def]
-    """Gather what each view says of its turn, and of its centre's place, against a look.
+def turn_equations(offsets, values, starts, turns, pivots, corners, side, splines, all_gains):  # type: ignore[no-untyped-def]
+    """Accumulate each view's normal equations for its turn and its centre's place, given the tile's appearance.
 
-    The view's own brightness and blur, plane by plane, are fitted along and eliminated.
+    The view's brightness and blur are fitted too, for each plane, and eliminated.
 
     Parameters
     ----------
     offsets, values, starts, turns, side
         As in `normal_equations`.
-    pivots, corners, looks, all_gains : ndarray
-        (tiles, …) centres of rotation, corners, coefficients and gains: of one tile, or of one for each view.
+    pivots, corners, splines, all_gains : ndarray
+        (tiles, …) centres of rotation, corners, coefficients and gains: of one tile, or of one tile for each view.
 
     Returns
     -------
     tuple of ndarray
-        What `anglecam.vision.registration.appearance.Fit` holds, in its order.
+        The fields of `anglecam.vision.registration.appearance.TileFit`, in its order.
     """
-    views, planes, n = len(turns), looks.shape[1], looks.shape[2]
+    views, planes, n = len(turns), splines.shape[1], splines.shape[2]
     normals, gradients = np.zeros((views, 3, 3)), np.zeros((views, 3))
     squares, counts = np.zeros(views), np.zeros(views, dtype=np.int64)
     lights = np.zeros((views, planes, 3))
@@ -189,15 +190,15 @@ def turn_equations(offsets, values, starts, turns, pivots, corners, side, looks,
     scale = (n - 3) / side
     for k in range(views):
         c, s = np.cos(turns[k]), np.sin(turns[k])
-        p = k if len(looks) > 1 else 0
-        pivot, corner, coefficients, gains = pivots[p], corners[p], looks[p], all_gains[p]
-        whole, pull = np.zeros((3, 3)), np.zeros(3)
-        light, light_pull, across = np.zeros((planes, 3, 3)), np.zeros((planes, 3)), np.zeros((planes, 3, 3))
+        p = k if len(splines) > 1 else 0
+        pivot, corner, coefficients, gains = pivots[p], corners[p], splines[p], all_gains[p]
+        normal, gradient = np.zeros((3, 3)), np.zeros(3)
+        light, light_gradient, cross = np.zeros((planes, 3, 3)), np.zeros((planes, 3)), np.zeros((planes, 3, 3))
         for m in range(starts[k], starts[k + 1]):
             at_x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1]
             at_y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1]
             x, y = at_x - corner[0], at_y - corner[1]
-            # half a pixel within, where the spline has been seen from all sides
+            # Half a pixel inside the tile, where data on all sides determine the spline.
             if x < 0.5 or y < 0.5 or x >= side - 0.5 or y >= side - 0.5:
                 continue
             g = _gain(gains, turns[k], 2 * x / side - 1, 2 * y / side - 1)
@@ -212,11 +213,11 @@ def turn_equations(offsets, values, starts, turns, pivots, corners, side, looks,
             away_x, away_y = at_x - pivot[0], at_y - pivot[1]
             from_pivot = max(away_x * away_x + away_y * away_y, 1.0)
             for channel in range(planes):
-                look, along_x, along_y, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+                level, along_x, along_y, xx, xy, yy = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
                 for j in range(4):
                     for i in range(4):
                         q = coefficients[channel, iy + j, ix + i]
-                        look += wx[i] * wy[j] * q
+                        level += wx[i] * wy[j] * q
                         along_x += dx[i] * wy[j] * q
                         along_y += wx[i] * dy[j] * q
                         xx += bx[i] * wy[j] * q
@@ -227,36 +228,36 @@ def turn_equations(offsets, values, starts, turns, pivots, corners, side, looks,
                 slope[0] = along_y * away_x - along_x * away_y
                 slope[1] = along_x
                 slope[2] = along_y
-                bright[0] = g * look
+                bright[0] = g * level
                 bent = away_y * away_y * xx - 2.0 * away_x * away_y * xy + away_x * away_x * yy
                 bright[2] = g * scale * scale * bent / from_pivot
-                rest = values[m, channel] - g * look
-                squares[k] += rest * rest
+                residual = values[m, channel] - g * level
+                squares[k] += residual * residual
                 counts[k] += 1
                 for a in range(3):
-                    pull[a] += slope[a] * rest
+                    gradient[a] += slope[a] * residual
                     for b in range(a, 3):
-                        whole[a, b] += slope[a] * slope[b]
+                        normal[a, b] += slope[a] * slope[b]
                 for a in range(3):
-                    light_pull[channel, a] += bright[a] * rest
+                    light_gradient[channel, a] += bright[a] * residual
                     for b in range(3):
                         light[channel, a, b] += bright[a] * bright[b]
-                        across[channel, a, b] += bright[a] * slope[b]
+                        cross[channel, a, b] += bright[a] * slope[b]
         if counts[k] < 30:
             counts[k] = 0
             squares[k] = 0.0
             continue
         for a in range(3):
             for b in range(a):
-                whole[a, b] = whole[b, a]
-        # the view's brightness and blur are fitted along and eliminated
+                normal[a, b] = normal[b, a]
+        # Eliminate the view's brightness and blur.
         for channel in range(planes):
-            known = light[channel] + 1e-9 * np.eye(3)
-            taken = np.linalg.solve(known, across[channel])
-            told = np.linalg.solve(known, light_pull[channel])
-            whole -= across[channel].T @ taken
-            pull -= taken.T @ light_pull[channel]
-            squares[k] -= light_pull[channel] @ told
-            lights[k, channel] = told
-        normals[k], gradients[k] = whole, pull
+            light_normal = light[channel] + 1e-9 * np.eye(3)
+            eliminated = np.linalg.solve(light_normal, cross[channel])
+            fitted_light = np.linalg.solve(light_normal, light_gradient[channel])
+            normal -= cross[channel].T @ eliminated
+            gradient -= eliminated.T @ light_gradient[channel]
+            squares[k] -= light_gradient[channel] @ fitted_light
+            lights[k, channel] = fitted_light
+        normals[k], gradients[k] = normal, gradient
     return normals, gradients, squares, counts, lights

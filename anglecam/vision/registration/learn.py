@@ -1,9 +1,10 @@
-"""Learning a head from the frames that show it: its looks, the centre it turns about, and how it is turned in each.
+"""Learn the body from the frames that show it: its appearance, its centre of rotation, and its angle in each frame.
 
-All three hang together and are found in turn: looks for given turns, then centre and turns for given looks. A look
-that is a little wrong agrees with the turns that made it, so that this goes in ever smaller steps, each about the same
-share of the one before: every third time the sum of all that would follow is gone at once (Aitken 1926). How slow it
-would have been is what the looks can swallow of an error of the centre, and widens its covariance.
+The three depend on one another and are found alternately: the appearance for given angles, then centre and angles for a
+given appearance. An appearance with a small error agrees with the angles from which it was learnt, so the steps shrink
+slowly, each by nearly the same ratio. After the first rounds, every second step is therefore extended by Aitken
+extrapolation (Aitken 1926). The ratio is the share of an error of the centre that the appearance absorbs. It is
+measured at the end by displacing the converged centre, and enlarges the centre's covariance.
 """
 
 from __future__ import annotations
@@ -16,7 +17,6 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
 from anglecam.vision.image.clusters import group_neighbours
-from anglecam.vision.image.transforms import rotation
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.registration.appearance import (
     HIDDEN_MISFIT,
@@ -28,224 +28,233 @@ from anglecam.vision.registration.appearance import (
     join_tiles,
     learn_tile,
 )
+from anglecam.vision.registration.centre_equations import (
+    CentrePrior,
+    centre_equations,
+    disagreement_of_groups,
+    excess_displacement,
+    solve_centres,
+)
 from anglecam.vision.registration.tiles import TILE_SIDE_PX, FrameView, MotionPlane, Tiles, view_tiles
 from anglecam.vision.registration.turn import BodyAppearance, covered_views, group_scatter
 
 _GROUPS = 6
-_ROUNDS = 16
+"""Groups of neighbouring tiles."""
+_MAX_ROUNDS = 16
 _SETTLED_PX = 0.002
-"""Looks, centre and turns are found in turn until the centre moves by less."""
-_LOOKS = 3
-"""Rounds after which it is settled what is hidden."""
+"""Change of the centres of rotation below which the iteration ends, px."""
+_HIDDEN_ROUNDS = 3
+"""Rounds after which the set of hidden views is no longer changed."""
 _NUDGE_PX = 0.2
-"""By which a settled centre is moved to see how much of it the looks swallow."""
+"""Displacement of a converged centre by which its absorbed share is measured, px."""
 _STRETCH = 1e-3
-"""By which settled turns are stretched for the same purpose."""
-_LARGEST_SHARE = 0.98
-"""Of what they can swallow."""
-_SOUND = 0.5
-"""Least variance of a tile over the usual one: a smaller one tells of too few views, not of less noise."""
-_NOTHING = 1e-9
-"""Information of a frame in which every tile is hidden."""
+"""Relative stretch of converged angles by which their absorbed share is measured."""
+_MAX_ABSORBED = 0.98
+"""Largest share of an error that the appearance is assumed to absorb."""
+_MIN_VARIANCE = 0.5
+"""Least variance of a tile relative to the median. A smaller variance results from too few views, not from less
+noise."""
+_NO_MISFIT = 1e-9
+"""Replaces the usual misfit, zero, of a tile that is outside most pictures."""
 _DEPTH = 0.15
-"""Standard deviation of the heights of a head's parts, over their distance from the pivot."""
+"""Standard deviation of the heights of a body's parts, relative to their distance from the pivot."""
 
 
 @dataclass(frozen=True)
-class _Prior:
-    """What is known of the centres of rotation before the head is looked at: information, 1/px²."""
-
-    pivot: Floats
-    height: float
-
-
-@dataclass(frozen=True)
-class _Pose:
-    """What is found besides the looks."""
+class _State:
+    """The unknowns besides the appearance."""
 
     error: Floats
-    """(2,) of the pivot, px."""
+    """(2,) of the initial pivot, px."""
     heights: Floats
     """(tiles,) px."""
     turns: Floats
     """(frames,) rad."""
 
-    def moved(self, step: Floats, lever: float) -> _Pose:
-        """Go a step, all of it in px."""
+    def moved(self, step: Floats, lever: float) -> _State:
+        """Return the state after a step whose components are all in px."""
         error, heights, turns = np.split(step, [2, 2 + len(self.heights)])
-        return _Pose(self.error + error, self.heights + heights, self.turns + turns / lever)
+        return _State(self.error + error, self.heights + heights, self.turns + turns / lever)
 
-    def step_to(self, other: _Pose, lever: float) -> Floats:
-        """Return the step from here to another, all of it in px."""
+    def step_to(self, other: _State, lever: float) -> Floats:
+        """Return the step from this state to another, all components in px."""
         parts = other.error - self.error, other.heights - self.heights, lever * (other.turns - self.turns)
         return np.concatenate(parts)
 
 
 @dataclass(frozen=True)
-class _Task:
-    """What stays the same from round to round."""
+class _Data:
+    """Everything that stays the same from round to round."""
 
     tiles: Tiles
     views: Sequence[TileViews]
+    """One for each tile."""
     start_px: Floats
-    """(2,) the pivot to begin with."""
+    """(2,) the initial pivot."""
     parallax: Floats
-    prior: _Prior
+    prior: CentrePrior
 
-    def centres(self, pose: _Pose) -> Floats:
-        """Return the centre that each tile turns about, (tiles, 2) px."""
-        return self.start_px + pose.error + pose.heights[:, None] * self.parallax
+    def centres(self, state: _State) -> Floats:
+        """Return the centre of rotation of each tile, (tiles, 2) px."""
+        return self.start_px + state.error + state.heights[:, None] * self.parallax
 
-    def seen(self, pose: _Pose) -> list[TileViews]:
-        """Return the views from those centres."""
-        off = pose.error + (pose.heights - self.tiles.heights)[:, None] * self.parallax
+    def seen(self, state: _State) -> list[TileViews]:
+        """Return the views with offsets from those centres."""
+        off = state.error + (state.heights - self.tiles.heights)[:, None] * self.parallax
         return [replace(v, offsets=v.offsets - shift) for v, shift in zip(self.views, off, strict=True)]
 
 
 @dataclass(frozen=True)
 class _Round:
-    """One round's looks, and where they lead."""
+    """One round: the appearance for a state, and the state that follows from it."""
 
-    patches: Sequence[TileAppearance]
+    appearance: Sequence[TileAppearance]
+    """One for each tile."""
     hidden: NDArray[np.bool_]
-    """(tiles, frames) views that something covers."""
+    """(tiles, frames) views in which something covers the tile."""
     variance: Floats
-    """(tiles,) of what is left over, grey levels squared."""
+    """(tiles,) mean squared residual, grey levels squared."""
     covariance: Floats
-    """Of pivot and heights if the looks were known, in units of the pixels' noise."""
-    pose: _Pose
+    """Of pivot and heights for a known appearance, in units of the pixels' noise."""
+    state: _State
     fits: TileFit
-    """Of the looks, in the pose that they were learnt for."""
+    """Of the appearance, in the state for which it was learnt."""
 
 
 def learn_appearance(
-    glimpses: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot: PivotEstimate
+    frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot: PivotEstimate
 ) -> BodyAppearance:
-    """Learn how the tiles look, where the head turns, and what its turns are, all from the same frames.
+    """Learn the tiles' appearance, the centre of rotation and the angles, all from the same frames.
 
     Parameters
     ----------
-    glimpses : sequence of Glimpse
-        Frames at turns that differ.
+    frames : sequence of FrameView
+        Frames at different angles.
     tiles : Tiles
         From `anglecam.vision.registration.tiles.choose_tiles`.
-    plane : Plane
-        What lies where.
-    pivot : Pivot
-        Of the reference frame; where the head hardly turns, it is all that is known.
+    plane : MotionPlane
+        Place of each pixel.
+    pivot : PivotEstimate
+        Prior of the pivot in the reference frame. Where the body hardly rotates, the data add no information to it.
 
     Returns
     -------
-    Look
+    BodyAppearance
         In a frame of reference whose pivot is the learnt one.
     """
     start = pivot.centre_px
     lever = float(np.median(np.hypot(*(tiles.corners - start).T)))
-    known = np.asarray(np.linalg.inv(pivot.covariance_px2), dtype=float)
+    prior = np.asarray(np.linalg.inv(pivot.covariance_px2), dtype=float)
     views = [
-        view_tiles(c[None], h[None], glimpses, plane, start)[0]
-        for c, h in zip(tiles.corners, tiles.heights, strict=True)
+        view_tiles(c[None], h[None], frames, plane, start)[0] for c, h in zip(tiles.corners, tiles.heights, strict=True)
     ]
-    task = _Task(tiles, views, start, plane.lens.parallax, _Prior(known, 1.0 / (_DEPTH * lever) ** 2))
-    pose = _Pose(np.zeros(2), tiles.heights, np.array([g.turn for g in glimpses]))
-    patches: Sequence[TileAppearance] = [
-        learn_tile(c, TILE_SIDE_PX, v, pose.turns, o)
-        for c, v, o in zip(tiles.corners, views, task.centres(pose), strict=True)
-    ]
-    now = _round(task, pose, patches, None)
-    before: Floats | None = None
-    for done in range(1, _ROUNDS):
-        step = pose.step_to(now.pose, lever)
-        if np.hypot(*(task.centres(now.pose) - task.centres(pose)).T).max() < _SETTLED_PX:
-            break
-        # heights have ways of their own to settle: in a tilted view there is no one share to leap by
-        ahead = done > _LOOKS and before is not None and not task.parallax.any()
-        pose = pose.moved(step * (_reach(before, step) if ahead and before is not None else 1.0), lever)
-        # after a leap two ordinary steps, to see anew where they lead
-        before = None if ahead else step
-        now = _round(task, pose, now.patches, now.hidden if done >= _LOOKS else None, now.fits)
-    swallowed = _swallowed(task, now)
-    pose, covariance = now.pose, now.covariance / (1.0 - swallowed)
-    fits = _compare_all(now.patches, task.seen(pose), pose.turns, task.centres(pose)).without(now.hidden)
-    normal, gradient = fits.weighted(now.variance)
+    data = _Data(tiles, views, start, plane.lens.parallax, CentrePrior(prior, 1.0 / (_DEPTH * lever) ** 2))
+    last = _iterate(data, _State(np.zeros(2), tiles.heights, np.array([f.turn for f in frames])), lever)
+    state, covariance = last.state, last.covariance / (1.0 - _absorbed_of_pivot(data, last))
+    fits = _compare_all(last.appearance, data.seen(state), state.turns, data.centres(state)).without(last.hidden)
+    normal, gradient = fits.weighted(last.variance)
     groups = group_neighbours(tiles.corners, _GROUPS)
     total, freedom = group_scatter(normal, gradient, groups)
-    # two witnesses: groups that disagree about the turn, and a head that seems to leave its pivot, if that stands still
-    witnesses = [total / max(freedom - len(pose.turns), 1)]
-    if glimpses[0].wander_px2 is None:
-        witnesses.append(_restlessness(normal.sum(axis=0), gradient.sum(axis=0)))
-    birge = max(1.0, float(np.sqrt(max(witnesses))))
-    scores = _centre_equations(normal, gradient, pose.turns, task.parallax).scores
-    unlike = max(birge**2, _disagreement(now.covariance, scores, groups))
-    told = normal[:, :, 0, 0].sum(axis=1)
+    # Two estimates of the Birge ratio: disagreement of groups about the angle and, where the camera does not move, the
+    # displacement that a body on a fixed pivot cannot have.
+    estimates = [total / max(freedom - len(state.turns), 1)]
+    if frames[0].pivot_covariance_px2 is None:
+        estimates.append(excess_displacement(normal.sum(axis=0), gradient.sum(axis=0)))
+    birge = max(1.0, float(np.sqrt(max(estimates))))
+    scores = centre_equations(normal, gradient, state.turns, data.parallax).scores
+    variance_ratio = max(birge**2, disagreement_of_groups(last.covariance, scores, groups))
+    information = normal[:, :, 0, 0].sum(axis=1)
     return BodyAppearance(
-        patches=join_tiles(now.patches),
-        heights=pose.heights,
+        tiles=join_tiles(last.appearance),
+        heights=state.heights,
         plane=plane,
-        pivot_px=start + pose.error,
-        pivot_covariance_px2=unlike * covariance[:2, :2],
-        variance=now.variance,
+        pivot_px=start + state.error,
+        pivot_covariance_px2=variance_ratio * covariance[:2, :2],
+        variance=last.variance,
         groups=groups,
         birge=birge,
-        absorbed_share=_yielding(task, now),
-        middle_px=told @ (tiles.corners + TILE_SIDE_PX / 2) / told.sum(),
+        absorbed_share=_absorbed_of_turns(data, last),
+        middle_px=information @ (tiles.corners + TILE_SIDE_PX / 2) / information.sum(),
     )
 
 
+def _iterate(data: _Data, state: _State, lever: float) -> _Round:
+    """Alternate between appearance and state until the centres of rotation settle; return the last round."""
+    appearance = [
+        learn_tile(c, TILE_SIDE_PX, v, state.turns, o)
+        for c, v, o in zip(data.tiles.corners, data.views, data.centres(state), strict=True)
+    ]
+    now = _round(data, state, appearance, None)
+    before: Floats | None = None
+    for done in range(1, _MAX_ROUNDS):
+        step = state.step_to(now.state, lever)
+        if np.hypot(*(data.centres(now.state) - data.centres(state)).T).max() < _SETTLED_PX:
+            break
+        # In a tilted view the heights converge at different rates, so no single ratio exists to extrapolate with.
+        extrapolate = done > _HIDDEN_ROUNDS and before is not None and not data.parallax.any()
+        factor = _aitken_factor(before, step) if extrapolate and before is not None else 1.0
+        state = state.moved(step * factor, lever)
+        # After an extrapolation the ratio is estimated anew, from the next two steps.
+        before = None if extrapolate else step
+        now = _round(data, state, now.appearance, now.hidden if done >= _HIDDEN_ROUNDS else None, now.fits)
+    return now
+
+
 def _round(
-    task: _Task,
-    pose: _Pose,
-    patches: Sequence[TileAppearance],
+    data: _Data,
+    state: _State,
+    appearance: Sequence[TileAppearance],
     hidden: NDArray[np.bool_] | None,
     before: TileFit | None = None,
 ) -> _Round:
-    """Learn the looks for a pose, then the pose for those looks."""
-    views, centres = task.seen(pose), task.centres(pose)
-    before = _compare_all(patches, views, pose.turns, centres) if before is None else before
+    """Learn the appearance for a state, then the state for that appearance."""
+    views, centres = data.seen(state), data.centres(state)
+    before = _compare_all(appearance, views, state.turns, centres) if before is None else before
     out = _hidden(before) if hidden is None else hidden
-    patches = [
-        learn_tile(p.corners[0], TILE_SIDE_PX, equalise_brightness(v, light).without(o), pose.turns, c, p.gains[0])
-        for p, v, c, light, o in zip(patches, views, centres, before.light, out, strict=True)
+    appearance = [
+        learn_tile(t.corners[0], TILE_SIDE_PX, equalise_brightness(v, light).without(o), state.turns, c, t.gains[0])
+        for t, v, c, light, o in zip(appearance, views, centres, before.light, out, strict=True)
     ]
-    whole = _compare_all(patches, views, pose.turns, centres)
-    fits = whole.without(out)
+    all_fits = _compare_all(appearance, views, state.turns, centres)
+    fits = all_fits.without(out)
     variance = fits.squares.sum(axis=1) / np.maximum(fits.count.sum(axis=1), 1)
-    variance = np.maximum(variance, _SOUND * np.median(variance))
-    equations = _centre_equations(*fits.weighted(variance), pose.turns, task.parallax)
-    step, covariance = _centres_error(equations, task.prior, pose.error, pose.heights)
-    raised = step[2:] if len(step) > 2 else np.zeros(len(pose.heights))
-    turn_steps = (equations.turn_pull - equations.crossed @ step) / equations.by_turn
-    there = _Pose(pose.error + step[:2], pose.heights + raised, pose.turns + turn_steps)
-    return _Round(patches, out, variance, covariance, there, whole)
+    variance = np.maximum(variance, _MIN_VARIANCE * np.median(variance))
+    equations = centre_equations(*fits.weighted(variance), state.turns, data.parallax)
+    step, covariance = solve_centres(equations, data.prior, state.error, state.heights)
+    height_steps = step[2:] if len(step) > 2 else np.zeros(len(state.heights))
+    turn_steps = (equations.turn_scores - equations.cross @ step) / equations.turn_information
+    following = _State(state.error + step[:2], state.heights + height_steps, state.turns + turn_steps)
+    return _Round(appearance, out, variance, covariance, following, all_fits)
 
 
-def _reach(before: Floats, step: Floats) -> float:
-    """Tell how many times as far the steps lead in the end: by 1/(1 − r) if each is r times the one before."""
-    share = float(before[:2] @ step[:2]) / max(float(before[:2] @ before[:2]), 1e-12)
-    return 1.0 / (1.0 - min(share, _LARGEST_SHARE)) if share > 0.0 else 1.0
+def _aitken_factor(before: Floats, step: Floats) -> float:
+    """Return the factor 1/(1 − r) from a step to the sum of all that follow, each r times its predecessor."""
+    ratio = float(before[:2] @ step[:2]) / max(float(before[:2] @ before[:2]), 1e-12)
+    return 1.0 / (1.0 - min(ratio, _MAX_ABSORBED)) if ratio > 0.0 else 1.0
 
 
-def _yielding(task: _Task, now: _Round) -> float:
-    """Return the share of an error that goes with the turn itself, that the looks adapt to."""
-    stretch = _STRETCH * (now.pose.turns - np.median(now.pose.turns))
-    after = _round(task, replace(now.pose, turns=now.pose.turns + stretch), now.patches, now.hidden, now.fits)
-    return float((after.pose.turns - now.pose.turns) @ stretch / max(float(stretch @ stretch), 1e-18))
+def _absorbed_of_turns(data: _Data, now: _Round) -> float:
+    """Return the share of an error of the angles, proportional to the angle, that the appearance absorbs."""
+    stretch = _STRETCH * (now.state.turns - np.median(now.state.turns))
+    stretched = replace(now.state, turns=now.state.turns + stretch)
+    after = _round(data, stretched, now.appearance, now.hidden, now.fits)
+    return float((after.state.turns - now.state.turns) @ stretch / max(float(stretch @ stretch), 1e-18))
 
 
-def _swallowed(task: _Task, now: _Round) -> float:
-    """Return the share of an error of the pivot, in its worst known direction, that the looks adapt to."""
+def _absorbed_of_pivot(data: _Data, now: _Round) -> float:
+    """Return the share of an error of the pivot, in its least certain direction, that the appearance absorbs."""
     axis = np.linalg.eigh(now.covariance[:2, :2])[1][:, -1]
-    nudged = replace(now.pose, error=now.pose.error + _NUDGE_PX * axis)
-    after = _round(task, nudged, now.patches, now.hidden, now.fits)
-    left = float((after.pose.error - now.pose.error) @ axis) / _NUDGE_PX
-    return float(np.clip(left, 0.0, _LARGEST_SHARE))
+    nudged = replace(now.state, error=now.state.error + _NUDGE_PX * axis)
+    after = _round(data, nudged, now.appearance, now.hidden, now.fits)
+    remaining = float((after.state.error - now.state.error) @ axis) / _NUDGE_PX
+    return float(np.clip(remaining, 0.0, _MAX_ABSORBED))
 
 
 def _compare_all(
-    patches: Sequence[TileAppearance], views: Sequence[TileViews], turns: Floats, centres: Floats
+    appearance: Sequence[TileAppearance], views: Sequence[TileViews], turns: Floats, centres: Floats
 ) -> TileFit:
     """Compare every tile with every frame: rows are tiles, columns frames."""
-    fits = [compare_tiles(p, v, turns, c[None]) for p, v, c in zip(patches, views, centres, strict=True)]
+    fits = [compare_tiles(t, v, turns, c[None]) for t, v, c in zip(appearance, views, centres, strict=True)]
     return TileFit(
         np.stack([f.normal for f in fits]),
         np.stack([f.gradient for f in fits]),
@@ -256,84 +265,10 @@ def _compare_all(
 
 
 def _hidden(fits: TileFit) -> NDArray[np.bool_]:
-    """Tell in which frames a tile is seen badly: what passes before it is not learnt."""
+    """Return the views (tiles, frames) with a large misfit: an object in front of a tile must not be learnt."""
     mean_square = fits.squares / np.maximum(fits.count, 1)
-    # a tile that is out of most pictures has no usual misfit; where it is seen, it is judged badly seen
-    usual = np.maximum(np.median(mean_square, axis=1, keepdims=True), _NOTHING)
-    # motion blur and the like spoil all tiles alike
-    spoilt = np.maximum(np.median(mean_square / usual, axis=0, keepdims=True), 1.0)
-    return np.asarray((mean_square > HIDDEN_MISFIT * spoilt * usual) | covered_views(fits))
-
-
-@dataclass(frozen=True)
-class _Equations:
-    """What tiles say of the errors of pivot and heights (size 2, or 2 + tiles), every frame's turn eliminated."""
-
-    information: Floats
-    """(size, size)."""
-    scores: Floats
-    """(tiles, size)."""
-    crossed: Floats
-    """(frames, size) what they have in common with each frame's turn."""
-    by_turn: Floats
-    """(frames,) information about the turn."""
-    turn_pull: Floats
-    """(frames,) score of the turn."""
-
-
-def _centre_equations(normal: Floats, gradient: Floats, turns: Floats, parallax: Floats) -> _Equations:
-    """Gather what tiles say of the errors of pivot and heights.
-
-    A turned tile seems displaced by t = (1 − R)·(e + p·h). Every frame's turn is free: it is eliminated. Where there
-    is no parallax, heights do not count.
-    """
-    moved = np.eye(2) - rotation(turns)
-    place = np.einsum("kai,tkab,kbj->tij", moved, normal[..., 1:, 1:], moved)
-    cross = np.einsum("kai,tka->tki", moved, normal[..., 1:, 0])
-    pull = np.einsum("kai,tka->ti", moved, gradient[..., 1:])
-    by_turn, tiles = np.maximum(normal[..., 0, 0].sum(axis=0), _NOTHING), len(normal)
-    size = 2 + (tiles if parallax.any() else 0)
-    information, scores, crossed = np.zeros((size, size)), np.zeros((tiles, size)), np.zeros((len(turns), size))
-    information[:2, :2], scores[:, :2], crossed[:, :2] = place.sum(axis=0), pull, cross.sum(axis=0)
-    if size > 2:
-        own = place @ parallax
-        information[2:, :2], information[:2, 2:] = own, own.T
-        information[2:, 2:] = np.diag(own @ parallax)
-        scores[:, 2:] = np.diag(pull @ parallax)
-        crossed[:, 2:] = (cross @ parallax).T
-    information -= (crossed.T / by_turn) @ crossed
-    scores -= (gradient[..., 0] / by_turn) @ crossed
-    return _Equations(information, scores, crossed, by_turn, gradient[..., 0].sum(axis=0))
-
-
-def _centres_error(equations: _Equations, prior: _Prior, so_far: Floats, heights: Floats) -> tuple[Floats, Floats]:
-    """Solve for the errors of pivot and heights; return the covariance too, all in units of the pixels' noise."""
-    known, right = equations.information.copy(), equations.scores.sum(axis=0)
-    known[:2, :2] += prior.pivot
-    right[:2] -= prior.pivot @ so_far
-    tall = len(known) > 2
-    if tall:
-        known[2:, 2:] += prior.height * np.eye(len(heights))
-        right[2:] -= prior.height * heights
-    covariance = np.asarray(np.linalg.inv(known), dtype=float)
-    return covariance @ right, covariance
-
-
-def _disagreement(covariance: Floats, scores: Floats, groups: NDArray[np.intp]) -> float:
-    """Ratio of the pivot's variance as groups of tiles disagree about it to what noise alone makes it.
-
-    The cluster-robust sandwich (Liang & Zeger 1986), a cluster a group.
-    """
-    names = np.unique(groups)
-    told = np.stack([scores[groups == group].sum(axis=0) for group in names]) @ covariance
-    variance = float((told[:, :2] ** 2).sum()) * len(names) / max(len(names) - 2, 1)
-    return variance / float(np.trace(covariance[:2, :2]))
-
-
-def _restlessness(normal: Floats, gradient: Floats) -> float:
-    """Mean square of the displacement that a head on a fixed pivot cannot have, in units of its noise."""
-    seen = normal[:, 0, 0] > _NOTHING
-    normal, gradient = normal[seen], gradient[seen]
-    place = normal[:, 1:, 1:] - normal[:, 1:, :1] * normal[:, :1, 1:] / normal[:, :1, :1]
-    shift = gradient[:, 1:] - normal[:, 1:, 0] * (gradient[:, :1] / normal[:, :1, 0])
-    return float(np.einsum("ni,nij,nj->n", shift, np.linalg.pinv(place, hermitian=True), shift).mean() / 2.0)
+    # A tile outside most pictures has no usual misfit; the few views that show it are then marked as hidden.
+    usual = np.maximum(np.median(mean_square, axis=1, keepdims=True), _NO_MISFIT)
+    # Motion blur and the like affect all tiles alike.
+    of_frame = np.maximum(np.median(mean_square / usual, axis=0, keepdims=True), 1.0)
+    return np.asarray((mean_square > HIDDEN_MISFIT * of_frame * usual) | covered_views(fits))

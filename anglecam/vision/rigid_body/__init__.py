@@ -1,1 +1,1 @@
-"""Follow a rigid body that carries no mark."""
+"""The rotation of a rigid body without a mark, from features and keyframes."""

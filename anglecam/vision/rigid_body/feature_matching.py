@@ -1,8 +1,9 @@
-"""What moves as one rigid body between two pictures.
+"""Rigid bodies between two pictures: matched features and the motions on which they agree.
 
-Features that can be told apart at any angle (SIFT, Lowe 2004) are matched between the pictures; the sets that move as
-one rigid body are found by random sampling (RANSAC, Fischler and Bolles 1981), the largest first, and peeled off one
-after another until one of them turns. Scenery, a shoulder, a thing that swings by are other bodies or none.
+Features that are recognised at any rotation (SIFT, Lowe 2004) are matched between the pictures. Sets of matches that
+move as one rigid body are found by random sampling (RANSAC, Fischler and Bolles 1981), the largest first, and removed
+one after another until one of them rotates. Scenery, a shoulder and a thing that swings past are other bodies, or
+belong to none.
 """
 
 from __future__ import annotations
@@ -17,106 +18,117 @@ from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.transforms import apply_motion, fit_rigid, rotation, turn_of
 
 MIN_POINTS = 10
-"""Points; fewer are no body."""
+"""Fewest points that count as a body."""
 MIN_TURN = np.radians(1.0)
-"""Of a body that turns, rad."""
+"""Least rotation of a body that counts as rotating, rad."""
 _FEATURES = 1000
 _FEATURE_CONTRAST = 0.015
-"""SIFT's own threshold is 0.04; skin has little contrast."""
+"""SIFT's contrast threshold. Its default is 0.04, too high for skin."""
 _SIFT_WIDTH_PX = 960
-"""Larger pictures are reduced before features are sought: coarse poses need no more."""
+"""Wider pictures are reduced before features are detected; coarse poses do not need more."""
 _DISTINCT = 0.8
-"""Lowe's ratio of the best match's distance to the second best's."""
+"""Lowe's ratio: largest distance of the best match, relative to that of the second best."""
 _COARSE_PX = 2.5
-"""Tolerance for matched features to move as one body."""
+"""Tolerance for matched features to move as one body, px."""
 _BODIES = 4
-"""Rigid bodies that are peeled off a pair of frames in search of one that turns."""
+"""Rigid bodies that are removed from a pair of pictures in search of one that rotates."""
 _TRIALS = 200
-"""Of two points each."""
-_OUTLYING = 4.0
-"""Times the usual distance from the body's motion beyond which a point is left out."""
+"""Random samples of two points each."""
+_OUTLIER = 4.0
+"""Multiple of the median distance from the body's motion beyond which a point is rejected."""
 
 
 @dataclass(frozen=True)
 class Features:
-    """Places in a picture that can be told apart at any angle."""
+    """The features of one picture."""
 
     points: Floats
     """(k, 2) px."""
     descriptors: NDArray[np.float32]
-    """Of unit length."""
+    """(k, 128) of unit length."""
 
 
 def find_features(grey: Image) -> Features:
-    """Find a picture's features.
+    """Detect a picture's features.
 
     Parameters
     ----------
     grey : ndarray
-        (h, w).
+        (h, w) grey levels.
+
+    Returns
+    -------
+    Features
+        At most 1000.
     """
     reduction = max(1, -(-grey.shape[1] // _SIFT_WIDTH_PX))
     if reduction > 1:
         grey = cv2.resize(grey, None, fx=1 / reduction, fy=1 / reduction, interpolation=cv2.INTER_AREA)
     sift = cv2.SIFT_create(_FEATURES, contrastThreshold=_FEATURE_CONTRAST)  # type: ignore[attr-defined]
-    marks, descriptors = sift.detectAndCompute(grey, None)
-    points = np.array([mark.pt for mark in marks]).reshape(-1, 2)
+    keypoints, descriptors = sift.detectAndCompute(grey, None)
+    points = np.array([keypoint.pt for keypoint in keypoints]).reshape(-1, 2)
     if descriptors is None:
         return Features(points, np.zeros((0, 128), np.float32))
     return Features((points + 0.5) * reduction - 0.5, descriptors / np.linalg.norm(descriptors, axis=1, keepdims=True))
 
 
-def find_body_pose(body: Features, there: Features) -> Floats | None:
-    """Find the motion (3, 3) that carries a body's features onto a picture's; ``None`` where too few agree on any."""
-    pairs = _match(body, there)
-    found = fit_body_motion(body.points[pairs[:, 0]], there.points[pairs[:, 1]], _COARSE_PX)
+def find_body_pose(body: Features, picture: Features) -> Floats | None:
+    """Return the motion (3, 3) from a body's features to a picture's; ``None`` where too few agree on any."""
+    pairs = _match(body, picture)
+    found = fit_body_motion(body.points[pairs[:, 0]], picture.points[pairs[:, 1]], _COARSE_PX)
     return None if found is None else found[0]
 
 
 def find_turning_body(one: Features, other: Features) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
-    """Find the largest set of features that moves as one rigid body and turns.
+    """Find the largest set of features that moves as one rigid body and rotates.
+
+    Parameters
+    ----------
+    one, other : Features
+        Of two pictures.
 
     Returns
     -------
     tuple or None
-        (k, 2) numbers of all features that both pictures have, and which of these k move so; ``None`` where none do.
+        (k, 2) indices of all features that match between the two pictures, and the rows of them that belong to the
+        body; ``None`` where no body rotates.
     """
     pairs = _match(one, other)
     start, end = one.points[pairs[:, 0]], other.points[pairs[:, 1]]
-    left = np.arange(len(pairs))
+    remaining = np.arange(len(pairs))
     for _ in range(_BODIES):
-        body = fit_body_motion(start[left], end[left], _COARSE_PX)
+        body = fit_body_motion(start[remaining], end[remaining], _COARSE_PX)
         if body is None:
             return None
-        motion, among = body
+        motion, members = body
         if abs(turn_of(motion)) >= MIN_TURN:
-            return pairs, left[among]
-        left = np.delete(left, among)
+            return pairs, remaining[members]
+        remaining = np.delete(remaining, members)
     return None
 
 
 def fit_body_motion(start: Floats, end: Floats, tolerance_px: float) -> tuple[Floats, NDArray[np.intp]] | None:
-    """Find the rigid motion on which most points agree, by random sampling of two, and refine it on them.
+    """Find the rigid motion on which most points agree, by random samples of two points, and refine it on them.
 
     Parameters
     ----------
     start, end : ndarray
         (n, 2) the same points in one picture and in the other, px.
     tolerance_px : float
-        How far off a point of the body may be.
+        Largest distance of a point of the body from the motion, px.
 
     Returns
     -------
     tuple or None
-        The motion (3, 3) and the numbers of the points that go along; ``None`` where fewer than `FEWEST` do.
+        The motion (3, 3) and the indices of the points that follow it; ``None`` where fewer than `MIN_POINTS` do.
     """
     n = len(start)
     if n < MIN_POINTS:
         return None
     first, second = np.random.default_rng(0).integers(0, n, (2, _TRIALS))
     a, b = start[second] - start[first], end[second] - end[first]
-    long = np.hypot(*a.T)
-    stiff = (long > 4 * tolerance_px) & (np.abs(long - np.hypot(*b.T)) < 2 * tolerance_px)
+    length = np.hypot(*a.T)
+    stiff = (length > 4 * tolerance_px) & (np.abs(length - np.hypot(*b.T)) < 2 * tolerance_px)
     if not stiff.any():
         return None
     first, second, a, b = first[stiff], second[stiff], a[stiff], b[stiff]
@@ -127,27 +139,27 @@ def fit_body_motion(start: Floats, end: Floats, tolerance_px: float) -> tuple[Fl
     off_x = c * start[:, 0] + s * start[:, 1] + place[:, :1] - end[:, 0]
     off_y = c * start[:, 1] - s * start[:, 0] + place[:, 1:] - end[:, 1]
     agree = off_x**2 + off_y**2 < tolerance_px**2
-    among = np.flatnonzero(agree[agree.sum(axis=1).argmax()])
+    members = np.flatnonzero(agree[agree.sum(axis=1).argmax()])
     motion = np.eye(3)
     for _ in range(3):
-        if len(among) < MIN_POINTS:
+        if len(members) < MIN_POINTS:
             return None
-        motion = fit_rigid(start[among], end[among])
+        motion = fit_rigid(start[members], end[members])
         off = np.hypot(*(end - apply_motion(motion, start)).T)
-        usual = float(np.median(off[among]))
-        among = np.flatnonzero(off < min(tolerance_px, _OUTLYING * max(usual, 0.02)))
-    return (motion, among) if len(among) >= MIN_POINTS else None
+        usual = float(np.median(off[members]))
+        members = np.flatnonzero(off < min(tolerance_px, _OUTLIER * max(usual, 0.02)))
+    return (motion, members) if len(members) >= MIN_POINTS else None
 
 
 def _match(one: Features, other: Features) -> NDArray[np.intp]:
-    """Return (k, 2) numbers of features that are each other's likeness, and nobody else's."""
+    """Return (k, 2) indices of each feature and its best match that pass Lowe's ratio test."""
     if len(one.points) < 2 or len(other.points) < 2:
         return np.zeros((0, 2), np.intp)
-    likeness = one.descriptors @ other.descriptors.T
-    rows = np.arange(len(likeness))
-    best = likeness.argmax(axis=1)
-    first = likeness[rows, best]
-    likeness[rows, best] = -1.0
-    # unit vectors: the square of a distance is 2 − 2·likeness
-    distinct = 1.0 - first < _DISTINCT**2 * (1.0 - likeness.max(axis=1))
+    similarity = one.descriptors @ other.descriptors.T
+    rows = np.arange(len(similarity))
+    best = similarity.argmax(axis=1)
+    first = similarity[rows, best]
+    similarity[rows, best] = -1.0
+    # The squared distance of unit vectors is 2 − 2·similarity.
+    distinct = 1.0 - first < _DISTINCT**2 * (1.0 - similarity.max(axis=1))
     return np.column_stack([rows, best])[distinct]

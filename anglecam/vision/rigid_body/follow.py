@@ -1,9 +1,9 @@
-"""The turn of a rigid head with no mark on it: what moves as one body, and turns, is the head.
+"""Follow a rigid body without a mark: whatever moves as one rigid body, and rotates, is the body.
 
-A few frames, spread over the clip, teach what turns (`anglecam.vision.rigid_body.feature_matching`). Those at different turns are kept as
-keys. Every frame of the clip is turned back onto the nearest key and what is left is followed
-(`anglecam.vision.rigid_body.keyframes`). Each frame is held against a key and not against the frame before it, so errors do not add up
-however long the clip.
+A few frames, spread over the clip, show what rotates (`anglecam.vision.rigid_body.feature_matching`). Frames at
+different angles become keyframes. Every frame of the clip is rotated back onto the nearest keyframe, and the remaining
+displacement is tracked (`anglecam.vision.rigid_body.keyframes`). Each frame is compared with a keyframe and not with
+the frame before it, so errors do not accumulate over the clip.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ from anglecam.vision.rigid_body.feature_matching import (
 from anglecam.vision.rigid_body.keyframes import Keyframe, choose_keyframes, match_keyframe
 from anglecam.vision.status import NO_MARK, OCCLUDED, UNDECODABLE
 
-_LEARNT = 16
-"""Samples from which the head is learnt, at most: they are compared in pairs."""
-_AGREE_SHARE = 0.3
-"""Of a key's points that must be seen, as one body, for a frame to be measured."""
+_MAX_SAMPLES = 16
+"""Samples from which the body is learnt, at most: they are compared in pairs."""
+_MIN_SEEN_SHARE = 0.3
+"""Share of a keyframe's points that must move as one body for a frame to be measured."""
 
 
 def follow_rigid_body(frames: Iterator[Frame], samples: Sequence[Image], noise: float) -> RigidMotion | str:
-    """Find how the head is turned in every frame, from nothing but that it is rigid and turns.
+    """Measure the body's rotation in every frame; nothing is assumed but that the body is rigid and rotates.
 
     Parameters
     ----------
     frames : iterator of Frame
-        The whole clip; read once, one frame at a time.
+        The whole clip; it is read once, one frame at a time.
     samples : sequence of ndarray
         Some of its frames, spread over the clip, (height, width, 3).
     noise : float
@@ -51,54 +51,55 @@ def follow_rigid_body(frames: Iterator[Frame], samples: Sequence[Image], noise: 
     Returns
     -------
     RigidMotion or str
-        Why not, in a few words, where nothing in the clip turns.
+        The cause in a few words where nothing in the clip rotates.
     """
     learnt = _learn([cv2.cvtColor(s, cv2.COLOR_BGR2GRAY) for s in samples], noise)
     if isinstance(learnt, str):
         return learnt
-    head, keys, spread = learnt
-    placed: list[FramePose] = []
-    before: list[tuple[float, Floats]] = []
-    middle = np.concatenate([apply_motion(inverse_motion(k.pose), k.points) for k in keys]).mean(axis=0)
+    body, keyframes, spread = learnt
+    poses: list[FramePose] = []
+    recent: list[tuple[float, Floats]] = []
+    middle = np.concatenate([apply_motion(inverse_motion(k.pose), k.points) for k in keyframes]).mean(axis=0)
     for frame in frames:
-        seen, key, partly = None, keys[0], False
+        match, keyframe, partly = None, keyframes[0], False
         if frame.image is not None:
             grey = cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY)
-            for guess in _guesses(before, frame.time, head, grey):
-                key = min(keys, key=lambda k: abs(turn_of(guess @ inverse_motion(k.pose))))
-                seen = match_keyframe(key, grey, guess @ inverse_motion(key.pose))
-                if seen is not None and seen.inlier.sum() >= _AGREE_SHARE * len(key.points):
+            for guess in _guesses(recent, frame.time, body, grey):
+                keyframe = min(keyframes, key=lambda k: abs(turn_of(guess @ inverse_motion(k.pose))))
+                match = match_keyframe(keyframe, grey, guess @ inverse_motion(keyframe.pose))
+                if match is not None and match.inlier.sum() >= _MIN_SEEN_SHARE * len(keyframe.points):
                     break
-                partly = partly or seen is not None
-                seen = None
-        if seen is None:
-            before = []
-            placed.append(FramePose(UNDECODABLE if frame.image is None else OCCLUDED if partly else NO_MARK))
+                partly = partly or match is not None
+                match = None
+        if match is None:
+            recent = []
+            poses.append(FramePose(UNDECODABLE if frame.image is None else OCCLUDED if partly else NO_MARK))
             continue
-        pose = seen.motion @ key.pose
-        before = [*before[-1:], (frame.time, pose)]
-        rigid = apply_motion(inverse_motion(key.pose), key.points[seen.inlier])
-        placed.append(FramePose(OK, pose, pose_information(pose, rigid - middle) / seen.variance, seen.grouped))
-    return fit_common_centre(placed, middle, spread)
+        pose = match.motion @ keyframe.pose
+        recent = [*recent[-1:], (frame.time, pose)]
+        rigid = apply_motion(inverse_motion(keyframe.pose), keyframe.points[match.inlier])
+        information = pose_information(pose, rigid - middle) / match.variance
+        poses.append(FramePose(OK, pose, information, match.group_ratio))
+    return fit_common_centre(poses, middle, spread)
 
 
-def _guesses(before: list[tuple[float, Floats]], time: float, head: Features, grey: Image) -> Iterator[Floats]:
-    """Yield poses to start from: the motion goes on, it pauses, the head is found anew."""
-    if len(before) == 2:
-        (t0, first), (t1, last) = before
+def _guesses(recent: list[tuple[float, Floats]], time: float, body: Features, grey: Image) -> Iterator[Floats]:
+    """Yield initial poses: the motion continues, it pauses, the body is found anew."""
+    if len(recent) == 2:
+        (t0, first), (t1, last) = recent
         step = last @ inverse_motion(first)
         yield np.linalg.matrix_power(step, max(1, round((time - t1) / (t1 - t0)))) @ last
-    if before:
-        yield before[-1][1]
-    found = find_body_pose(head, find_features(grey))
+    if recent:
+        yield recent[-1][1]
+    found = find_body_pose(body, find_features(grey))
     if found is not None:
         yield found
 
 
 def _learn(samples: Sequence[Image], noise: float) -> tuple[Features, list[Keyframe], float] | str:
-    """Find what turns, and frames to hold the others against."""
+    """Find the features of the body that rotates, and keyframes; or return the cause where there are none."""
     images = _unlike(samples, noise)
-    images = [images[i] for i in np.unique(np.linspace(0, len(images) - 1, _LEARNT).round().astype(int))]
+    images = [images[i] for i in np.unique(np.linspace(0, len(images) - 1, _MAX_SAMPLES).round().astype(int))]
     if len(images) < 2:
         return "nothing moves"
     features = [find_features(image) for image in images]
@@ -113,23 +114,23 @@ def _learn(samples: Sequence[Image], noise: float) -> tuple[Features, list[Keyfr
             turning[i][pairs[inlier, 0]] += 1
             turning[j][pairs[inlier, 1]] += 1
     reference = int(np.argmax([t.sum() for t in turning]))
-    of_head = turning[reference] > 0.5 * matched[reference]
-    if of_head.sum() < MIN_POINTS:
-        return "nothing rigid is seen to turn"
-    head = Features(features[reference].points[of_head], features[reference].descriptors[of_head])
+    of_body = turning[reference] > 0.5 * matched[reference]
+    if of_body.sum() < MIN_POINTS:
+        return "nothing rigid rotates"
+    body = Features(features[reference].points[of_body], features[reference].descriptors[of_body])
     poses: dict[int, Floats] = {}
-    for i, there in enumerate(features):
-        pose = find_body_pose(head, there)
+    for i, picture in enumerate(features):
+        pose = find_body_pose(body, picture)
         if pose is not None:
             poses[i] = pose
     if np.ptp([turn_of(pose) for pose in poses.values()]) < MIN_TURN:
-        return "nothing rigid is seen to turn"
-    keys, spread = choose_keyframes(images, poses, head.points)
-    return (head, keys, spread) if keys else "too little of what turns can be followed"
+        return "nothing rigid rotates"
+    keyframes, spread = choose_keyframes(images, poses, body.points)
+    return (body, keyframes, spread) if keyframes else "too little of the rotating body can be tracked"
 
 
 def _unlike(samples: Sequence[Image], noise: float) -> list[Image]:
-    """Leave out samples that look like one before them: they would cost time and teach nothing."""
+    """Leave out samples that resemble an earlier one: they would cost time and add no information."""
     kept: list[Image] = []
     small: list[Floats] = []
     for sample in samples:

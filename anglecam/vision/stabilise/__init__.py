@@ -1,1 +1,1 @@
-"""The background's motion in a clip whose camera does not stand still."""
+"""The background's motion in a clip whose camera moves."""

@@ -1,4 +1,4 @@
-"""A mouth that turns as its place does is seen square on; one that does not, at a slant."""
+"""A mark whose outline rotates with its place is seen square on; otherwise the view is slanted."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ from anglecam.vision.mark.segment import Region
 TURN = np.radians(np.concatenate([np.linspace(-15, 15, 60), np.linspace(15, -15, 60)]))
 
 
-def outlines(direction, noise=0.0, axes=(9.0, 6.0)):
-    """Regions whose longer axis lies at ``direction`` (n,), their moments scattered by a share ``noise``."""
+def marks(direction, noise=0.0, axes=(9.0, 6.0)):
+    """Return regions with the longer axis at ``direction`` (n,), their moments scattered by a share ``noise``."""
     rng = np.random.default_rng(0)
     regions = []
     for at in direction:
@@ -22,18 +22,18 @@ def outlines(direction, noise=0.0, axes=(9.0, 6.0)):
 
 
 @pytest.mark.parametrize("share", [-0.4, 0.0, 0.2])
-def test_the_share_is_found_and_its_uncertainty_holds_it(share):
-    found, sigma = outline_turn(outlines(2.0 + (1.0 + share) * TURN, noise=0.03), 0.3 + TURN)
+def test_the_share_is_found_within_its_uncertainty(share):
+    found, sigma = outline_turn(marks(2.0 + (1.0 + share) * TURN, noise=0.03), 0.3 + TURN)
     assert sigma < 0.03
     assert abs(found - share) < 3.0 * sigma
 
 
-def test_an_axis_that_points_across_its_own_seam_turns_on():
-    found, _ = outline_turn(outlines(np.pi / 2 + TURN), TURN)
+def test_an_axis_that_crosses_the_end_of_its_range_is_unwrapped():
+    found, _ = outline_turn(marks(np.pi / 2 + TURN), TURN)
     assert found == pytest.approx(0.0, abs=1e-6)
 
 
-def test_a_round_mouth_one_at_rest_and_one_hardly_seen_tell_nothing():
-    assert outline_turn(outlines(TURN, axes=(7.0, 6.9)), TURN) is None
-    assert outline_turn(outlines(np.zeros(40)), np.zeros(40)) is None
-    assert outline_turn(outlines(TURN[:5]), TURN[:5]) is None
+def test_a_round_mark_a_mark_at_rest_and_a_mark_in_few_frames_give_no_share():
+    assert outline_turn(marks(TURN, axes=(7.0, 6.9)), TURN) is None
+    assert outline_turn(marks(np.zeros(40)), np.zeros(40)) is None
+    assert outline_turn(marks(TURN[:5]), TURN[:5]) is None

@@ -1,4 +1,4 @@
-"""Regions of the mouth's colour: each at its place, and none made of nothing."""
+"""Regions of the mark's colour: each at its place, and none without area."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from anglecam.vision.mark.colour import ColourModel
 from anglecam.vision.mark.segment import find_regions
 
 RED = ColourModel(np.array([0.0, 0.0, 1 / 255]), 0.0, 0.01, np.array([0.0, 0.0, 255.0]), np.zeros(2))
-"""The fraction of mouth is the red channel."""
+"""The fraction of mark is the red channel."""
 
 
 def _picture(red: np.ndarray) -> np.ndarray:
     return np.dstack([np.zeros_like(red), np.zeros_like(red), red]).astype(np.uint8)
 
 
-def test_a_square_is_where_it_is_and_as_large_as_it_is():
+def test_a_square_has_its_true_centre_and_area():
     red = np.zeros((60, 80))
     red[20:40, 30:60] = 255
     (region,) = find_regions(_picture(red), RED, 10.0)
@@ -25,7 +25,7 @@ def test_a_square_is_where_it_is_and_as_large_as_it_is():
     assert region.area_px2 == pytest.approx(600.0, rel=0.02)
 
 
-def test_a_thread_between_two_larger_patches_is_no_region_of_its_own():
+def test_a_thread_between_two_larger_patches_is_not_a_separate_region():
     red = np.zeros((60, 80))
     red[10:50, 10:37] = red[10:50, 43:70] = 255
     red[12:48, 39:41] = 255

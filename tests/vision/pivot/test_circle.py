@@ -1,4 +1,4 @@
-"""The centre of rotation from a path: right, robust, and as sure as it says."""
+"""The centre of rotation from a path: accurate, robust, and with a covariance that matches its error."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ def _arc(half_deg, n, rng, noise=0.03, centre=(214.5, 301.3), radius=170.0):
     return np.array(centre) + radius * np.column_stack([np.cos(at), np.sin(at)]) + noise * rng.standard_normal((n, 2))
 
 
-def test_three_points_give_their_circle():
+def test_three_points_determine_a_circle():
     centre, radius = circle_through(np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]) * 50 + 7)
     np.testing.assert_allclose([*centre, radius], [7, 7, 50], atol=1e-9)
 
@@ -34,13 +34,13 @@ def test_a_tenth_of_wrong_points_does_not_move_the_centre():
 @pytest.mark.parametrize("half_deg", [8, 12, 25])
 def test_the_covariance_is_not_too_small(half_deg):
     rng = np.random.default_rng(half_deg)
-    pulls = []
+    squared = []
     for _ in range(40):
         found = fit_circle(_arc(half_deg, 120, rng))
         off = found.centre_px - [214.5, 301.3]
-        pulls.append(off @ np.linalg.solve(found.centre_covariance_px2, off) / 2)
-    # White noise alone: the allowance for slow errors makes the stated uncertainty larger, never smaller.
-    assert np.mean(pulls) < 1.2
+        squared.append(off @ np.linalg.solve(found.centre_covariance_px2, off) / 2)
+    # With white noise alone, the allowance for slow errors makes the stated uncertainty larger, never smaller.
+    assert np.mean(squared) < 1.2
 
 
 def test_a_mark_at_rest_has_no_circle():
@@ -49,7 +49,7 @@ def test_a_mark_at_rest_has_no_circle():
 
 
 @pytest.mark.parametrize("off", [(-2.9, -3.2, -2.5), (2.0, 2.0, 2.0), (-400.0, 35.0, 50.0)])
-def test_a_mark_that_rests_in_two_places_has_their_circle_wherever_the_search_begins(off):
+def test_a_mark_that_rests_in_two_places_has_their_circle_from_any_start(off):
     rng = np.random.default_rng(0)
     at = np.radians(np.concatenate([np.full(140, -17.0), np.linspace(-17.0, 6.0, 15), np.full(40, 0.0)]))
     path = np.array([214.5, 301.3]) + 170.0 * np.column_stack([np.cos(at), np.sin(at)])
@@ -59,7 +59,7 @@ def test_a_mark_that_rests_in_two_places_has_their_circle_wherever_the_search_be
     assert found.fits.all()
 
 
-def test_a_path_that_is_all_but_a_line_has_no_circle():
+def test_a_nearly_straight_path_has_no_circle():
     rng = np.random.default_rng(3)
     along = np.linspace(0.0, 12.0, 40)
     for bend in (0.0, 1e-9, 1e-7):
@@ -69,7 +69,7 @@ def test_a_path_that_is_all_but_a_line_has_no_circle():
         assert circle is None or np.linalg.eigvalsh(circle.centre_covariance_px2).min() > 0.0
 
 
-def test_an_arc_of_two_degrees_has_one():
+def test_an_arc_of_two_degrees_has_a_circle():
     angle = np.radians(np.linspace(0.0, 2.0, 60))
     path = 400.0 * np.column_stack([np.cos(angle), np.sin(angle)])
     circle = fit_circle(path)

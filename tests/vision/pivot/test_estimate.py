@@ -13,7 +13,7 @@ def _path(centre):
     return np.array(centre) + 170 * np.column_stack([np.cos(at), np.sin(at)]) + 0.02 * rng.standard_normal((200, 2))
 
 
-def test_marker_and_motion_that_agree_are_joined():
+def test_marker_and_centre_of_rotation_that_agree_are_combined():
     pivot, note = combine_pivot(
         RoundMarker(np.array([50.02, 60.0]), 0.05**2 * np.eye(2), 9.0), fit_circle(_path((50, 60)))
     )
@@ -23,7 +23,7 @@ def test_marker_and_motion_that_agree_are_joined():
     assert pivot.covariance_px2[0, 0] < 0.05**2
 
 
-def test_a_marker_that_is_not_the_centre_of_rotation_is_reported_and_not_believed():
+def test_a_marker_off_the_centre_of_rotation_is_reported_and_not_used():
     pivot, note = combine_pivot(
         RoundMarker(np.array([50.0, 66.0]), 0.05**2 * np.eye(2), 9.0), fit_circle(_path((50, 60)))
     )

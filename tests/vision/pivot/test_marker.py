@@ -1,4 +1,4 @@
-"""Round markers to a small part of a pixel, wherever they lie on the grid and whatever they look like."""
+"""Round markers are located to a small part of a pixel, at any place on the grid and for any appearance."""
 
 import cv2
 import numpy as np
@@ -9,12 +9,12 @@ from anglecam.vision.pivot.marker import find_marker
 DARK_DISC, BRIGHT_DISC = [(7, 20)], [(12, 240)]
 BLACK_RING, WHITE_RING = [(12, 245), (8, 20), (4, 245)], [(13, 15), (9, 240), (5, 15)]
 ROUGH = 12
-"""Standard deviation of a ground's bumps, grey levels."""
-DRAGGED = pytest.mark.xfail(strict=True, reason="a rough ground drags a disc's one edge by 0.13 px RMS")
+"""Standard deviation of the background's bumps, grey levels."""
+BIASED = pytest.mark.xfail(strict=True, reason="a rough background shifts the only edge of a disc by 0.13 px RMS")
 
 
 def _scene(centre, rings, seed=0, relief=ROUGH):
-    """Draw discs (radius, grey) one on the other, at 8×, on a ground with bumps, with noise of 2 grey levels."""
+    """Draw discs (radius, grey) on top of one another, at 8×, on a bumpy background, with noise of 2 grey levels."""
     rng = np.random.default_rng(seed)
     ground = rng.normal(150, relief, (12, 16)).astype(np.float32)
     bumps = cv2.resize(ground, (160 * 8, 120 * 8), interpolation=cv2.INTER_CUBIC)
@@ -31,15 +31,15 @@ def _scene(centre, rings, seed=0, relief=ROUGH):
     [
         pytest.param(DARK_DISC, 4, id="dark disc"),
         pytest.param(BRIGHT_DISC, 4, id="bright disc"),
-        pytest.param(DARK_DISC, ROUGH, id="dark disc on rough ground", marks=DRAGGED),
-        pytest.param(BRIGHT_DISC, ROUGH, id="bright disc on rough ground", marks=DRAGGED),
+        pytest.param(DARK_DISC, ROUGH, id="dark disc on rough background", marks=BIASED),
+        pytest.param(BRIGHT_DISC, ROUGH, id="bright disc on rough background", marks=BIASED),
         pytest.param(BLACK_RING, ROUGH, id="black ring on white"),
         pytest.param(WHITE_RING, ROUGH, id="white ring on black"),
     ],
 )
-def test_the_centre_is_good_to_a_tenth_of_a_pixel_with_a_hint_12_px_off(rings, relief):
+def test_the_centre_is_accurate_to_a_tenth_of_a_pixel_with_a_hint_12_px_off(rings, relief):
     rng = np.random.default_rng(5)
-    pulls = []
+    squared = []
     for seed in range(12):
         centre = np.array([80.0, 60.0]) + rng.uniform(-5, 5, 2)
         away = rng.uniform(0, 2 * np.pi)
@@ -48,8 +48,8 @@ def test_the_centre_is_good_to_a_tenth_of_a_pixel_with_a_hint_12_px_off(rings, r
         )
         off = found.centre_px - centre
         assert np.hypot(*off) < 0.1
-        pulls.append(off @ np.linalg.solve(found.covariance_px2, off) / 2)
-    assert np.mean(pulls) < 1.7
+        squared.append(off @ np.linalg.solve(found.covariance_px2, off) / 2)
+    assert np.mean(squared) < 1.7
 
 
 def test_no_marker_is_found_where_there_is_none():

@@ -1,4 +1,4 @@
-"""The whole head against the mouth alone, on a film whose truth is known to a ten-thousandth of a degree."""
+"""Angles from the whole body on a film whose truth is known to a ten-thousandth of a degree."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def swing(tmp_path_factory):
     return measure_clip(folder / "session" / "swing.avi", Rig()), truth
 
 
-def test_the_whole_head_gives_the_angle_to_a_thousandth_of_a_degree(swing):
+def test_the_whole_body_gives_the_angle_to_a_thousandth_of_a_degree(swing):
     measured, truth = swing
     assert measured.why_coarse is None
     assert measured.series.status == ("ok",) * 90
@@ -37,15 +37,15 @@ def test_the_whole_head_gives_the_angle_to_a_thousandth_of_a_degree(swing):
     np.testing.assert_allclose(registered.pivot_px, pivot, atol=0.02)
 
 
-def test_sigma_is_true(swing):
+def test_sigma_matches_the_error(swing):
     measured, truth = swing
-    # without a command the median is zero
+    # Without a command the zero is the median.
     error = np.degrees(measured.series.angle) - truth["angle_deg"]
     error -= np.median(error)
     assert 0.5 < np.sqrt(np.mean((error / np.degrees(measured.series.sigma)) ** 2)) < 1.3
 
 
-def test_the_mouths_place_in_a_frame_stays_what_was_seen_there(swing):
+def test_the_marks_place_in_a_frame_is_the_one_seen_in_that_frame(swing):
     measured, truth = swing
-    away = measured.series.mark_px - np.column_stack([truth["mouth_x_px"], truth["mouth_y_px"]])
-    assert np.hypot(*away.T).max() < 0.5
+    off = measured.series.mark_px - np.column_stack([truth["mouth_x_px"], truth["mouth_y_px"]])
+    assert np.hypot(*off.T).max() < 0.5

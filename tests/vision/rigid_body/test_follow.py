@@ -1,4 +1,4 @@
-"""A head followed with nothing on it that marks it: a person's nod, and a textured room with a thing that swings."""
+"""A body without a mark: a person's nod, and a textured room with another thing that swings."""
 
 import itertools
 
@@ -37,8 +37,8 @@ def numbered(images, rate_hz=30.0):
     return (Frame(i, i / rate_hz, image) for i, image in enumerate(images))
 
 
-def off(motion, angle_deg):
-    """Return the error of the turn, deg, the median taken out, and its ratio to sigma."""
+def errors(motion, angle_deg):
+    """Return the error of the turn less its median, deg, and its ratio to sigma."""
     error = np.degrees(motion.turn) - angle_deg
     error -= np.nanmedian(error)
     return error, error / np.degrees(motion.sigma)
@@ -61,23 +61,23 @@ def nod(tmp_path_factory):
 
 def test_a_nod_of_seventy_degrees_in_a_third_of_a_second_is_followed(nod):
     motion, truth = nod
-    error, ratio = off(motion, truth["angle_deg"])
+    error, ratio = errors(motion, truth["angle_deg"])
     resting = np.abs(np.gradient(truth["angle_deg"])) < 0.05
     reach_px = 150.0
     assert np.radians(rms(error[resting])) * reach_px < 0.2
-    # at 7° a frame, blurred over 7 px, with levels that are no measure of light
+    # At 7° a frame, blurred over 7 px, with grey levels that are not proportional to light.
     assert np.radians(rms(error[~resting])) * reach_px < 0.6
     assert 0.3 < rms(ratio) < 2.0
 
 
 def test_the_centre_of_rotation_needs_no_marker(nod):
     motion, truth = nod
-    away = motion.pivot_px - [truth["pivot_x_px"][0], truth["pivot_y_px"][0]]
-    assert np.hypot(*away) < 0.6
-    assert away @ np.linalg.solve(motion.pivot_covariance_px2, away) < 25
+    off = motion.pivot_px - [truth["pivot_x_px"][0], truth["pivot_y_px"][0]]
+    assert np.hypot(*off) < 0.6
+    assert off @ np.linalg.solve(motion.pivot_covariance_px2, off) < 25
 
 
-def test_what_is_hidden_is_lost_and_found_again(nod):
+def test_a_hidden_body_is_lost_and_found_again(nod):
     motion, truth = nod
     ok = np.array([s == "ok" for s in motion.status])
     assert set(motion.status) <= {"ok", "no_mouth", "occluded"}
@@ -85,7 +85,7 @@ def test_what_is_hidden_is_lost_and_found_again(nod):
     lost = np.flatnonzero(~ok)
     assert 0 < len(lost) < 16
     assert ok[-30:].all()
-    assert np.nanmax(np.abs(off(motion, truth["angle_deg"])[0])) < 0.6
+    assert np.nanmax(np.abs(errors(motion, truth["angle_deg"])[0])) < 0.6
 
 
 @pytest.fixture(scope="module")
@@ -95,10 +95,10 @@ def swinging():
     return look, angles, list(draw_frames(look, angles, seed=4))
 
 
-def test_a_textured_room_and_a_thing_that_swings_are_not_the_head(swinging):
+def test_a_textured_room_and_another_swinging_thing_are_not_the_body(swinging):
     look, angles, images = swinging
     motion = follow_rigid_body(numbered(images), sampled(images, 8), look.noise)
-    error, ratio = off(motion, -angles)
+    error, ratio = errors(motion, -angles)
     assert rms(error) < 0.01
     assert rms(ratio) < 1.5
     assert motion.status == ("ok",) * 40
@@ -106,7 +106,7 @@ def test_a_textured_room_and_a_thing_that_swings_are_not_the_head(swinging):
     assert look.pivot[0] - 250 < motion.centre_px[0] < look.pivot[0] + 50
 
 
-def test_errors_do_not_add_up_with_the_length_of_the_clip_and_every_frame_has_its_row(swinging):
+def test_errors_do_not_accumulate_over_a_long_clip_and_every_frame_has_its_row(swinging):
     look, angles, images = swinging
     rounds = 3
     long = [None if i == 50 else image for i, image in enumerate(images * rounds)]
@@ -115,18 +115,18 @@ def test_errors_do_not_add_up_with_the_length_of_the_clip_and_every_frame_has_it
     assert motion.status[50] == "undecodable"
     turns = motion.turn.reshape(rounds, -1)
     assert rms(np.degrees(turns[-1] - turns[0])) < 0.005
-    assert rms(off(motion, np.tile(-angles, rounds))[0]) < 0.01
+    assert rms(errors(motion, np.tile(-angles, rounds))[0]) < 0.01
 
 
-def test_a_clip_in_which_nothing_turns_says_so(swinging):
+def test_a_clip_in_which_nothing_rotates_gives_the_cause(swinging):
     look = swinging[0]
     images = list(draw_frames(look, np.zeros(6), seed=2))
     assert isinstance(follow_rigid_body(numbered(images), sampled(images), look.noise), str)
     assert isinstance(follow_rigid_body(numbered(images[:1] * 20), images[:1] * 5, look.noise), str)
 
 
-@pytest.mark.skipif(not FILM.exists(), reason="the real film is not here")
-def test_a_plain_ball_has_nothing_to_tell_its_turn_by():
-    """Its centre moves on a circle; whether it turns on its thread is not to be seen."""
+@pytest.mark.skipif(not FILM.exists(), reason="the real film is not available")
+def test_a_plain_ball_shows_no_rotation():
+    """Its centre moves on a circle, but its rotation on the thread is not visible."""
     images = [frame.image for frame in itertools.islice(open_film(FILM).frames(), 0, 60)]
     assert isinstance(follow_rigid_body(numbered(images, 24.0), images[::10], 2.0), str)

@@ -1,4 +1,4 @@
-"""How the camera moved, against films whose every frame is known, and against films in which it stands still."""
+"""The camera's motion, against films with a known motion, and against films in which it stands still."""
 
 import cv2
 import numpy as np
@@ -6,9 +6,10 @@ import pytest
 import yaml
 
 from anglecam.video.film import open_film
-from anglecam.vision.stabilise.background_motion import CameraMove, brightness
+from anglecam.vision.stabilise.background_motion import CameraMove
 from anglecam.vision.stabilise.learn import learn_background
 from anglecam.vision.stabilise.scenery import find_scenery
+from anglecam.vision.stabilise.tile_cuts import brightness
 from support.drawn import Look, draw_frames
 from synth.session import render
 
@@ -16,7 +17,7 @@ SWING = {"name": "swing", "duration_s": 1.0, "command": {"kind": "random", "ampl
 
 
 def film(folder, **spec):
-    """Render a short film; return its path, and where each frame truly shows the pivot."""
+    """Render a short film; return its path, the true place of the pivot in each frame, and the times."""
     (folder / "spec.yaml").write_text(yaml.safe_dump({"seed": 7, "recordings": [SWING], **spec}))
     render(folder / "spec.yaml", folder / "session", folder / "truth")
     (clip,) = (folder / "session").glob("swing.[am]*")
@@ -25,14 +26,14 @@ def film(folder, **spec):
 
 
 def follow(clip):
-    steady = learn_background([frame.image for frame in open_film(clip).sample(32).frames])
-    return steady, [steady.at(frame.image) for frame in open_film(clip).frames()]
+    background = learn_background([frame.image for frame in open_film(clip).sample(32).frames])
+    return background, [background.at(frame.image) for frame in open_film(clip).frames()]
 
 
 def errors(moves, pivots):
     error = np.array([move.to_frame(pivots[0]) for move in moves]) - pivots
     sigma = np.sqrt([np.diag(move.place_covariance(pivots[0])) for move in moves])
-    # the reference is good to a frame's own error only
+    # The reference has the error of a single frame, which is common to all.
     return error - error.mean(axis=0), sigma
 
 
@@ -44,34 +45,34 @@ def raw(tmp_path_factory):
 
 
 def test_a_shaking_camera_is_followed_to_some_thousandths_of_a_pixel(raw):
-    steady, moves, pivots = raw
-    assert not steady.rolls
+    background, moves, pivots = raw
+    assert not background.rolls
     assert np.sqrt((errors(moves, pivots)[0] ** 2).mean()) < 0.005
 
 
-def test_the_uncertainty_is_true(raw):
+def test_the_uncertainty_matches_the_error(raw):
     _, moves, pivots = raw
     error, sigma = errors(moves, pivots)
     assert 0.7 < np.sqrt(((error / sigma) ** 2).mean()) < 1.4
 
 
-def test_a_frame_whose_scenery_is_covered_says_so(raw):
-    steady, moves, _ = raw
+def test_a_frame_whose_scenery_is_covered_has_no_known_motion(raw):
+    background, moves, _ = raw
     assert all(move.known for move in moves)
-    assert not steady.at(np.full((480, 640, 3), 128, np.uint8)).known
+    assert not background.at(np.full((480, 640, 3), 128, np.uint8)).known
 
 
-def test_a_roll_is_told_from_the_heads_turn(tmp_path):
+def test_a_roll_is_separated_from_the_bodys_rotation(tmp_path):
     camera = {"codec": "mjpeg", "fps": 30, "shake": {"rms_px": 1.0, "frequency_hz": 4}}
     clip, pivots, time = film(tmp_path, camera=camera, effects={"angle_drift": {"rate_deg_per_s": 0.5}})
-    steady, moves = follow(clip)
-    assert steady.rolls
+    background, moves = follow(clip)
+    assert background.rolls
     rate = np.polyfit(time, np.degrees([move.roll for move in moves]), 1)[0]
     assert rate == pytest.approx(0.5, abs=0.02)
     assert np.sqrt((errors(moves, pivots)[0] ** 2).mean()) < 0.01
 
 
-def test_a_shake_of_a_third_of_a_pixel_is_seen_in_a_lossy_film():
+def test_a_shake_of_a_third_of_a_pixel_is_detected_in_a_lossy_film():
     images = []
     for image, shift in zip(draw_frames(Look(), 20.0 * np.sin(np.arange(12))), shaking(12, 0.3), strict=True):
         moved = cv2.warpAffine(image, np.column_stack([np.eye(2), shift]), image.shape[1::-1], flags=cv2.INTER_CUBIC)
@@ -90,7 +91,7 @@ def shaking(frames, rms_px):
 
 
 @pytest.mark.parametrize("look", [Look(distractor="pendulum"), Look(facing="left", background="gradient")])
-def test_a_camera_that_stands_still_does_not_shake_though_head_and_light_do(look):
+def test_a_camera_at_rest_does_not_shake_while_body_and_light_change(look):
     images = list(draw_frames(look, 20.0 * np.sin(np.arange(12))))
     lit = [np.clip(image * (1.0 + 0.1 * np.sin(k)), 0, 255).astype(np.uint8) for k, image in enumerate(images)]
     assert not shakes(images)
@@ -98,9 +99,9 @@ def test_a_camera_that_stands_still_does_not_shake_though_head_and_light_do(look
     assert learn_background(lit) is None
 
 
-def test_points_come_back():
+def test_points_mapped_to_the_frame_and_back_are_unchanged():
     move = CameraMove(np.array([300.0, 200.0]), np.array([2.0, -1.0]), 0.01, np.eye(3))
     points = np.array([[0.0, 0.0], [640.0, 480.0]])
     np.testing.assert_allclose(move.to_reference(move.to_frame(points)), points, atol=1e-9)
-    # counter-clockwise as seen: what lies to the right goes up
+    # Counter-clockwise as seen: a point to the right moves up.
     assert move.to_frame(np.array([400.0, 200.0]))[1] < 199.0
