@@ -69,9 +69,9 @@ def detect_mark(path: Path, rig: Rig, progress: Callable[[int, int], None] | Non
     def placed(i: int, point: Floats) -> Floats:
         return lens.rectify(moves[i].to_reference(point) if moves else point)
 
-    found = find_mark(images, rig.mouth_rgb, near, placed) if images else None
+    found = find_mark(images, rig.mark_rgb, near, placed) if images else None
     if found is None:
-        head = detect_rigid_body(path, rig) if rig.mouth_rgb is None and images else None
+        head = detect_rigid_body(path, rig) if rig.mark_rgb is None and images else None
         if isinstance(head, Detections):
             return head
         besides = "" if head is None else f"; nor can the head be followed without one: {head}"
@@ -202,7 +202,7 @@ def _read_regions(
 
 
 def _colour(rig: Rig) -> str:
-    return "auto" if rig.mouth_rgb is None else ",".join(map(str, rig.mouth_rgb))
+    return "auto" if rig.mark_rgb is None else ",".join(map(str, rig.mark_rgb))
 
 
 def _no_mouth(path: Path, sample: Sample, rig: Rig) -> str:

@@ -223,7 +223,7 @@ def test_a_distortion_that_turns_back_within_the_picture_is_refused(tmp_path):
     [
         ("{tilt_deg: 85}", "camera.tilt_deg: input should be less than 80"),
         ("{tilt: 15}", "unknown key camera.tilt"),
-        ("{calibration: c.yaml, focal_px: 800}", "camera: focal_px stands in the calibration already"),
+        ("{calibration: c.yaml, focal_px: 800}", "camera: focal_px is already in the calibration"),
     ],
 )
 def test_a_wrong_declaration_is_said_in_one_line(tmp_path, text, said):

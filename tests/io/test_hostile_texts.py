@@ -158,9 +158,9 @@ def test_json_that_is_no_model_is_refused(tmp_path, name, text):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("time_s,command_deg\n0,1e300\n", "no recording has that"),
+        ("time_s,command_deg\n0,1e300\n", "too large for a recording"),
         ("time_s,command_deg\n0,nan\n", "not a number"),
-        ("time_s,time_s,command_deg\n0,0,1\n", "stands twice"),
+        ("time_s,time_s,command_deg\n0,0,1\n", "appears twice"),
         ("time_s,command_deg\n0," + "x" * 100_000 + "\n", "not a number"),
         ("time_s,command_deg\n0," + "x" * 200_000 + "\n", "field larger"),
         ("time_s,command_deg\n0,\x00\n", "not a number"),
