@@ -124,13 +124,13 @@ def test_a_view_seen_wrongly_is_left_out():
 
 def test_a_clip_without_a_board_is_said_so(tmp_path):
     write_pictures(tmp_path / "wall.mkv", [np.full((480, 640), 120.0)] * 3)
-    with pytest.raises(InputError, match=r"wall.mkv: chessboard of 9×6 inner corners not seen in any of 3 frames"):
+    with pytest.raises(InputError, match=r"wall.mkv: chessboard of 9×6 inner corners not found in any of 3 frames"):
         calibrate_clip(tmp_path / "wall.mkv", BOARD)
 
 
 def test_too_few_poses_are_said_so(tmp_path):
     film_board(tmp_path / "still.mkv", CAMERA, poses(2, camera=CAMERA), hold=4)
-    with pytest.raises(InputError, match=r"seen in . of 8 frames searched, but in only 2 different poses"):
+    with pytest.raises(InputError, match=r"found in . of 8 frames searched, but in only 2 different poses"):
         calibrate_clip(tmp_path / "still.mkv", BOARD)
 
 
