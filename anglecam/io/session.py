@@ -189,7 +189,7 @@ def _choose_tracks(directory: Path, rig: Rig) -> tuple[dict[str, Path], list[str
     files = sorted(find_tracks(directory), key=lambda p: (len(p.stem), p.stem, p.suffix.lower() == ".csv"))
     for path in files:
         if rig.marks is None:
-            unused.append(f"{path}: not used; name its points in rig.yaml: marks: {{mouth: …, pivot: …}}")
+            unused.append(f"{path}: not used; name its points with marks: {{mouth: …, pivot: …}} in rig.yaml")
             continue
         used = chosen.setdefault(recording_name(path), path)
         if used.stem != path.stem:

@@ -206,4 +206,4 @@ def test_tracks_stand_in_the_place_of_their_clip_where_the_rig_tells_them(tmp_pa
     assert find_measurable(tmp_path, rig) == ([tracks, tmp_path / "b.avi"], [])
     clips, (idle,) = find_measurable(tmp_path, Rig())
     assert [clip.name for clip in clips] == ["a.avi", "b.avi"]
-    assert "not used; name its points in rig.yaml: marks: {mouth: …, pivot: …}" in idle
+    assert "not used; name its points with marks: {mouth: …, pivot: …} in rig.yaml" in idle
