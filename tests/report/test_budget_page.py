@@ -58,8 +58,8 @@ def test_the_page_holds_the_numbers_and_the_figures(written):
     assert "src=" not in page
     assert f"{math.degrees(budget.bounds[-1].worst):.3f}" in page
     assert "0.408°" in page
-    for course in budget.terms_over_time:
-        assert course.name in page
+    for term in budget.terms_over_time:
+        assert term.name in page
     assert "None" not in page
     assert "nan" not in page.replace("provenance", "")
 
