@@ -247,7 +247,7 @@ def _check_border(lens: Lens, size: tuple[int, int], path: Path) -> None:
     error = np.nan_to_num(np.abs(returned - grid).max(axis=-1), nan=np.inf)
     if folded.any() or (error > _RETURNS_PX).any():
         x, y = grid[np.unravel_index(np.argmax(np.where(folded, np.inf, error)), error.shape)]
-        raise RigError(f"{path}: its distortion cannot be undone at pixel {x:.0f},{y:.0f} of the picture")
+        raise RigError(f"{path}: its distortion cannot be inverted at pixel {x:.0f},{y:.0f} of the picture")
 
 
 def _deviate(calibration: Calibration) -> list[Calibration]:

@@ -302,9 +302,9 @@ def readers() -> dict[str, Reader]:
 
 def main() -> None:
     """Run the cases; exit status 1 if there is a finding."""
-    asked = arguments(__doc__)
+    options = arguments(__doc__)
     trial = Trial(readers, seconds=SECONDS, most_bytes=MOST_BYTES)
-    sys.exit(1 if run_all(cases(asked.cases, asked.seed, asked.first), trial, asked.keep) else 0)
+    sys.exit(1 if run_all(cases(options.cases, options.seed, options.first), trial, options.keep) else 0)
 
 
 if __name__ == "__main__":

@@ -214,7 +214,7 @@ def test_a_calibration_of_another_picture_is_refused(tmp_path):
 
 def test_a_distortion_that_turns_back_within_the_picture_is_refused(tmp_path):
     write_calibration(_calibration(-0.9, 400.0), tmp_path / "c.yaml")
-    with pytest.raises(RigError, match="cannot be undone at pixel"):
+    with pytest.raises(RigError, match="cannot be inverted at pixel"):
         lens_from_rig(_rig(calibration=str(tmp_path / "c.yaml")), SIZE, "swing.avi")
 
 
