@@ -1,4 +1,4 @@
-"""What can go wrong outside our own code, as exceptions whose text is the one line that the user reads."""
+"""Exceptions for faults in a call or in a file; their text is the one line that the user reads."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from unicodedata import category
 
 
 class AnglecamError(Exception):
-    """Base of every failure that is told to the user in one line: ``what: how much, what next``.
+    """Base of every failure that the user reads as one line: ``what: how much, what next``.
 
-    One line it is whatever a file is called and whatever stands in it: see `printable`.
+    The text stays on one line whatever a file's name and content are: see `printable`.
     """
 
     def __init__(self, line: str) -> None:
@@ -19,16 +19,16 @@ class AnglecamError(Exception):
 
 
 class RigError(AnglecamError):
-    """The call, the rig file or the make-up of a session is wrong; nothing can be done with it (exit status 2)."""
+    """The call, the rig file or the composition of a session is wrong, so nothing can be done (exit status 2)."""
 
 
 class InputError(AnglecamError):
-    """One clip, series or command file cannot be used; the others of the call still can (exit status 1)."""
+    """One clip, series or command file cannot be used; the others of the call still can be (exit status 1)."""
 
 
 @contextmanager
 def blame(path: Path) -> Iterator[None]:
-    """Turn a fault of our own into an `InputError` that names the file, so that it costs that file alone."""
+    """Turn an unexpected exception into an `InputError` that names the file, so that only that file fails."""
     try:
         yield
     except AnglecamError:
@@ -42,5 +42,13 @@ def blame(path: Path) -> Iterator[None]:
 
 
 def printable(text: str) -> str:
-    """Return text that every file and terminal takes on one line, whatever bytes a file's name is made of."""
+    r"""Return a text in which every control character, line break and unpaired surrogate is escaped.
+
+    The result is one line that any file and terminal accepts, whatever bytes a file's name consists of.
+
+    Examples
+    --------
+    >>> printable("nod\n.avi")
+    'nod\\n.avi'
+    """
     return "".join(c.encode("unicode_escape").decode() if category(c) in ("Cc", "Cs", "Zl", "Zp") else c for c in text)

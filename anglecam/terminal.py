@@ -1,4 +1,4 @@
-"""What every command prints to, and the folder that it writes to."""
+"""The consoles that every command prints to, and its output folder."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ errors = Console(stderr=True, soft_wrap=True, highlight=False, markup=False, emo
 
 
 def make_folder(out: Path) -> None:
-    """Make a folder for results, unless it is there.
+    """Create a folder for results if it does not exist.
 
     Raises
     ------
     RigError
-        Where it cannot be made, or written to.
+        If the folder cannot be created or written to.
     """
     if out.is_file():
         raise RigError(f"--out {out}: is a file; give a folder")
@@ -29,7 +29,7 @@ def make_folder(out: Path) -> None:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
         raise RigError(f"--out {out}: this folder cannot be made ({problem.strerror})") from problem
-    try:  # before the work, not after it
+    try:  # fail before the work, not after it
         with tempfile.TemporaryFile(dir=out):
             pass
     except OSError as problem:

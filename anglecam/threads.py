@@ -1,4 +1,4 @@
-"""How many threads one clip or session may take."""
+"""Number of threads that one clip or session may use."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import os
 
 
 def native_threads() -> int:
-    """Return how many threads to use: ``OMP_NUM_THREADS`` where it is set, as in other programs, else all cores."""
+    """Return the number of threads to use: ``OMP_NUM_THREADS`` if it is set, as in other programs, else all cores."""
     stated = os.environ.get("OMP_NUM_THREADS", "")
     return int(stated) if stated.isdecimal() and int(stated) > 0 else cores()
 
 
 def cores() -> int:
-    """Count the cores that this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -1,1 +1,1 @@
-"""The uncertainty budget: every term of the angle's uncertainty, by the rules of the GUM."""
+"""The uncertainty budget: every term of the angle's uncertainty, combined by the rules of the GUM."""

@@ -1,4 +1,4 @@
-"""A clip's uncertainty budget: at its typical frame, at its worst, over all of it, and the bounds of the paper."""
+"""A clip's uncertainty budget: in a typical frame, in the worst frame, over the clip, and the bounds of the paper."""
 
 from __future__ import annotations
 
@@ -15,50 +15,51 @@ from anglecam.data.typing import Floats
 from anglecam.measurement.sigma import worst_case, worst_case_both_ends
 
 PAPER = ((6.0, 0.28), (10.0, 0.68))
-"""Pixel error, px, and what the paper says it does to the angle, degrees (text on Fig. 8)."""
+"""Pixel errors, px, and the angle errors that the paper states for them, degrees (text on Fig. 8)."""
 
 
 @dataclass(frozen=True)
 class FrameBudget:
-    """The uncertainty of one frame's angle; in degrees, because digits count in the unit that is stated."""
+    """The uncertainty of one frame's angle, in degrees, because significant digits refer to the stated unit."""
 
     index: int
-    """Among the measured frames."""
+    """Index among the measured frames."""
     frame: int
+    """Number of the frame in the clip."""
     time: float
-    """s."""
+    """Time of the frame, s."""
     angle_deg: float
     lever_px: float
     sigma_deg: float
-    """Of the terms that the series' sigma holds."""
+    """Standard uncertainty from the terms that the series' sigma contains."""
     combined: Combined
-    """Of all terms, by the GUM."""
+    """Uncertainty from all terms, by the GUM."""
     drawn: Propagated
-    """By Monte Carlo, uncertain standard uncertainties widened to Student's t."""
+    """Distribution by Monte Carlo; uncertain standard uncertainties widen their term to Student's t."""
     comparison: Comparison
-    """Of both."""
+    """Comparison of ``combined`` with ``drawn``."""
     drawn_as_known: Propagated
-    """By Monte Carlo, every standard uncertainty taken as known."""
+    """Distribution by Monte Carlo with every standard uncertainty taken as known."""
     linearity: Comparison
-    """Of that with ± 1.960·u: what linearisation alone costs."""
+    """Comparison of ``drawn_as_known`` with ± 1.960·u: the effect of linearisation alone."""
 
 
 @dataclass(frozen=True)
 class PixelBound:
-    """What a place wrong by up to so many pixels does to the angle, rad: answers to different questions."""
+    """The angle error, rad, due to a position that is wrong by up to a number of pixels, by four definitions."""
 
     radius_px: float
-    """r."""
+    """Radius r of the circle of possible positions, px."""
     lever_px: float
-    """R, the arm that the rest was computed at."""
+    """Lever arm R, px."""
     worst: float
-    """At most, the mouth anywhere within the circle: asin(r/R)."""
+    """Largest error with the mark anywhere within the circle: asin(r/R)."""
     worst_both: float
-    """At most, mouth and pivot each anywhere within theirs: asin(2r/R)."""
+    """Largest error with mark and pivot each anywhere within a circle: asin(2r/R)."""
     standard: float
-    """Standard uncertainty, the mouth uniformly distributed in the disc, so r/2 along the path: r/(2R)."""
+    """Standard uncertainty with the mark uniformly distributed in the disc, hence r/2 along the path: r/(2R)."""
     standard_both: float
-    """The same at both ends: r/(√2·R)."""
+    """Standard uncertainty with mark and pivot each uniformly distributed in a disc: r/(√2·R)."""
 
 
 @dataclass(frozen=True)
@@ -66,21 +67,21 @@ class Budget:
     """The uncertainty of a clip's angles."""
 
     name: str
-    """The recording's."""
+    """Name of the recording."""
     sources: ErrorSources
     terms_over_time: tuple[TermOverTime, ...]
     sigma: Floats
-    """(n,) of the terms that the series' sigma holds, rad."""
+    """(n,) standard uncertainty from the terms that the series' sigma contains, rad."""
     total: Floats
-    """(n,) of all terms, rad."""
+    """(n,) standard uncertainty from all terms, rad."""
     typical: FrameBudget
-    """The frame of the median uncertainty."""
+    """The frame with the median uncertainty."""
     worst: FrameBudget
-    """The frame of the largest."""
+    """The frame with the largest uncertainty."""
     bounds: tuple[PixelBound, ...]
-    """By radius, at the clip's median lever arm."""
+    """Bounds by radius, at the clip's median lever arm."""
     notes: tuple[str, ...]
-    """What is not in it, and what that could cost, a line each."""
+    """What the budget does not include, and what that could contribute; one line each."""
 
     @property
     def lever_px(self) -> float:
@@ -89,26 +90,26 @@ class Budget:
 
 
 def budget_of(name: str, sources: ErrorSources, radii_px: tuple[float, ...] = CONTRACT_RADII_PX) -> Budget:
-    """Work out a clip's uncertainty budget.
+    """Compute a clip's uncertainty budget.
 
     Parameters
     ----------
     name : str
-        The recording's.
+        Name of the recording.
     sources : ErrorSources
-        What errs in it.
+        Its error sources.
     radii_px : tuple of float
-        Pixel errors to bound, beside the contract's.
+        Radii of the pixel bounds, in addition to 6 px and 10 px.
 
     Returns
     -------
     Budget
-        The same for the same sources: the drawing is seeded.
+        Equal sources give equal budgets: the Monte Carlo has a fixed seed.
     """
     terms = terms_over_time(sources)
-    variance = np.array([c.contribution**2 for c in terms])
+    variance = np.array([term.contribution**2 for term in terms])
     total = np.sqrt(variance.sum(axis=0))
-    sigma = np.sqrt(variance[[c.in_sigma for c in terms]].sum(axis=0))
+    sigma = np.sqrt(variance[[term.in_sigma for term in terms]].sum(axis=0))
     order = np.argsort(total)
     lever = float(np.median(sources.lever_px))
     return Budget(
@@ -120,12 +121,19 @@ def budget_of(name: str, sources: ErrorSources, radii_px: tuple[float, ...] = CO
         typical=_frame(sources, terms, sigma, int(order[(len(order) - 1) // 2])),
         worst=_frame(sources, terms, sigma, int(order[-1])),
         bounds=tuple(pixel_bound(r, lever) for r in sorted({*CONTRACT_RADII_PX, *radii_px})),
-        notes=_not_in_it(sources),
+        notes=_not_included(sources),
     )
 
 
 def pixel_bound(radius_px: float, lever_px: float) -> PixelBound:
-    """Return worst cases and standard uncertainties for places wrong by up to ``radius_px`` at an arm."""
+    """Return worst cases and standard uncertainties of the angle for positions within ``radius_px`` at a lever arm.
+
+    Examples
+    --------
+    >>> bound = pixel_bound(6.0, 843.0)
+    >>> [round(math.degrees(angle), 3) for angle in (bound.worst, bound.worst_both, bound.standard)]
+    [0.408, 0.816, 0.204]
+    """
     return PixelBound(
         radius_px,
         lever_px,
@@ -137,7 +145,7 @@ def pixel_bound(radius_px: float, lever_px: float) -> PixelBound:
 
 
 def budget_as_dict(budget: Budget) -> dict[str, Any]:
-    """Return what ``NAME.budget.json`` holds; degrees of freedom that are infinite become ``null`` there."""
+    """Return the content of ``NAME.budget.json``; infinite degrees of freedom become ``null`` in the file."""
     s = budget.sources
     mean2 = float((budget.total**2).mean())
     return {
@@ -162,12 +170,12 @@ def budget_as_dict(budget: Budget) -> dict[str, Any]:
             "combined_deg": math.degrees(math.sqrt(mean2)),
             "terms": [
                 {
-                    "name": c.name,
-                    "in_sigma": c.in_sigma,
-                    "contribution_deg": math.degrees(math.sqrt((c.contribution**2).mean())),
-                    "share": float((c.contribution**2).mean()) / mean2,
+                    "name": term.name,
+                    "in_sigma": term.in_sigma,
+                    "contribution_deg": math.degrees(math.sqrt((term.contribution**2).mean())),
+                    "share": float((term.contribution**2).mean()) / mean2,
                 }
-                for c in budget.terms_over_time
+                for term in budget.terms_over_time
             ],
         },
         "bounds": [
@@ -189,12 +197,20 @@ def budget_as_dict(budget: Budget) -> dict[str, Any]:
 
 
 def implied_lever(radius_px: float, stated_deg: float) -> float:
-    """Return the lever arm, px, at which a worst case of so many pixels is the stated angle: r / sin θ."""
+    """Return the lever arm, px, at which the worst case of a pixel error r is the stated angle θ: r / sin θ.
+
+    Examples
+    --------
+    The two angles that the paper states do not belong to one lever arm:
+
+    >>> [round(implied_lever(radius, stated)) for radius, stated in PAPER]
+    [1228, 843]
+    """
     return radius_px / math.sin(math.radians(stated_deg))
 
 
 def _frame(sources: ErrorSources, terms: tuple[TermOverTime, ...], sigma: Floats, i: int) -> FrameBudget:
-    stated = [course.at(i) for course in terms]
+    stated = [term.at(i) for term in terms]
     certain = replace(sources, noise_dof=math.inf, pose_dof=math.inf, pivot_dof=math.inf)
     combined, as_known = combine(stated), combine([replace(term, dof=math.inf) for term in stated])
     drawn, drawn_as_known = (_draw_degrees(s, i) for s in (sources, certain))
@@ -244,10 +260,10 @@ def _frame_as_dict(budget: Budget, one: FrameBudget) -> dict[str, Any]:
                 "sensitivity_unit": f"°/{t.unit}",
                 "contribution_deg": t.contribution,
                 "share": share,
-                "in_sigma": course.in_sigma,
+                "in_sigma": over_time.in_sigma,
                 "known": t.known,
             }
-            for course, t, share in zip(budget.terms_over_time, combined.terms, combined.shares, strict=True)
+            for over_time, t, share in zip(budget.terms_over_time, combined.terms, combined.shares, strict=True)
         ],
         "monte_carlo": _drawn_as_dict(one.drawn, one.comparison),
         "monte_carlo_uncertainties_as_known": _drawn_as_dict(one.drawn_as_known, one.linearity),
@@ -268,22 +284,22 @@ def _drawn_as_dict(drawn: Propagated, comparison: Comparison) -> dict[str, Any]:
     }
 
 
-def _not_in_it(s: ErrorSources) -> tuple[str, ...]:
-    """Say what nothing is known about, and what a plausible amount of it would cost at the clip's worst moment."""
+def _not_included(s: ErrorSources) -> tuple[str, ...]:
+    """Return a line on each unknown error, with the effect of a plausible amount of it in the clip's worst frame."""
     farthest = float(np.abs(np.sin(s.angle)).max())
     fastest = float(np.abs(s.speed).max())
     notes = []
     if s.neutral is None:
-        notes.append("neutral is declared: a definition, without an uncertainty of its own")
+        notes.append("neutral is declared: it is a definition and has no uncertainty")
     if s.lens_px is None:
-        cost = math.degrees(0.1 / float(s.lever_px.min()))
+        effect = math.degrees(0.1 / float(s.lever_px.min()))
         notes.append(
-            f"no calibration of the lens: distortion that moves the mouth 0.1 px along its path costs {cost:.3f}°"
+            f"no calibration of the lens: a distortion that shifts the mark by 0.1 px along its path adds {effect:.3f}°"
         )
     if s.tilt is None:
-        cost = math.degrees(0.5 * math.radians(3.0) ** 2 * farthest)
-        notes.append(f"no tilt is declared: a camera 3° off the axis of rotation costs up to {cost:.3f}°")
+        effect = math.degrees(0.5 * math.radians(3.0) ** 2 * farthest)
+        notes.append(f"no tilt is declared: a camera 3° off the axis of rotation adds up to {effect:.3f}°")
     if s.exposure_s is None and s.clock_s is None:
-        cost = math.degrees(fastest * 1e-3)
-        notes.append(f"no error of the time: 1 ms is worth up to {cost:.3f}° at the fastest moment")
+        effect = math.degrees(fastest * 1e-3)
+        notes.append(f"no error of the time: 1 ms adds up to {effect:.3f}° at the fastest moment")
     return tuple(notes)

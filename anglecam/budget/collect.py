@@ -1,4 +1,4 @@
-"""From a measured clip to what errs in it."""
+"""Collect the error sources of a measured clip."""
 
 from __future__ import annotations
 
@@ -16,44 +16,45 @@ from anglecam.measurement.clip import Measurement
 from anglecam.measurement.registration_pass import Registered
 
 _MARKER_DOF = 10.0
-"""Of a marker's covariance: twelve sectors of its edge less two coordinates."""
+"""Degrees of freedom of a marker's covariance: twelve sectors of its edge minus two coordinates."""
 _MAD_EFFICIENCY = 0.37
-"""Of a median absolute deviation as an estimate of a normal spread."""
+"""Statistical efficiency of the median absolute deviation as an estimate of a normal standard deviation."""
 _FEWEST_REPEATS = 20
-"""Below, noise is taken from the pixels (`anglecam.measurement.sigma.place_errors`)."""
+"""Number of frames in repeated poses below which the noise comes from the pixels
+(`anglecam.measurement.sigma.place_errors`)."""
 
 
 def error_sources(measured: Measurement, rig: Rig) -> ErrorSources:
-    """Gather from a measured clip what errs in it.
+    """Collect the error sources of a measured clip.
 
     Parameters
     ----------
     measured : Measurement
-        Of the clip.
+        The measured clip.
     rig : Rig
-        That it was measured with.
+        The rig that it was measured with.
 
     Returns
     -------
     ErrorSources
-        Such that its terms give the series' sigma, frame by frame.
+        Sources whose terms combine to the series' sigma in every frame.
     """
     series, angles = measured.series, measured.angles
-    # A duplicate was measured, and has its part in neutral, before it was found out.
+    # A duplicate frame is detected after it was measured, so it contributes to neutral.
     rows = np.array([i for i, status in enumerate(series.status) if status in (OK, "duplicate")])
     kept = series.ok[rows]
     mirrored = rig.facing == "left"
     _, pose, count = np.unique(np.round(angles.mark_px), axis=0, return_inverse=True, return_counts=True)
-    several, poses = count[count > 1], max(len(count) - 3.0, 1.0)
-    noise, registration, pull, mouth_on_head = angles.errors.noise_px, None, None, None
+    repeats, poses = count[count > 1], max(len(count) - 3.0, 1.0)
+    noise, registration, sensitivity, mark_on_body = angles.errors.noise_px, None, None, None
     pose_px, pivot_dof = angles.errors.pose_px, _pivot_dof(angles.pivot.source, poses)
     neutral = None
     if angles.resting is not None:
         neutral = _neutral(angles, angles.resting, pose.reshape(-1), mirrored)
     if angles.registered is not None:
-        # Fitted to some thousand pixels of a hundred frames: what is uncertain about its uncertainty does not count.
+        # The fit uses some thousand pixels of a hundred frames, so its uncertainty is well known.
         pose_px, pivot_dof = 0.0, math.inf
-        registration, pull, noise, mouth_on_head, neutral = _by_registration(
+        registration, sensitivity, noise, mark_on_body, neutral = _by_registration(
             angles, angles.registered, rows, neutral, mirrored
         )
     return ErrorSources(
@@ -68,13 +69,13 @@ def error_sources(measured: Measurement, rig: Rig) -> ErrorSources:
         pivot_source=angles.pivot.source,
         pivot_dof=pivot_dof,
         noise_px=noise[kept],
-        noise_dof=_MAD_EFFICIENCY * (several - 1).sum() if several.sum() >= _FEWEST_REPEATS else math.inf,
+        noise_dof=_MAD_EFFICIENCY * (repeats - 1).sum() if repeats.sum() >= _FEWEST_REPEATS else math.inf,
         pose_px=pose_px,
         pose_dof=poses,
         neutral=neutral,
         registration=None if registration is None else registration[kept],
-        pivot_sensitivity=None if pull is None else pull[kept],
-        mouth_on_head=None if mouth_on_head is None else mouth_on_head[kept],
+        pivot_sensitivity=None if sensitivity is None else sensitivity[kept],
+        mark_on_body=None if mark_on_body is None else mark_on_body[kept],
         lens_px=(angles.view.lens * angles.lever_px)[kept] if angles.view.lens.any() else None,
         tilt=angles.view.tilt,
         within_exposure=angles.within_exposure[kept] if angles.within_exposure.any() else None,
@@ -83,20 +84,20 @@ def error_sources(measured: Measurement, rig: Rig) -> ErrorSources:
 
 
 def _pivot_dof(source: str, poses: float) -> float:
-    """Of two sources return those of the one that knows less: both together are no less sure than that."""
+    """Return the pivot's degrees of freedom; of two sources the smaller number, as both together have no fewer."""
     dof = [_MARKER_DOF] if "marker" in source else []
     return min([*dof, poses] if "centre" in source else dof)
 
 
 def _neutral(angles: Angles, resting: Flags, pose: NDArray[np.int64], mirrored: bool) -> Neutral:
     upright = np.array([-1.0 if mirrored else 1.0, -1.0])
-    places = (angles.mark_px[resting] - angles.pivot.centre_px) * upright
-    ahead, up = (places / np.hypot(*places.T)[:, None]).mean(axis=0)
+    position = (angles.mark_px[resting] - angles.pivot.centre_px) * upright
+    ahead, up = (position / np.hypot(*position.T)[:, None]).mean(axis=0)
     frames = int(resting.sum())
     return Neutral(
         frames=frames,
         poses=len(np.unique(pose[resting])),
-        place_px=places.mean(axis=0),
+        place_px=position.mean(axis=0),
         along=np.array([-up, ahead]),
         noise_px=math.sqrt(float((angles.errors.noise_px[resting] ** 2).mean()) / frames),
     )
@@ -105,24 +106,36 @@ def _neutral(angles: Angles, resting: Flags, pose: NDArray[np.int64], mirrored: 
 def _by_registration(
     angles: Angles, found: Registered, rows: NDArray[np.int64], neutral: Neutral | None, mirrored: bool
 ) -> tuple[Floats, Floats, Floats, Floats | None, Neutral]:
-    """Return registration, pull, noise of the mouth where the head was not found, mouth on head, and neutral.
+    """Return the error sources of an angle measured by registration.
 
-    Everything is what `anglecam.measurement.angles.fine_angles` made sigma of. A declared neutral leaves the mean over all frames
-    in its place, and what the line itself stands on: the mouth's place on the head.
+    They are the sources from which `anglecam.measurement.angles.fine_angles` computes sigma. If neutral is declared,
+    the reference is the mean over all frames, and the absolute line adds the error of the mark's position on the body.
+
+    Returns
+    -------
+    registration : ndarray
+        (n,) standard uncertainty of the rotation, rad.
+    sensitivity : ndarray
+        (n, 2) pivot sensitivity, rad/px.
+    noise : ndarray
+        (n,) standard uncertainty of the mark in frames without a registration, px.
+    mark_on_body : ndarray or None
+        (n,) standard uncertainty of the absolute line, rad; ``None`` if neutral is not declared.
+    neutral : Neutral
+        The reference line.
     """
-    sigma, pull = found.sigma[rows], found.pivot_sensitivity[rows]
-    seen = np.isfinite(found.turn[rows])
-    used = seen if angles.resting is None else angles.resting & seen
-    some = bool(used.any())
+    sigma, sensitivity = found.sigma[rows], found.pivot_sensitivity[rows]
+    registered = np.isfinite(found.turn[rows])
+    used = registered if angles.resting is None else angles.resting & registered
     shared = angles.shared
-    mean = pull[used].mean(axis=0) if some else np.zeros(2)
-    pull = np.where(seen[:, None], pull, mean)
-    off = pull - mean
-    by_pivot = np.einsum("ni,ij,nj->n", off, angles.pivot.covariance_px2, off)
-    explained = by_pivot + shared**2 + angles.within_exposure**2 + np.where(seen, sigma**2, 0.0)
+    mean = sensitivity[used].mean(axis=0) if used.any() else np.zeros(2)
+    sensitivity = np.where(registered[:, None], sensitivity, mean)
+    difference = sensitivity - mean
+    by_pivot = np.einsum("ni,ij,nj->n", difference, angles.pivot.covariance_px2, difference)
+    explained = by_pivot + shared**2 + angles.within_exposure**2 + np.where(registered, sigma**2, 0.0)
     rest = np.sqrt(np.maximum(angles.sigma**2 - explained, 0.0))
-    alone = np.where(seen, 0.0, rest * angles.lever_px)
-    mouth_on_head = np.where(seen, rest, 0.0) if neutral is None else None
-    stand_in = neutral or _neutral(angles, used, np.zeros(len(rows), np.int64), mirrored)
-    fine = Neutral(int(used.sum()), stand_in.poses, stand_in.place_px, stand_in.along, 0.0, shared, mean)
-    return np.where(seen, sigma, 0.0), pull, alone, mouth_on_head, fine
+    noise = np.where(registered, 0.0, rest * angles.lever_px)
+    mark_on_body = np.where(registered, rest, 0.0) if neutral is None else None
+    reference = neutral or _neutral(angles, used, np.zeros(len(rows), np.int64), mirrored)
+    fine = Neutral(int(used.sum()), reference.poses, reference.place_px, reference.along, 0.0, shared, mean)
+    return np.where(registered, sigma, 0.0), sensitivity, noise, mark_on_body, fine

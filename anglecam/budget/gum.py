@@ -1,9 +1,9 @@
-"""The arithmetic of measurement uncertainty: terms joined by the GUM, and checked by drawing.
+"""The arithmetic of measurement uncertainty: terms combined by the GUM, and checked by Monte Carlo.
 
-JCGM 100 (the GUM) adds the variances of the inputs, each times the square of its sensitivity, and widens the result
-by Student's t for what its terms are not sure of. JCGM 101 (its Supplement 1) draws the inputs and looks at what the
-model makes of them; where both agree within the digits that are stated, the shorter way is valid. Nothing here knows
-what is measured.
+JCGM 100 (the GUM) adds the variances of the inputs, each multiplied by the square of its sensitivity, and widens the
+result by Student's t for terms whose uncertainty is itself uncertain. JCGM 101 (its Supplement 1) draws the inputs and
+propagates them through the model. If both agree within the stated digits, the GUM's result is validated. This module
+does not depend on what is measured.
 """
 
 from __future__ import annotations
@@ -21,45 +21,46 @@ from anglecam.data.typing import Floats
 Distribution = Literal["normal", "uniform"]
 
 COVERAGE = 0.95
-"""Probability of every coverage interval here."""
+"""Coverage probability of every interval in this module."""
 DIGITS = 2
 """Significant digits of a stated uncertainty (JCGM 100, 7.2.6)."""
 _BLOCK = 10_000
 """Trials of one round: the larger of 100/(1 − p) and 10⁴ (JCGM 101, 7.9.4 b)."""
 _MOST_TRIALS = 4_000_000
-"""Leaves an error of 0.3 % of the standard uncertainty; δ at two digits is never smaller than 0.5 %."""
+"""Largest number of trials. They leave an error of 0.3 % of the standard uncertainty; δ at two digits is never smaller
+than 0.5 %."""
 _NEAR = 0.008
 """Probability on either side over which an interval's width is smoothed."""
 _ROUNDS = 3
-"""In which the trough's middle is looked for about the one before."""
+"""Iterations that locate the minimum of the width, each around the last result."""
 _VALIDATING = 5.0
-"""To validate, the drawing must be this many times surer than the tolerance (JCGM 101, 8.2)."""
+"""Ratio of δ to the numerical error of the Monte Carlo that a validation requires (JCGM 101, 8.2)."""
 
 
 @dataclass(frozen=True)
 class Term:
-    """One input's part in the uncertainty of a result."""
+    """The contribution of one input to the uncertainty of a result."""
 
     name: str
-    """What errs."""
+    """Name of the input's error."""
     unit: str
-    """Of the input."""
+    """Unit of the input."""
     estimate: float
     """Best estimate of the input, in ``unit``; 0 for an error that is not corrected."""
     uncertainty: float
     """Standard uncertainty of the input, in ``unit``."""
     distribution: Distribution
-    """What the input is taken to be distributed like; normal with finite ``dof`` means Student's t."""
+    """Distribution that the input is assumed to have; normal with finite ``dof`` means Student's t."""
     sensitivity: float
-    """Change of the result for a unit of the input."""
+    """Change of the result per unit of the input."""
     dof: float = math.inf
-    """Degrees of freedom of ``uncertainty``; infinite where it is taken as known."""
+    """Degrees of freedom of ``uncertainty``; infinite if it is taken as known."""
     known: str = ""
-    """How the uncertainty is known."""
+    """What the uncertainty is known from, with its type of evaluation, A or B."""
 
     @property
     def contribution(self) -> float:
-        """Standard uncertainty that the input brings to the result, in the result's unit."""
+        """Standard uncertainty of the result due to this input, in the result's unit."""
         return abs(self.sensitivity) * self.uncertainty
 
     @property
@@ -74,7 +75,7 @@ class Combined:
 
     terms: tuple[Term, ...]
     shares: tuple[float, ...]
-    """Part of the variance that each term brings; 1 in sum."""
+    """Share of the variance that each term contributes; their sum is 1."""
     standard: float
     """Combined standard uncertainty."""
     dof: float
@@ -87,78 +88,86 @@ class Combined:
 
 @dataclass(frozen=True)
 class Propagated:
-    """The distribution of a result as drawn, in the unit that it was drawn in."""
+    """The distribution of a result by Monte Carlo, in the unit of the drawn results."""
 
     estimate: float
     """Mean."""
     standard: float
     """Standard deviation."""
     low: float
-    """Lower end of the shortest interval that holds 95 %."""
+    """Lower end of the shortest interval that contains 95 %."""
     high: float
-    """Upper end."""
+    """Upper end of that interval."""
     trials: int
     error: float
-    """Twice the largest standard error of mean, standard deviation and both ends, as more trials would move them."""
+    """Numerical error: twice the largest standard error of the mean, the standard deviation and both ends."""
     tolerance: float
-    """What ``error`` was to reach; it is larger only where the trials came to an end before."""
+    """Target for ``error``; ``error`` is larger only if the number of trials reached its limit."""
     density: Floats
-    """(b,) density in equal bins between ``edges``."""
+    """(b,) probability density in equal bins between ``edges``."""
     edges: Floats
-    """(b + 1,)."""
+    """(b + 1,) edges of the bins."""
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Whether the GUM's interval is the drawn one (JCGM 101, clause 8)."""
+    """Comparison of the GUM's interval with the Monte Carlo interval (JCGM 101, clause 8)."""
 
     tolerance: float
     """δ: half a unit of the last stated digit of the standard uncertainty."""
     low: float
-    """Distance of the lower ends."""
+    """Distance between the lower ends."""
     high: float
-    """Distance of the upper ends."""
+    """Distance between the upper ends."""
 
     @property
     def agrees(self) -> bool:
-        """Whether neither distance is larger than δ."""
+        """Whether no distance is larger than δ, so that the GUM's interval is validated."""
         return max(self.low, self.high) <= self.tolerance
 
 
 def combine(terms: Sequence[Term]) -> Combined:
-    """Join independent terms: root of the sum of squares, Welch–Satterthwaite, Student's t.
+    """Combine independent terms: root of the sum of squares, Welch–Satterthwaite, Student's t.
 
     Parameters
     ----------
     terms : sequence of Term
-        Of one result, in its unit.
+        Terms of one result, in its unit.
 
     Returns
     -------
     Combined
         u_c² = Σ (c·u)² (JCGM 100, Eq. 11a), ν = u_c⁴ / Σ (c·u)⁴/ν_i (Eq. G.2b), U = t(0.95, ν)·u_c (Eq. G.1d).
-        ν is not cut to an integer; t is interpolated (G.4.1).
+        ν is not truncated to an integer; t is interpolated (G.4.1).
+
+    Examples
+    --------
+    >>> noise = Term("noise", "px", 0.0, 0.03, "normal", 0.1)
+    >>> pivot = Term("pivot", "px", 0.0, 0.05, "normal", 0.08, dof=10.0)
+    >>> total = combine([noise, pivot])
+    >>> round(total.standard, 6), round(total.dof, 4), round(total.coverage_factor, 3)
+    (0.005, 24.4141, 2.062)
     """
-    parts = np.array([t.contribution for t in terms])
-    standard = float(np.sqrt((parts**2).sum()))
-    shares = (parts / standard) ** 2 if standard > 0.0 else np.zeros(len(parts))
-    # Through shares, because fourth powers of small angles leave the range of numbers in which they can be divided.
-    doubt = float((shares**2 / np.array([t.dof for t in terms])).sum())
-    dof = 1.0 / doubt if doubt > 0.0 else math.inf
+    contributions = np.array([t.contribution for t in terms])
+    standard = float(np.sqrt((contributions**2).sum()))
+    shares = (contributions / standard) ** 2 if standard > 0.0 else np.zeros(len(contributions))
+    # Computed from shares, because the fourth power of a small angle would underflow.
+    inverse_dof = float((shares**2 / np.array([t.dof for t in terms])).sum())
+    dof = 1.0 / inverse_dof if inverse_dof > 0.0 else math.inf
     factor = coverage_factor(dof)
     return Combined(tuple(terms), tuple(map(float, shares)), standard, dof, factor, factor * standard)
 
 
 def coverage_factor(dof: float) -> float:
-    """Return k for 95 %: Student's t, 1.960 where the degrees of freedom are infinite."""
+    """Return k for 95 %: Student's t, or 1.960 if the degrees of freedom are infinite."""
     upper = (1.0 + COVERAGE) / 2.0
     return float(special.ndtri(upper) if math.isinf(dof) else special.stdtrit(dof, upper))
 
 
 def widening(rng: np.random.Generator, dof: float, trials: int) -> Floats:
-    """Draw what turns a normal error into Student's t: √(ν/χ²), 1 where the degrees of freedom are infinite.
+    """Draw factors that turn a normal error into Student's t: √(ν/χ²), or 1 if the degrees of freedom are infinite.
 
-    Errors whose uncertainty was estimated together share one draw of it (JCGM 101, 6.4.9).
+    Errors whose uncertainty was estimated together share one draw of the factor (JCGM 101, 6.4.9).
     """
     return np.ones(trials) if math.isinf(dof) else np.sqrt(dof / rng.chisquare(dof, trials))
 
@@ -169,14 +178,21 @@ def numerical_tolerance(uncertainty: float, digits: int = DIGITS) -> float:
     Parameters
     ----------
     uncertainty : float
-        In the unit in which it will be stated: the digits counted are decimal ones of that unit.
+        Standard uncertainty in the unit in which it will be stated, because the digits are decimals of that unit.
     digits : int
-        Significant ones.
+        Number of significant digits.
 
     Returns
     -------
     float
-        For 0.0237 and two digits, 24·10⁻³, it is 0.0005.
+        δ, in the same unit.
+
+    Examples
+    --------
+    0.0237 is stated with two digits as 24·10⁻³:
+
+    >>> numerical_tolerance(0.0237)
+    0.0005
     """
     if uncertainty <= 0.0:
         return 0.0
@@ -189,45 +205,45 @@ def numerical_tolerance(uncertainty: float, digits: int = DIGITS) -> float:
 def propagate(
     draw: Callable[[np.random.Generator, int], Floats], *, seed: int = 0, digits: int = DIGITS, most: int = _MOST_TRIALS
 ) -> Propagated:
-    """Draw results until their mean, standard deviation and 95 % interval stand still (JCGM 101, 7.9.4).
+    """Draw results until their mean, standard deviation and 95 % interval have converged (JCGM 101, 7.9.4).
 
-    Rounds of 10⁴ trials are added until twice the standard error of all four over the rounds is at most a fifth of
-    `numerical_tolerance`, which is what the comparison with the GUM asks for (8.2).
+    Rounds of 10⁴ trials are added until twice the standard error over the rounds of each of these four numbers is at
+    most a fifth of `numerical_tolerance`, as the comparison with the GUM requires (8.2).
 
     Parameters
     ----------
     draw : callable
         Called with a generator and a number m; returns (m,) results, in the unit in which they will be stated.
     seed : int
-        Of the generator.
+        Seed of the generator.
     digits : int
-        Significant digits of the standard uncertainty that count.
+        Significant digits of the standard uncertainty that must converge.
     most : int
-        Trials after which it ends in any case.
+        Largest number of trials.
 
     Returns
     -------
     Propagated
-        From all trials together.
+        The distribution of all trials together.
     """
     rng = np.random.default_rng(seed)
     rounds: list[Floats] = []
-    told: list[tuple[float, float, float, float]] = []
+    statistics: list[tuple[float, float, float, float]] = []
     sums = np.zeros(2)
     tolerance, error = 0.0, math.inf
     while error > tolerance and (len(rounds) + 1) * _BLOCK <= most:
         results = np.sort(draw(rng, _BLOCK))
         rounds.append(results)
-        told.append((float(results.mean()), float(results.std(ddof=1)), *shortest_interval(results)))
-        # About the first result, lest the squares of a large angle swallow a small uncertainty.
-        off = results - rounds[0][0]
-        sums += off.sum(), (off**2).sum()
+        statistics.append((float(results.mean()), float(results.std(ddof=1)), *shortest_interval(results)))
+        # Relative to the first result, because the square of a large angle would swamp a small uncertainty.
+        difference = results - rounds[0][0]
+        sums += difference.sum(), (difference**2).sum()
         if len(rounds) < 2:
             continue
         trials = len(rounds) * _BLOCK
         spread = math.sqrt(max(sums[1] - sums[0] ** 2 / trials, 0.0) / (trials - 1))
         tolerance = numerical_tolerance(spread, digits) / _VALIDATING
-        error = 2.0 * float(np.std(told, axis=0, ddof=1).max()) / math.sqrt(len(told))
+        error = 2.0 * float(np.std(statistics, axis=0, ddof=1).max()) / math.sqrt(len(statistics))
     values = np.sort(np.concatenate(rounds))
     low, high = shortest_interval(values)
     reach = np.quantile(values, [0.0005, 0.9995])
@@ -246,11 +262,11 @@ def propagate(
 
 
 def shortest_interval(values: Floats) -> tuple[float, float]:
-    """Return the ends of the shortest interval that holds 95 % of sorted values (JCGM 101, 5.3.4 and 7.7).
+    """Return the ends of the shortest interval that contains 95 % of sorted values (JCGM 101, 5.3.4 and 7.7).
 
-    The width of an interval hardly changes near the shortest one, so the least of many drawn widths lies anywhere
-    about it. A parabola through the widths nearby finds the middle of the trough; where there is none, because the
-    distribution ends steeply, the least width stands.
+    The width of an interval hardly changes near the shortest one, so the smallest of many drawn widths is found
+    anywhere near the minimum. A parabola fitted to the widths nearby locates the minimum. If there is no such minimum,
+    because the distribution ends steeply, the smallest width is used.
 
     Parameters
     ----------
@@ -261,6 +277,14 @@ def shortest_interval(values: Floats) -> tuple[float, float]:
     -------
     low, high : float
         Two of the values.
+
+    Examples
+    --------
+    A density that falls from zero: the interval starts at zero and leaves out the upper tail.
+
+    >>> low, high = shortest_interval(np.linspace(0.0, 1.0, 1001) ** 2)
+    >>> low, round(high, 2)
+    (0.0, 0.9)
     """
     held = round(COVERAGE * len(values))
     width = values[held:] - values[:-held]
@@ -279,7 +303,7 @@ def shortest_interval(values: Floats) -> tuple[float, float]:
 
 
 def compare(estimate: float, combined: Combined, propagated: Propagated, digits: int = DIGITS) -> Comparison:
-    """Compare the GUM's 95 % interval with the drawn one (JCGM 101, 8.1).
+    """Compare the GUM's 95 % interval with the Monte Carlo interval (JCGM 101, 8.1).
 
     Parameters
     ----------
@@ -288,9 +312,9 @@ def compare(estimate: float, combined: Combined, propagated: Propagated, digits:
     combined : Combined
         Its uncertainty by the GUM, in the same unit as ``propagated``.
     propagated : Propagated
-        Its distribution as drawn.
+        Its distribution by Monte Carlo.
     digits : int
-        Significant digits of the standard uncertainty that count.
+        Significant digits of the standard uncertainty, for δ.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""A clip of a chessboard -> the camera's calibration, how sure it is, and which pictures it stands on.
+"""Calibrate a camera from a clip of a chessboard: the calibration, its covariance and the pictures it is based on.
 
-The sharpest frame of each stretch of the clip is searched for the board; of what is found, views that differ are
-kept. Distortion gets as many terms as predict views that were not fitted better, no more.
+The sharpest frame of each stretch of the clip is searched for the board, and views that differ are kept. A distortion
+term is added only if it improves the prediction of views that were held out of the fit.
 """
 
 from __future__ import annotations
@@ -20,21 +20,23 @@ from anglecam.errors import InputError
 from anglecam.video.film import Film
 
 _STRETCHES = 120
-"""Parts of the clip from each of which one frame is searched."""
+"""Number of parts of the clip; one frame of each is searched."""
 _MOST_VIEWS = 40
 _FEWEST_VIEWS = 6
 _APART = 0.02
-"""Of the picture's diagonal: views whose board's corners all lie nearer than this are the same view."""
+"""Share of the picture's diagonal: two views count as the same if each corner moves by less from one to the other."""
 _FITTED = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 60, 1e-10)
 _BAD = 4.0
-"""Robust standard deviations above the median at which a view's error means that its board was seen wrongly …"""
+"""A view is rejected if its error exceeds the median by more than this many robust standard deviations …"""
 _BAD_SHARE = 2.5
-"""… and least multiple of it: good views differ by a factor of two, as the board is near or far, lit well or badly."""
+"""… and exceeds this multiple of the median: errors of good views differ by a factor of two, because the board is near
+or far and lit well or badly."""
 _WORTH = 2.0
-"""Standard errors by which further terms must predict held-out views better."""
+"""Number of standard errors by which further distortion terms must improve the prediction of held-out views."""
 _FOLDS = 5
+"""Number of parts for the cross-validation of the distortion terms."""
 _LOOSE_FOCAL = 0.03
-"""Relative uncertainty of the focal length above which the views say too little."""
+"""Relative uncertainty of the focal length above which a calibration is refused."""
 
 _ALWAYS = cv2.CALIB_FIX_ASPECT_RATIO | cv2.CALIB_FIX_K3
 _MODELS = (
@@ -43,36 +45,36 @@ _MODELS = (
     (("k1", "k2"), _ALWAYS | cv2.CALIB_ZERO_TANGENT_DIST),
     (("k1", "k2", "p1", "p2"), _ALWAYS),
 )
-"""Distortion terms from few to many; pixels are square in all."""
+"""Distortion models from few to many terms, with OpenCV's flags; all have square pixels."""
 
 
 @dataclass(frozen=True, eq=False)
 class BoardView:
-    """One picture of the board that was used."""
+    """One picture of the board that the calibration uses."""
 
     frame: int
     corners_px: Floats
-    """(n, 2) as found."""
+    """(n, 2) corners as found."""
     residuals_px: Floats
-    """(n, 2) found less reprojected."""
+    """(n, 2) corners as found minus corners as reprojected."""
 
 
 @dataclass(frozen=True, eq=False)
 class BoardCalibration:
-    """A calibration and what it stands on."""
+    """A calibration and the views that it is based on."""
 
     calibration: Calibration
     terms: tuple[str, ...]
     """Distortion coefficients that the views support; the others are zero."""
     held_out_px: dict[str, float]
-    """RMS error of views that were not fitted, by the terms of the model, px."""
+    """RMS error of held-out views by the terms of the distortion model, px."""
     views: tuple[BoardView, ...]
     rejected: int
-    """Views whose corners did not fit with the others."""
+    """Number of views whose corners do not agree with the other views."""
     reach: float
-    """How far out corners were seen, as a share of the way from the picture's middle to its corner."""
+    """Largest distance of a corner from the picture's middle, as a share of the distance to the picture's corner."""
     notes: tuple[str, ...]
-    """What the user should know, a line each."""
+    """Remarks for the user, one line each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,42 +95,42 @@ class _Fit:
 
 
 def calibrate_clip(film: Film, board: tuple[int, int], square_m: float = 1.0) -> BoardCalibration:
-    """Calibrate a camera from a clip in which a chessboard is shown to it in many poses.
+    """Calibrate a camera from a clip that shows a chessboard in many poses.
 
     Parameters
     ----------
     film : Film
         The clip.
     board : tuple of int
-        Inner corners, columns and rows: a board of 10 by 7 squares has (9, 6).
+        Number of inner corners, columns and rows: a board of 10 by 7 squares has (9, 6).
     square_m : float
-        Side of a square, m. It scales the board's distances, never the calibration.
+        Side of a square, m. It scales the distances to the board and does not affect the calibration.
 
     Returns
     -------
     BoardCalibration
-        Camera matrix, distortion, covariance, and what they stand on.
+        Camera matrix, distortion, covariance and the views that they are based on.
 
     Raises
     ------
     InputError
-        Where the clip cannot be read, the board is not seen, seen in too few poses, or never at a slant.
+        If the clip cannot be read, or the board is not found, found in too few poses, or never at a slant.
     """
     clip = film.path
     if min(board) < 3 or not square_m > 0.0:
-        raise InputError(f"{clip}: a board needs at least 3×3 inner corners and squares larger than nothing")
+        raise InputError(f"{clip}: a board needs at least 3×3 inner corners and squares larger than zero")
     size = film.size
     name = f"chessboard of {board[0]}×{board[1]} inner corners"
     seen, searched = _search(film, board)
     if not seen:
         raise InputError(
-            f"{clip}: {name} not seen in any of {searched} frames searched; count the corners where four squares"
+            f"{clip}: {name} not found in any of {searched} frames searched; count the corners where four squares"
             " meet, and show the whole board with a white rim"
         )
     found = _diverse(seen, math.hypot(*size))
     if len(found) < _FEWEST_VIEWS:
         raise InputError(
-            f"{clip}: {name} seen in {len(seen)} of {searched} frames searched, but in only {len(found)} different"
+            f"{clip}: {name} found in {len(seen)} of {searched} frames searched, but in only {len(found)} different"
             f" poses; at least {_FEWEST_VIEWS} are needed, 15 are good: move and lean the board"
         )
     X = np.zeros((board[0] * board[1], 3))
@@ -146,16 +148,16 @@ def calibrate_clip(film: Film, board: tuple[int, int], square_m: float = 1.0) ->
     loose = math.sqrt(covariance[0, 0]) / fit.K[0, 0]
     if not loose < _LOOSE_FOCAL:
         raise InputError(
-            f"{clip}: the focal length stays uncertain by {100 * loose:.0f} %: the board is always seen nearly square"
-            " on; lean it by 20° to 40°, to all sides"
+            f"{clip}: the focal length remains uncertain by {100 * loose:.0f} % because the board always faces the"
+            " camera; lean it by 20° to 40° to all sides"
         )
     middle = (np.array(size) - 1) / 2
     reach = max(float(np.hypot(*(c - middle).T).max()) for c in corners) / float(np.hypot(*middle))
     notes = []
     if reach < 0.8:
-        notes.append(f"corners reach {reach:.0%} of the way to the picture's corner; farther out the lens is a guess")
+        notes.append(f"corners reach {reach:.0%} of the way to the picture's corner; beyond, the lens is extrapolated")
     if len(kept) < 15:
-        notes.append(f"{len(kept)} poses of the board; 15 and more are better")
+        notes.append(f"{len(kept)} poses of the board; 15 or more are better")
     return BoardCalibration(
         calibration=Calibration(size, fit.K, fit.distortion, covariance, fit.rms, len(kept)),
         terms=terms,
@@ -170,7 +172,7 @@ def calibrate_clip(film: Film, board: tuple[int, int], square_m: float = 1.0) ->
 
 
 def _search(film: Film, board: tuple[int, int]) -> tuple[list[_Seen], int]:
-    """Find the board in the sharpest frame of each stretch of a clip; say how many frames were searched."""
+    """Find the board in the sharpest frame of each stretch of a clip; also return how many frames were searched."""
     sharpness = [
         -1.0 if f.image is None else float(cv2.Laplacian(cv2.cvtColor(f.image, cv2.COLOR_BGR2GRAY), cv2.CV_32F).var())
         for f in film.frames()
@@ -187,26 +189,29 @@ def _search(film: Film, board: tuple[int, int]) -> tuple[list[_Seen], int]:
 
 
 def _diverse(seen: list[_Seen], diagonal: float) -> list[_Seen]:
-    """Keep views that differ, at most `_MOST_VIEWS`, the farthest from those kept first; of one pose the sharpest."""
-    # a board may be counted from either end: both orders are the same pose
-    there = np.array([np.stack([view.corners, view.corners[::-1]]) for view in seen])
+    """Select views that differ, at most `_MOST_VIEWS`: repeatedly the one farthest from those selected so far.
+
+    Of views of the same pose, the sharpest is taken.
+    """
+    # the corners may be listed from either end of the board: both orders are the same pose
+    corners = np.array([np.stack([view.corners, view.corners[::-1]]) for view in seen])
     apart = np.full(len(seen), np.inf)
     kept: list[int] = []
     while len(kept) < _MOST_VIEWS and apart.max() > _APART * diagonal:
-        distance = _distance(there, int(np.argmax(apart)))
+        distance = _distance(corners, int(np.argmax(apart)))
         alike = np.flatnonzero((distance <= _APART * diagonal) & (apart > _APART * diagonal))
         kept.append(max((int(i) for i in alike), key=lambda i: seen[i].sharpness))
-        apart = np.minimum(apart, _distance(there, kept[-1]))
+        apart = np.minimum(apart, _distance(corners, kept[-1]))
     return [seen[i] for i in sorted(kept)]
 
 
-def _distance(there: Floats, i: int) -> Floats:
-    """Largest distance (n,) between a corner in view i and the same corner in each view, px."""
-    return np.asarray(np.hypot(*np.moveaxis(there - there[i, 0], -1, 0)).max(axis=-1).min(axis=-1))
+def _distance(corners: Floats, i: int) -> Floats:
+    """Return (n,) the largest distance between a corner in view i and the same corner in each view, px."""
+    return np.asarray(np.hypot(*np.moveaxis(corners - corners[i, 0], -1, 0)).max(axis=-1).min(axis=-1))
 
 
 def _without_bad_views(X: Floats, views: list[tuple[int, Floats]], size: tuple[int, int]) -> list[tuple[int, Floats]]:
-    """Leave out, worst first, the views whose error stands out from the others'."""
+    """Return the views without those whose error is an outlier; the worst is removed first."""
     while len(views) >= _FEWEST_VIEWS:
         error = _fit(X, [c for _, c in views], size, _MODELS[-1][1]).per_view
         middle = float(np.median(error))
@@ -221,7 +226,7 @@ def _without_bad_views(X: Floats, views: list[tuple[int, Floats]], size: tuple[i
 def _fit(X: Floats, corners: Sequence[Floats], size: tuple[int, int], flags: int) -> _Fit:
     seen = [c.astype(np.float32).reshape(-1, 1, 2) for c in corners]
     boards = [X.astype(np.float32)] * len(seen)
-    # With FIX_ASPECT_RATIO OpenCV takes fx/fy from the matrix it is given; its own start gives the focal length.
+    # With FIX_ASPECT_RATIO, OpenCV keeps fx/fy of the given matrix; initCameraMatrix2D supplies a focal length.
     start = cv2.initCameraMatrix2D(boards, seen, size, 1.0)
     rms, K, distortion, rvecs, tvecs, _, _, per_view = cv2.calibrateCameraExtended(
         boards, seen, size, start, np.zeros(5), flags=flags | cv2.CALIB_USE_INTRINSIC_GUESS, criteria=_FITTED
@@ -244,19 +249,19 @@ def _residuals(X: Floats, corners: Sequence[Floats], fit: _Fit) -> list[Floats]:
 
 
 def _held_out(X: Floats, corners: Sequence[Floats], size: tuple[int, int], flags: int) -> Floats:
-    """Mean squared error (n,), px², of each view under a calibration by the others, its own pose fitted."""
+    """Return (n,) each view's mean squared error, px², under a calibration by other views; only its pose is fitted."""
     error = np.empty(len(corners))
     for k in range(_FOLDS):
         fit = _fit(X, [c for i, c in enumerate(corners) if i % _FOLDS != k], size, flags)
         for i in range(k, len(corners), _FOLDS):
             _, r, t = cv2.solvePnP(X, corners[i], fit.K, fit.distortion)
-            shown = np.asarray(cv2.projectPoints(X, r, t, fit.K, fit.distortion)[0]).reshape(-1, 2)
-            error[i] = ((corners[i] - shown) ** 2).sum(axis=1).mean()
+            projected = np.asarray(cv2.projectPoints(X, r, t, fit.K, fit.distortion)[0]).reshape(-1, 2)
+            error[i] = ((corners[i] - projected) ** 2).sum(axis=1).mean()
     return error
 
 
 def _choose(held_out: Sequence[Floats]) -> int:
-    """Return the largest model that predicts better, view by view, than every smaller one that was worth it."""
+    """Return the index of the chosen model: each larger model replaces the last chosen one if it predicts better."""
     chosen = 0
     for larger in range(1, len(held_out)):
         gain = held_out[chosen] - held_out[larger]
@@ -266,11 +271,11 @@ def _choose(held_out: Sequence[Floats]) -> int:
 
 
 def _covariance(X: Floats, fit: _Fit, residuals: Sequence[Floats], terms: tuple[str, ...]) -> Floats:
-    """Return the (9, 9) covariance of fx, fy, cx, cy and five coefficients, poses eliminated.
+    """Return the (9, 9) covariance of fx, fy, cx, cy and five coefficients, with the poses eliminated.
 
-    The cluster-robust sandwich (Liang & Zeger 1986) with views as clusters: corners of one view share its blur and
-    its board's faults. With Q the projector off the six directions of a view's pose, A = Σ JᵀQJ and g = JᵀQr,
-    the covariance is A⁻¹·(Σ g·gᵀ)·n/(n − p)·A⁻¹.
+    This is the cluster-robust sandwich estimator (Liang & Zeger 1986) with views as clusters, because the corners of
+    one view share its blur and the faults of the board. With Q the projector onto the complement of the six directions
+    of a view's pose, A = Σ JᵀQJ and g = JᵀQr, the covariance is A⁻¹·(Σ g·gᵀ)·n/(n − p)·A⁻¹.
     """
     active = [("k1", "k2", "p1", "p2").index(term) for term in terms]
     p = 3 + len(active)

@@ -1,7 +1,7 @@
-"""A camera's calibration as OpenCV means it: camera matrix, distortion, and how sure both are; read and written.
+"""A camera's calibration in OpenCV's model: camera matrix, distortion, covariance; reading and writing its file.
 
-What is written is a file of OpenCV's own kind, so that every tool that reads those reads ours; the covariance
-stands in it beside. What is read may be YAML, XML or JSON, as cv2.FileStorage writes them, or the YAML of ROS.
+Files are written in OpenCV's YAML, with the covariance as a further key, so every tool that reads OpenCV's files reads
+them. Files may be read as YAML, XML or JSON, as cv2.FileStorage writes them, or as the YAML of ROS.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ from anglecam.errors import RigError
 from anglecam.io.files import read_text, write_atomically
 
 DISTORTION_NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "taux", "tauy")
-"""OpenCV's order."""
+"""Names of the distortion coefficients in OpenCV's order."""
 _MOST_BYTES = 512 * 1024
-"""A calibration with the corners of a hundred pictures has as much."""
+"""Size above which a file is not read; a calibration with the corners of a hundred pictures has this size."""
 _STACK = 512 * _MOST_BYTES
-"""OpenCV takes up to 330 bytes of stack for each level of nesting, which is at least a byte of text."""
+"""Stack for the parser, bytes: OpenCV uses up to 330 bytes for each level of nesting, which takes at least one byte of
+text."""
 _LENGTHS = (4, 5, 8, 12, 14)
 _IN_MEMORY = cv2.FILE_STORAGE_MEMORY
 _MATRIX_KEYS = ("camera_matrix", "Camera_Matrix", "cameraMatrix", "K")
@@ -41,20 +42,20 @@ _SIZE_KEYS = (("image_width", "image_Width"), ("image_height", "image_Height"))
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """What is known about a camera and its lens."""
+    """Calibration of a camera and its lens."""
 
     size: tuple[int, int] | None
-    """Width and height of the pictures that it holds for, px; ``None`` where the file does not say."""
+    """Width and height of the pictures that the calibration applies to, px; ``None`` if not stated."""
     camera_matrix: Floats
     """(3, 3), px."""
     distortion: Floats
-    """(4, 5, 8, 12 or 14) coefficients in OpenCV's order, `DISTORTION_NAMES`."""
+    """(n,) 4, 5, 8, 12 or 14 coefficients in OpenCV's order, `DISTORTION_NAMES`."""
     covariance: Floats | None = None
-    """(4 + n, 4 + n) of fx, fy, cx, cy (px) and the n coefficients; ``None`` where the file states none."""
+    """(4 + n, 4 + n) covariance of fx, fy, cx, cy (px) and the n coefficients; ``None`` if the file states none."""
     rms_px: float | None = None
-    """Of the reprojected corners, px, where stated."""
+    """RMS error of the reprojected corners, px; ``None`` if the file states none."""
     views: int = 0
-    """Pictures of a board that it was made from, where stated."""
+    """Number of pictures of a board that the calibration was made from; 0 if the file states none."""
 
     @property
     def focal_px(self) -> float:
@@ -62,7 +63,7 @@ class Calibration:
         return float(np.sqrt(self.camera_matrix[0, 0] * self.camera_matrix[1, 1]))
 
     def sigma(self, name: str) -> float:
-        """Return the standard uncertainty of ``fx``, ``fy``, ``cx``, ``cy`` (px) or of a coefficient, e.g. ``k1``."""
+        """Return the standard uncertainty of ``fx``, ``fy``, ``cx``, ``cy`` (px) or a coefficient such as ``k1``."""
         if self.covariance is None:
             return float("nan")
         index = ("fx", "fy", "cx", "cy", *DISTORTION_NAMES).index(name)
@@ -75,18 +76,18 @@ def read_calibration(path: Path) -> Calibration:
     Parameters
     ----------
     path : Path
-        YAML, XML or JSON with ``camera_matrix``, ``distortion_coefficients`` (or ``dist_coeffs``) and, where the
-        picture's size is to be checked, ``image_width`` and ``image_height``.
+        YAML, XML or JSON with ``camera_matrix``, ``distortion_coefficients`` (or ``dist_coeffs``) and, optionally,
+        ``image_width`` and ``image_height``, against which a clip's size is checked.
 
     Returns
     -------
     Calibration
-        With a covariance where the file holds one.
+        With a covariance if the file holds one.
 
     Raises
     ------
     RigError
-        Where the file is missing, of another kind, or holds no numbers that can be a camera's.
+        If the file is missing, is not a calibration, or its numbers cannot be those of a camera.
     """
     content = _open(path)
     matrix = _numbers(_first(content, _MATRIX_KEYS))
@@ -122,14 +123,14 @@ def read_calibration(path: Path) -> Calibration:
 
 
 def write_calibration(calibration: Calibration, path: Path) -> None:
-    """Write a calibration as OpenCV's YAML, with the covariance of its numbers beside them.
+    """Write a calibration as OpenCV's YAML, including its covariance.
 
     Parameters
     ----------
     calibration : Calibration
-        What is known.
+        The calibration.
     path : Path
-        A ``.yaml`` file; replaced if it is there.
+        A ``.yaml`` file; an existing one is replaced.
     """
     store = cv2.FileStorage("calibration.yaml", cv2.FILE_STORAGE_WRITE | _IN_MEMORY | cv2.FILE_STORAGE_FORMAT_YAML)
     if calibration.size is not None:
@@ -147,7 +148,7 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
 
 
 def _open(path: Path) -> dict[str, Any]:
-    """Read a file's content as numbers, texts, lists and mappings."""
+    """Return a file's content as numbers, texts, lists and mappings."""
     try:
         text = read_text(path, _MOST_BYTES)
     except OSError as error:
@@ -155,10 +156,10 @@ def _open(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise RigError(f"{path}: not a calibration: not a text file") from error
     if not text.lstrip().startswith(("%YAML", "<?xml", "{")):
-        text = f"%YAML:1.0\n---\n{text}"  # as ROS writes it, without the line that OpenCV asks for
+        text = f"%YAML:1.0\n---\n{text}"  # ROS omits the first line, which OpenCV requires
     try:
         content = _parsed(text)
-    # the binding raises SystemError for a text that cannot be parsed
+    # OpenCV's Python binding raises SystemError for a text that cannot be parsed
     except (cv2.error, SystemError, RecursionError) as error:
         raise RigError(f"{path}: not a calibration: not YAML, XML or JSON as OpenCV writes it") from error
     if not isinstance(content, dict):
@@ -167,7 +168,7 @@ def _open(path: Path) -> dict[str, Any]:
 
 
 def _parsed(text: str) -> Any:
-    """Let OpenCV read a text, on a stack that is deep enough for whatever so many bytes can nest."""
+    """Parse a text with OpenCV, in a thread whose stack suffices for the deepest nesting that `_MOST_BYTES` allow."""
 
     def read() -> Any:
         store = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | _IN_MEMORY)
@@ -182,16 +183,16 @@ def _parsed(text: str) -> Any:
 
 
 def _plain(node: Any) -> Any:
-    """Turn a node, which lives only as long as its file does, into plain Python."""
+    """Convert a node, which is valid only while its file is open, into plain Python objects."""
     if node.isMap():
-        return {key: _plain(node.getNode(key)) for key in node.keys()}  # noqa: SIM118 - a node is no mapping
+        return {key: _plain(node.getNode(key)) for key in node.keys()}  # noqa: SIM118 - a node is not a mapping
     if node.isSeq():
         return [_plain(node.at(i)) for i in range(node.size())]
     return node.real() if node.isReal() or node.isInt() else node.string() if node.isString() else None
 
 
 def _first(content: dict[str, Any], keys: tuple[str, ...]) -> Any:
-    """Return the value of the first key that is there."""
+    """Return the value of the first of ``keys`` that is present."""
     return next((content[key] for key in keys if content.get(key) is not None), None)
 
 
@@ -201,7 +202,7 @@ def _number(content: dict[str, Any], keys: tuple[str, ...]) -> float | None:
 
 
 def _numbers(value: Any) -> Floats | None:
-    """Return all numbers of a matrix, or of lists within lists, in their order; NaN for what is no number."""
+    """Return all numbers of a matrix, or of nested lists, in their order; NaN for a value that is not a number."""
     if isinstance(value, dict):
         value = value.get("data")
     if value is None:

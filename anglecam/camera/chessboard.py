@@ -1,8 +1,8 @@
-"""A chessboard's inner corners in one picture, to a part of a pixel.
+"""A chessboard's inner corners in one picture, with subpixel accuracy.
 
-They come from OpenCV's sector-based detector (Duda & Frese 2018) and are then set where the grey levels' gradients
-say (Förstner & Gülch 1987), after a blur of one pixel that spares the gradients the pixel grid: 0.016 px on drawn
-boards with a noise of 2 grey levels, against 0.025 px of the detector alone.
+OpenCV's sector-based detector (Duda & Frese 2018) finds the corners. They are then refined with the gradients of the
+grey levels (Förstner & Gülch 1987), after a blur of one pixel that removes the pixel grid from the gradients. The error
+is 0.016 px on drawn boards with a noise of 2 grey levels; the detector alone reaches 0.025 px.
 """
 
 from __future__ import annotations
@@ -16,28 +16,31 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Floats
 
 _BLUR_PX = 1.0
+"""Standard deviation of the blur before the refinement, px."""
 _WINDOW_SHARE = 0.3
-"""Half the window of the refinement, of the smallest distance between corners: it must hold one corner only."""
+"""Half the width of the refinement's window as a share of the smallest distance between corners: the window must
+contain one corner only."""
 _WINDOW_PX = (2, 9)
+"""Limits of half the width of that window, px."""
 _UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-6)
 
 
 def find_corners(grey: NDArray[Any], board: tuple[int, int]) -> Floats | None:
-    """Find a chessboard's inner corners in a picture, to a part of a pixel.
+    """Find a chessboard's inner corners in a picture, with subpixel accuracy.
 
     Parameters
     ----------
     grey : ndarray
-        (height, width) bytes.
+        (height, width) grey levels, 8 bits.
     board : tuple of int
-        Inner corners, columns and rows.
+        Number of inner corners, columns and rows.
 
     Returns
     -------
     ndarray or None
-        (columns·rows, 2) px, row by row; ``None`` where the board is not seen as a whole.
+        (columns·rows, 2) px, row by row; ``None`` if the whole board is not found.
     """
-    # Normalising the picture helps in bad light and triples the error in good light, so it comes second.
+    # Normalising the picture helps in bad light and triples the error in good light, so it is tried second.
     for flags in (0, cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE):
         seen, corners = cv2.findChessboardCornersSB(grey, board, flags=flags)
         if seen:

@@ -1,23 +1,26 @@
-"""From the picture as it was filmed to the plane of motion seen square on: points, not frames.
+"""Map points between the filmed picture and the plane of motion as a camera on the axis of rotation would see it.
 
-Two things are undone, each only if it is known. The lens: OpenCV's model, by its calibration. Then a declared tilt:
-the camera looks at the pivot along a line that is not the axis of rotation but leans τ away from it, turned about
-an axis a in the picture. With the pivot at the origin, U along a and V across it, a point (X, Y) of the plane, in the
-pixels of a square view, appears at ::
+Only points are mapped, never frames. `Lens.rectify` corrects two effects, each only if it is known. The first is the
+lens, by OpenCV's model and a calibration. The second is a declared tilt: the line of sight to the pivot leans by τ from
+the axis of rotation, because the camera is turned about an axis a in the picture. With the pivot at the origin, U along
+a and V across a, a point (X, Y) of the plane, in pixels of the rectified view, appears at ::
 
     U = X / (1 − Y·sin τ / f),    V = Y·cos τ / (1 − Y·sin τ / f)
 
-so that a circle about the pivot appears with axes in the ratio cos τ, nearer points larger. What is undone is ::
+A circle about the pivot therefore appears with axes in the ratio cos τ, and nearer points appear larger. The inverse is
+::
 
     X = U / (1 + V·tan τ / f),    Y = V / cos τ / (1 + V·tan τ / f)
 
-Lengths along a are kept at the pivot. Both coordinates share the denominator: without f (weak perspective) the line
-from pivot to mouth still has the right direction, and only distances from the pivot are wrong, by a share Y·sin τ/f.
-A centre fitted to a path of radius R is then off by about R²·sin τ/f, and nothing in the path tells.
+At the pivot, lengths along a do not change. Both coordinates have the same denominator. Without f (weak perspective),
+the line from the pivot to the mark still has the correct direction, and only distances from the pivot are wrong, by a
+relative error Y·sin τ/f. A centre fitted to a path of radius R is then off by about R²·sin τ/f, which the path does not
+reveal.
 
-What turns with the body but z nearer to the camera than the pivot turns, rectified, by exactly the same angle and on
-a circle, but about a centre of its own: the axis of rotation is seen from beside, and stands where it passes z. With
-b the unit vector across a, a view from above having b upwards, that centre is −b·z·sin τ/(cos τ − z/f) off the pivot.
+A point of the body that lies z nearer to the camera than the pivot also turns, rectified, by exactly the same angle on
+a circle, but about a different centre: the tilted view shows the axis of rotation obliquely, and the centre is where
+the axis passes the height z. With b the unit vector across a, upward for a view from above, that centre is off the
+pivot by −b·z·sin τ/(cos τ − z/f).
 """
 
 from __future__ import annotations
@@ -37,60 +40,72 @@ from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Rig
 
 _UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
-"""OpenCV's own default, five rounds, leaves 0.1 px in the corners of a wide lens."""
+"""Iterations of the undistortion; OpenCV's default of five leaves an error of 0.1 px in the corners of a wide lens."""
 _STEP_PX = 0.5
-"""Half the base of a difference quotient; lenses are smooth over many pixels."""
+"""Half the step of a difference quotient, px; lenses are smooth over many pixels."""
 _RETURNS_PX = 0.01
-"""How near a point of the picture's border must come to itself when it is rectified and distorted again."""
+"""Largest error of a point that is rectified and distorted again, px."""
 
 
 @dataclass(frozen=True, eq=False)
 class Lens:
-    """Camera, lens and view of one clip; without arguments the identity."""
+    """Camera, lens and view of one clip; without arguments the identity.
+
+    Examples
+    --------
+    Seen at a tilt of 60° from above, heights above the pivot appear at half their length:
+
+    >>> lens = Lens(tilt=math.radians(60.0), pivot_px=(100.0, 100.0))
+    >>> lens.rectify([130.0, 80.0]).round(9)
+    array([130.,  60.])
+    >>> lens.distort(lens.rectify([130.0, 80.0])).round(9)
+    array([130.,  80.])
+    """
 
     calibration: Calibration | None = None
     """``None``: a pinhole."""
     tilt: float = 0.0
-    """Of the line of sight to the pivot away from the axis of rotation, rad."""
+    """Angle τ between the line of sight to the pivot and the axis of rotation, rad."""
     tilt_axis: float = 0.0
     """Direction in the picture of the axis about which the camera is turned, rad, y up: at 0 it looks from above."""
     tilt_sigma: float = 0.0
     """Standard uncertainty of the tilt, rad."""
     focal_px: float | None = None
-    """px; ``None``: weak perspective."""
+    """Focal length f, px; ``None``: weak perspective."""
     pivot_px: tuple[float, float] = (0.0, 0.0)
-    """Where the tilted view is centred, px, in the picture without distortion."""
+    """Centre of the tilted view in the picture without distortion, px."""
 
     @property
     def is_identity(self) -> bool:
-        """Whether points pass unchanged."""
+        """Whether points are left unchanged."""
         return self.calibration is None and self.tilt == 0.0
 
     @property
     def neglects_perspective(self) -> bool:
-        """Whether distances in a tilted view are wrong for want of a focal length."""
+        """Whether distances in a tilted view are wrong because the focal length is unknown."""
         return self.tilt != 0.0 and self.focal_px is None
 
     @property
     def parallax(self) -> Floats:
-        """(2,) how far off the pivot, rectified, what is nearer to the camera has its centre, for each px of height.
+        """(2,) rectified offset from the pivot of the centre about which nearer points turn, px for each px of height.
 
-        Its direction is exact for every height, its length to first order: (cos τ)/(cos τ − z/f) times as much.
+        The direction is exact for every height z. The length is of first order: the exact one is larger by the factor
+        (cos τ)/(cos τ − z/f).
         """
         return math.tan(self.tilt) * np.array([math.sin(self.tilt_axis), math.cos(self.tilt_axis)])
 
     def looking_at(self, pivot_px: ArrayLike) -> Lens:
-        """Return this lens with the tilt centred on a pivot that stands at (2,) px in the picture as it was filmed."""
+        """Return this lens with the tilted view centred on a pivot at (2,) px in the picture as it was filmed."""
         x, y = self._undistort(np.asarray(pivot_px, dtype=float))
         return dataclasses.replace(self, pivot_px=(float(x), float(y)))
 
     def rectify(self, points_px: ArrayLike) -> Floats:
-        """Return (…, 2) points of the picture where a square view without distortion shows them, px; NaN stays NaN."""
+        """Return (…, 2) points of the picture at their positions in the rectified view, px; NaN stays NaN."""
         points = self._undistort(np.asarray(points_px, dtype=float))
         return points if self.tilt == 0.0 else _map(self._homography(), points)
 
     def distort(self, points_px: ArrayLike) -> Floats:
-        """Return (…, 2) rectified points where the picture shows them, px: the inverse of `rectify`."""
+        """Return (…, 2) rectified points at their positions in the picture, px: the inverse of `rectify`."""
         points = np.asarray(points_px, dtype=float)
         if self.tilt != 0.0:
             points = _map(np.asarray(np.linalg.inv(self._homography()), dtype=float), points)
@@ -104,7 +119,7 @@ class Lens:
         return np.asarray(seen, dtype=float).reshape(points.shape)
 
     def jacobian(self, points_px: ArrayLike) -> Floats:
-        """Return (…, 2, 2) how a rectified point moves when the point in the picture does: J·C·Jᵀ is its covariance."""
+        """Return (…, 2, 2) the derivative J of `rectify`: a point's covariance C becomes J·C·Jᵀ."""
         points = np.asarray(points_px, dtype=float)
         if self.is_identity:
             return np.broadcast_to(np.eye(2), (*points.shape, 2))
@@ -115,15 +130,15 @@ class Lens:
         return np.stack(columns, axis=-1)
 
     def deviants(self) -> tuple[Lens, ...]:
-        """Return lenses that each err by one standard deviation in one independent direction.
+        """Return lenses that are each off by one standard deviation in one independent direction.
 
-        Whatever is computed through a lens, y, has from it the variance Σ (y(deviant) − y(lens))². The errors are
-        common to all frames: a difference of two angles is to be formed with the same deviant.
+        The lens contributes Σ (y(deviant) − y(lens))² to the variance of any result y that is computed through it. The
+        errors are common to all frames, so a difference of two angles must be computed with the same deviant.
 
         Returns
         -------
         tuple of Lens
-            One for each direction in which calibration and tilt are uncertain, none where they state no uncertainty.
+            One lens for each direction in which calibration and tilt are uncertain; empty if they state no uncertainty.
         """
         found = []
         if self.calibration is not None and self.calibration.covariance is not None:
@@ -134,19 +149,19 @@ class Lens:
         return tuple(found)
 
     def covariance(self, points_px: ArrayLike) -> Floats:
-        """Return (…, 2, 2) px², the covariance of rectified points that stems from calibration and tilt alone."""
+        """Return (…, 2, 2) the covariance of rectified points due to calibration and tilt alone, px²."""
         here = self.rectify(points_px)
         moved = [lens.rectify(points_px) - here for lens in self.deviants()]
         return sum((d[..., :, None] * d[..., None, :] for d in moved), np.zeros((*here.shape, 2)))
 
     def _keeping_focal(self, nominal: Lens) -> Lens:
-        """Move the focal length of the perspective along with the calibration's."""
+        """Return this lens with the focal length of the perspective set to that of its calibration."""
         assert self.calibration is not None
         focal = None if nominal.focal_px is None else self.calibration.focal_px
         return dataclasses.replace(self, focal_px=focal)
 
     def _square(self) -> tuple[float, Floats]:
-        """Return focal length and principal point of the picture without distortion, whose pixels are square."""
+        """Return focal length and principal point, px, of the picture without distortion, whose pixels are square."""
         assert self.calibration is not None
         return self.calibration.focal_px, self.calibration.camera_matrix[:2, 2]
 
@@ -165,7 +180,7 @@ class Lens:
         return np.asarray(ideal, dtype=float).reshape(points.shape)
 
     def _homography(self) -> Floats:
-        """(3, 3), from the tilted view to the square one, the pivot staying in its place."""
+        """Return (3, 3) the homography from the tilted view to the rectified one; it leaves the pivot unchanged."""
         c, s = math.cos(self.tilt_axis), math.sin(self.tilt_axis)
         turn = np.array([[c, -s, 0.0], [-s, -c, 0.0], [0.0, 0.0, 1.0]])  # rows: along a and across it, y down
         nearer = 0.0 if self.focal_px is None else math.tan(self.tilt) / self.focal_px
@@ -183,24 +198,24 @@ def lens_from_rig(rig: Rig, size: tuple[int, int], clip: Path) -> Lens:
     Parameters
     ----------
     rig : Rig
-        Of which ``camera``, ``facing`` and ``pivot.near`` count. ``facing: left`` mirrors the tilt's axis too.
+        Its ``camera``, ``facing`` and ``pivot.near`` are used; ``facing: left`` also mirrors the tilt's axis.
     size : tuple of int
         Width and height of the clip, px.
     clip : Path
-        Named where the calibration does not fit it.
+        The clip, named in the error if the calibration does not fit it.
 
     Returns
     -------
     Lens
-        The identity where nothing is declared. Its tilt is centred on ``pivot.near``, else on the middle of the
-        picture, until `Lens.looking_at` says better.
+        The identity if nothing is declared. The tilted view is centred on ``pivot.near``, else on the middle of the
+        picture; `Lens.looking_at` replaces this centre.
 
     Raises
     ------
     RigError
-        Where the calibration cannot be read, or cannot be undone within its own picture.
+        If the calibration cannot be read, or its distortion cannot be inverted within the picture.
     InputError
-        Where it was made for pictures of another size.
+        If the calibration was made for pictures of another size.
     """
     camera = rig.camera
     calibration = None
@@ -224,19 +239,19 @@ def lens_from_rig(rig: Rig, size: tuple[int, int], clip: Path) -> Lens:
 
 
 def _check_border(lens: Lens, size: tuple[int, int], path: Path) -> None:
-    """Refuse coefficients whose polynomial turns back inside the picture: points there have no one place."""
+    """Raise `RigError` if the distortion folds the picture over itself, so that points there have no unique inverse."""
     across, down = (np.linspace(0.0, side - 1.0, 9) for side in size)
     grid = np.stack(np.meshgrid(across, down), axis=-1)
     returned = lens.distort(lens.rectify(grid))
-    turned = np.linalg.det(lens.jacobian(grid)) <= 0.0
-    off = np.nan_to_num(np.abs(returned - grid).max(axis=-1), nan=np.inf)
-    if turned.any() or (off > _RETURNS_PX).any():
-        x, y = grid[np.unravel_index(np.argmax(np.where(turned, np.inf, off)), off.shape)]
-        raise RigError(f"{path}: its distortion cannot be undone at pixel {x:.0f},{y:.0f} of the picture")
+    folded = np.linalg.det(lens.jacobian(grid)) <= 0.0
+    error = np.nan_to_num(np.abs(returned - grid).max(axis=-1), nan=np.inf)
+    if folded.any() or (error > _RETURNS_PX).any():
+        x, y = grid[np.unravel_index(np.argmax(np.where(folded, np.inf, error)), error.shape)]
+        raise RigError(f"{path}: its distortion cannot be inverted at pixel {x:.0f},{y:.0f} of the picture")
 
 
 def _deviate(calibration: Calibration) -> list[Calibration]:
-    """Move a calibration by one standard deviation along each principal axis of its correlation."""
+    """Return the calibration shifted by one standard deviation along each principal axis of its correlation matrix."""
     covariance = np.asarray(calibration.covariance)
     sigma = np.sqrt(np.diag(covariance))
     stated = np.flatnonzero(sigma > 0.0)

@@ -1,8 +1,8 @@
-"""When a mark was seen: what a rolling shutter adds to a frame's time, and what the exposure's length hides.
+"""The time at which a mark was measured: the delay of a rolling shutter and the error by the exposure's length.
 
-A frame's time stamp is taken as the middle of the exposure of its middle row, (height − 1)/2. The exposure itself
-then moves no time: it blurs, and the blur of a mark is centred on its mean place. At a steady speed that is where it
-was in the middle of the exposure; where it speeds up or slows down, it is not.
+A frame's time stamp is taken as the middle of the exposure of its middle row, (height − 1)/2. The length of the
+exposure then shifts no time: it blurs the mark, and the blur is centred on the mark's mean position. At constant speed,
+the mean position is the position in the middle of the exposure; under acceleration it is not.
 """
 
 from __future__ import annotations
@@ -12,53 +12,60 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def measurement_time(
-    time: ArrayLike, mouth_y_px: ArrayLike, height: int, row_time_s: float | None
+    time: ArrayLike, mark_y_px: ArrayLike, height: int, row_time_s: float | None
 ) -> NDArray[np.float64]:
-    """Return the time at which the mouth was where it was measured: t + row_time·(y − (height − 1)/2).
+    """Return the time at which the mark was at its measured position: t + row_time·(y − (height − 1)/2).
 
     Parameters
     ----------
     time : array_like
-        (n,) the frames' time stamps, s.
-    mouth_y_px : array_like
-        (n,) the mouth's row in the picture as it was filmed, not as it was rectified, px; NaN where it was not found.
+        (n,) time stamps of the frames, s.
+    mark_y_px : array_like
+        (n,) row of the mark in the picture as it was filmed, not as it was rectified, px; NaN where it was not found.
     height : int
-        Rows of the picture.
+        Number of rows of the picture.
     row_time_s : float or None
-        How much later each row is exposed than the one above it, s; ``None``: all at once.
+        Delay of the exposure from one row to the next, s; ``None``: all rows are exposed at the same time.
 
     Returns
     -------
     ndarray
-        (n,) s, in the frames' order; the time stamp itself where the mouth was not found. Times of neighbouring
-        frames can coincide or change places only if the mouth crosses the picture faster than the shutter does.
+        (n,) times, s, in the order of the frames; the time stamp itself where the mark was not found. Times of
+        neighbouring frames can coincide or swap only if the mark crosses the picture faster than the shutter does.
+
+    Examples
+    --------
+    A mark in the first of 480 rows is exposed half a read-out earlier than the middle row:
+
+    >>> measurement_time([0.0, 0.04], [0.0, 239.5], 480, 1e-5).round(6)
+    array([-0.002395,  0.04    ])
     """
     stamps = np.asarray(time, dtype=float)
     if row_time_s is None:
         return stamps
-    rows = np.asarray(mouth_y_px, dtype=float) - (height - 1) / 2.0
+    rows = np.asarray(mark_y_px, dtype=float) - (height - 1) / 2.0
     return stamps + row_time_s * np.where(np.isfinite(rows), rows, 0.0)
 
 
 def mean_off_middle(time: ArrayLike, angle: ArrayLike, exposure_s: float | None) -> NDArray[np.float64]:
-    """Return how far the mean over the exposure may lie from the angle at its middle: |θ̈|·T²/24.
+    """Return the difference between the mean angle over the exposure and the angle at its middle: |θ̈|·T²/24.
 
-    Frames are too far apart to undo it: where the motion sets off between two of them it would be made worse. So it
-    is an uncertainty, about as large as the error is.
+    The difference is not corrected, because frames are too far apart: where a motion starts between two frames, the
+    correction would increase the error. It is therefore stated as an uncertainty, of about the size of the error.
 
     Parameters
     ----------
     time : array_like
-        (n,) s, of frames one after another.
+        (n,) times of consecutive frames, s.
     angle : array_like
-        (n,) rad.
+        (n,) angles, rad.
     exposure_s : float or None
-        T, s; ``None``: not known, taken as short.
+        Length T of the exposure, s; ``None``: unknown, taken as short.
 
     Returns
     -------
     ndarray
-        (n,) standard uncertainty, rad; the first and the last frame have that of their neighbour.
+        (n,) standard uncertainty, rad; the first and the last frame get that of their neighbour.
     """
     t, theta = np.asarray(time, dtype=float), np.asarray(angle, dtype=float)
     if exposure_s is None or len(t) < 3:

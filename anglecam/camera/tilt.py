@@ -1,4 +1,4 @@
-"""The error of a declared tilt: what it does to the direction of a line in the plane of motion."""
+"""How an error of the declared tilt changes the direction of a line in the plane of motion."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from anglecam.data.typing import Floats
 
 @dataclass(frozen=True)
 class Tilt:
-    """A view that was declared to be slanted, and how sure that is; see `anglecam.camera.lens`."""
+    """The declared tilt of a view and its uncertainty; see `anglecam.camera.lens`."""
 
     angle: float
-    """Between the line of sight and the axis of rotation, undone in the angles, rad."""
+    """Angle between the line of sight and the axis of rotation, rad; the measured angles are corrected for it."""
     axis: float
     """Direction of the axis about which the camera is turned, counted as the line is, rad."""
     sigma: float
     """Standard uncertainty of ``angle``, rad."""
 
     def turned(self, line: Floats, error: float | Floats) -> Floats:
-        """Return what a line of the square view becomes if the tilt is larger by ``error``, rad.
+        """Return the direction of a line of the rectified view if the tilt τ is larger by ``error``, rad.
 
-        Along the axis lengths are kept, across it they grow by cos τ / cos(τ + error); perspective moves a point on
-        its line through the pivot and so leaves the direction alone.
+        Lengths along the axis stay the same; lengths across it grow by cos τ / cos(τ + error). Perspective moves a
+        point along its line through the pivot and so does not change the direction.
         """
         from_axis = line - self.axis
         grown = np.cos(self.angle) / np.cos(self.angle + error)

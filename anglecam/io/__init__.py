@@ -1,1 +1,1 @@
-"""Every file format, one door each: what is read is validated here, and nothing inside checks it again."""
+"""Reading and writing of every file format, one module each. Content is validated here and nowhere else."""

@@ -1,4 +1,4 @@
-"""``NAME.command.csv``: what was commanded, beside the recording that it belongs to."""
+"""``NAME.command.csv``: the command of the recording NAME."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ COMMAND_ENDING = ".command.csv"
 
 
 def read_command(path: Path) -> Command:
-    """Read ``NAME.command.csv``: ``time_s,command_deg``, held constant until the next row.
+    """Read ``NAME.command.csv`` with the columns ``time_s,command_deg``; each value holds until the next row.
 
     Parameters
     ----------
@@ -23,12 +23,22 @@ def read_command(path: Path) -> Command:
     Returns
     -------
     Command
-        In radians.
+        The command, rad.
 
     Raises
     ------
     InputError
-        Where a row cannot be read or times do not increase, naming file and line.
+        If a row cannot be read or times do not increase; the line names the file and the row.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder, "stairs.command.csv")
+    ...     _ = path.write_text(chr(10).join(["time_s,command_deg", "0,0", "1.5,10"]))
+    ...     command = read_command(path)
+    >>> command.first_change()
+    1.5
     """
     table = read_columns(path, required=("time_s", "command_deg"))
     require_increasing(path, table["time_s"])

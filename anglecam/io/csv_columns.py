@@ -1,4 +1,4 @@
-"""CSV files read by the names of their columns, within limits of size."""
+"""Read CSV files by the names of their columns, within limits of size."""
 
 from __future__ import annotations
 
@@ -30,38 +30,39 @@ SERIES_COLUMNS = (
     "pivot_y_px",
     "status",
 )
-"""Of ``NAME.angles.csv``, in order."""
+"""Columns of ``NAME.angles.csv``, in order."""
 _MOST_BYTES = 256 * 2**20
+"""Size above which a file is not read."""
 _MOST_ROWS = 1_000_000
-"""Nine hours at 30 Hz; a file of ours has 110 bytes for each."""
+"""Rows above which a file is not read: nine hours at 30 Hz. A row of anglecam's files has 110 bytes."""
 _LONGEST_STATUS = max(map(len, STATUSES)) + 1
-"""Characters; longer than any, so that what is cut is none of them."""
+"""Characters at which a status is cut; one more than the longest, so that a cut status equals none of them."""
 _LARGEST = 1e12
-"""No time in s, angle in degrees or place in px is as large; squares of what is smaller stay finite."""
+"""Largest number that is read; no time in s, angle in degrees or coordinate in px reaches it. Its square is finite."""
 
 
 def read_columns(path: Path, *, required: Sequence[str], may_be_empty: bool = False) -> dict[str, NDArray]:
-    """Read those columns of a CSV file that anglecam knows, by name: numbers as floats, ``status`` as text.
+    """Read the required columns of a CSV file and those of an angle series: numbers as floats, ``status`` as text.
 
     Parameters
     ----------
     path : Path
         A CSV file with a header line.
     required : sequence of str
-        Columns that must be there.
+        Columns that the file must have.
     may_be_empty : bool
-        Whether an empty cell of a numeric column, or one that says so, is NaN instead of an error (``time_s`` never
-        may be).
+        Whether an empty cell or ``nan`` in a numeric column is read as NaN instead of being an error; in ``time_s`` it
+        is always an error.
 
     Returns
     -------
     dict of str to ndarray
-        The columns that are required, and those of an angle series that are there.
+        The required columns, and those of `SERIES_COLUMNS` that the file has.
 
     Raises
     ------
     InputError
-        Naming the file, the line and the cause.
+        If the file cannot be read, lacks a column or has a wrong cell; the line names the file, the row and the cause.
     """
     try:
         with open_text(path, _MOST_BYTES) as stream:
@@ -92,7 +93,7 @@ def read_columns(path: Path, *, required: Sequence[str], may_be_empty: bool = Fa
 
 
 def _known(path: Path, header: list[str], required: Sequence[str]) -> dict[str, int]:
-    """Return which of a header's columns are to be read, and where they stand."""
+    """Return the columns of a header that are to be read, with their positions."""
     if not any(header):
         raise InputError(f"{path}: empty file; expected a header with {','.join(required)}")
     missing = [name for name in required if name not in header]
@@ -101,7 +102,7 @@ def _known(path: Path, header: list[str], required: Sequence[str]) -> dict[str, 
     known = {name: i for i, name in enumerate(header) if name in required or name in SERIES_COLUMNS}
     twice = [name for name in known if header.count(name) > 1]
     if twice:
-        raise InputError(f"{path}: column {twice[0]} stands twice in the header")
+        raise InputError(f"{path}: column {twice[0]} appears twice in the header")
     return known
 
 
@@ -123,7 +124,7 @@ def _number(path: Path, line: int, name: str, cell: str, may_be_empty: bool) -> 
     if not math.isfinite(value):
         raise InputError(f"{path}: line {line}: {name} is {cell[:40]!r}, not a number")
     if abs(value) > _LARGEST:
-        raise InputError(f"{path}: line {line}: {name} is {value:g}; no recording has that")
+        raise InputError(f"{path}: line {line}: {name} is {value:g}, which is too large for a recording")
     return value
 
 

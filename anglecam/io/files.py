@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, and text files that are read within limits."""
+"""Write files atomically, and read text files within limits of size."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
-_NAMED = 40
-"""Characters of a file's name in that of its unfinished form, so that no name becomes too long by it."""
+_NAME_CHARACTERS = 40
+"""Characters of a file's name that its temporary file's name begins with; a longer name could exceed the limit."""
 _MOST_JSON = 64 * 2**20
-"""Bytes; what anglecam writes has a hundredth of it."""
+"""Size above which JSON is not read, bytes; files that anglecam writes have a hundredth of it."""
 
 
 @contextlib.contextmanager
 def open_regular(path: Path) -> Iterator[BinaryIO]:
-    """Open a file for reading: an ordinary one, never a folder, a device or a pipe that may let one wait for ever.
+    """Open an ordinary file for reading; a folder, a device or a pipe, which could block for ever, is refused.
 
     Parameters
     ----------
@@ -32,12 +32,12 @@ def open_regular(path: Path) -> Iterator[BinaryIO]:
     Yields
     ------
     BinaryIO
-        Its bytes.
+        A stream of its bytes.
 
     Raises
     ------
     OSError
-        Where it cannot be opened or is no ordinary file; ``strerror`` says why.
+        If the file cannot be opened or is not an ordinary file; ``strerror`` states the cause.
     """
     if "\0" in str(path):
         raise OSError(errno.EINVAL, "no file can be called that", str(path))
@@ -49,19 +49,24 @@ def open_regular(path: Path) -> Iterator[BinaryIO]:
 
 @contextlib.contextmanager
 def open_text(path: Path, most: int) -> Iterator[IO[str]]:
-    """Open a UTF-8 text file, with or without a mark of that, as the csv module wants it; raises as `open_regular`.
+    """Open a UTF-8 text file, with or without a byte order mark, with line ends kept as the csv module needs them.
 
     Parameters
     ----------
     path : Path
         The file.
     most : int
-        Bytes; a larger file is an OSError, too.
+        Largest size, bytes.
 
     Yields
     ------
     IO[str]
-        Its text.
+        A stream of its text.
+
+    Raises
+    ------
+    OSError
+        As `open_regular`, and if the file is larger than ``most``.
     """
     with open_regular(path) as stream:
         if os.fstat(stream.fileno()).st_size > most:
@@ -70,28 +75,28 @@ def open_text(path: Path, most: int) -> Iterator[IO[str]]:
 
 
 def read_text(path: Path, most: int) -> str:
-    """Read a UTF-8 text file of at most ``most`` bytes whole.
+    """Read a whole UTF-8 text file of at most ``most`` bytes.
 
     Raises
     ------
     OSError
         As `open_text`.
     UnicodeDecodeError
-        Where it is no UTF-8.
+        If the file is not UTF-8.
     """
     with open_text(path, most) as stream:
         return stream.read(most)
 
 
 def read_json(path: Path) -> Any:
-    """Read JSON, its numbers as floats.
+    """Read JSON; all its numbers become floats.
 
     Raises
     ------
     OSError
         As `open_text`.
     ValueError
-        Where it is no JSON, or nested too deeply.
+        If the file is not JSON or is nested too deeply.
     """
     try:
         return json.loads(read_text(path, _MOST_JSON), parse_int=float)
@@ -106,7 +111,7 @@ def write_atomically(path: Path) -> Iterator[IO[str]]:
     Parameters
     ----------
     path : Path
-        The file to be; its folder is made if missing.
+        The file to write; its folder is made if missing.
 
     Yields
     ------
@@ -114,12 +119,12 @@ def write_atomically(path: Path) -> Iterator[IO[str]]:
         A UTF-8 stream.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:_NAMED]}.")
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:_NAME_CHARACTERS]}.")
     try:
-        # a name of bytes that are no text may stand in a page
+        # a page may contain a file's name, and that name need not be valid text
         with os.fdopen(handle, "w", encoding="utf-8", newline="", errors="backslashreplace") as stream:
             yield stream
-        # mkstemp makes files private; give the result the mode any new file would have
+        # mkstemp makes files private; the result gets the mode that any new file would have
         mask = os.umask(0)
         os.umask(mask)
         Path(name).chmod(0o666 & ~mask)
@@ -131,27 +136,27 @@ def write_atomically(path: Path) -> Iterator[IO[str]]:
 
 @contextlib.contextmanager
 def write_whole(path: Path) -> Iterator[Path]:
-    """Give a place for a file that a library writes by itself; it takes the place of ``path`` when the block ends.
+    """Yield a temporary path for a library that writes a file itself; the file replaces ``path`` when the block ends.
 
     Parameters
     ----------
     path : Path
-        The file to be; its folder is made if missing.
+        The file to write; its folder is made if missing.
 
     Yields
     ------
     Path
-        In a folder of its own beside it, removed whatever happens.
+        A path of the same name in a temporary folder next to ``path``; the folder is always removed.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name[:_NAMED]}.") as folder:
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name[:_NAME_CHARACTERS]}.") as folder:
         unfinished = Path(folder) / path.name
         yield unfinished
         unfinished.replace(path)
 
 
 def write_json(path: Path, content: Any) -> None:
-    """Write JSON with every float at full precision; a number that is not finite becomes ``null``."""
+    """Write JSON with every float at full precision; a float that is not finite becomes ``null``."""
     with write_atomically(path) as stream:
         stream.write(json_text(content) + "\n")
 

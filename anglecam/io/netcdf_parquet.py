@@ -1,8 +1,10 @@
-"""Angle series for other programs: netCDF as `movement` reads it, Parquet for tables; both beside the CSV.
+"""Angle series for other programs: netCDF in the layout of `movement`, and Parquet tables.
 
-`movement` (neuroinformatics.dev) keeps poses as an xarray dataset: ``position`` over time, space, keypoints and
-individuals, ``confidence`` without space, attributes that say where they come from. Mouth and pivot are its two
-keypoints here, and the angle stands beside them as further variables over time.
+`movement` (neuroinformatics.dev) holds poses as an xarray dataset: ``position`` over time, space, keypoints and
+individuals, ``confidence`` over the same without space, and attributes that state the source. The mark (keypoint
+``mouth``) and the pivot are the two keypoints; the angle and its uncertainty are further variables over time.
+
+The netCDF file also holds the series unrounded, so that `read_netcdf` returns it bit for bit.
 """
 
 from __future__ import annotations
@@ -25,29 +27,29 @@ from anglecam.io.files import write_whole
 from anglecam.io.series_csv import series_columns
 
 UNITS = {"s": "s", "deg": "degree", "px": "pixel"}
-"""By the last part of a column's name."""
+"""Units by the last part of a column's name."""
 GROUP = "anglecam"
-"""Of a netCDF file, with the series to the last bit."""
+"""Group of the netCDF file that holds the fields of the series unrounded."""
 
 
 class Also(StrEnum):
-    """What `write_also` can write besides the CSV."""
+    """Formats that `write_also` can write in addition to the CSV."""
 
     netcdf = "netcdf"
     parquet = "parquet"
 
 
 def write_also(series: AngleSeries, formats: Iterable[Also], stem: Path) -> None:
-    """Write a series as ``NAME.angles.nc`` or ``NAME.angles.parquet``.
+    """Write a series as ``NAME.angles.nc``, ``NAME.angles.parquet`` or both.
 
     Parameters
     ----------
     series : AngleSeries
-        Measured.
+        A measured series.
     formats : iterable of Also
-        Which of them.
+        Formats to write; one that is listed twice is written once.
     stem : Path
-        Folder and NAME.
+        The folder and NAME.
     """
     for wanted in dict.fromkeys(formats):
         if wanted is Also.netcdf:
@@ -57,18 +59,19 @@ def write_also(series: AngleSeries, formats: Iterable[Also], stem: Path) -> None
 
 
 def write_netcdf(series: AngleSeries, path: Path) -> None:
-    """Write a series as netCDF-4: in the layout of `movement`'s poses, and to the last bit in a group of its own.
+    """Write a series as netCDF-4: in the layout of `movement`'s poses, and unrounded in a separate group.
 
-    Dimensions time, space, keypoints, individuals; ``position`` in px, ``confidence`` NaN, because anglecam states an
-    uncertainty and no likelihood; ``angle_deg``, ``sigma_deg``, ``line_deg``, the bounds and ``status`` over time. The
-    group ``anglecam`` holds the fields of `AngleSeries` and `CameraEvidence` in SI units, unrounded.
+    The dimensions are time, space, keypoints and individuals. ``position`` is in px; ``confidence`` is NaN, because
+    anglecam states an uncertainty and no likelihood. ``angle_deg``, ``sigma_deg``, ``line_deg``, the bounds and
+    ``status`` are variables over time. The group ``anglecam`` holds the fields of `AngleSeries` and `CameraEvidence`
+    in rad, s and px, unrounded.
 
     Parameters
     ----------
     series : AngleSeries
-        Measured; without marks the positions are NaN.
+        A measured series; without marks the positions are NaN.
     path : Path
-        The file; it appears whole or not at all.
+        The file; it is written whole or not at all. Equal series give equal bytes.
     """
     import h5netcdf
 
@@ -90,8 +93,8 @@ def write_netcdf(series: AngleSeries, path: Path) -> None:
         time.attrs["long_name"] = "time stamps of the frames on the clip's own clock, in seconds"
         for name, labels in (("space", ["x", "y"]), ("keypoints", ["mouth", "pivot"]), ("individuals", ["head"])):
             _texts(file, name, name, labels)
-        marks = np.stack([_marks(series.mark_px, n), _marks(series.pivot_px, n)], axis=-1)
-        position = file.create_variable("position", tuple(file.dimensions), "f8", data=marks[..., None])
+        points = np.stack([_points(series.mark_px, n), _points(series.pivot_px, n)], axis=-1)
+        position = file.create_variable("position", tuple(file.dimensions), "f8", data=points[..., None])
         position.attrs["units"] = "pixel"
         unstated = np.full((n, 2, 1), np.nan)
         file.create_variable("confidence", ("time", "keypoints", "individuals"), "f8", data=unstated)
@@ -104,7 +107,7 @@ def write_netcdf(series: AngleSeries, path: Path) -> None:
 
 
 def read_netcdf(path: Path) -> AngleSeries:
-    """Read a series that `write_netcdf` wrote, equal to it bit for bit.
+    """Read a series that `write_netcdf` wrote; the result equals what was written bit for bit.
 
     Parameters
     ----------
@@ -114,14 +117,25 @@ def read_netcdf(path: Path) -> AngleSeries:
     Returns
     -------
     AngleSeries
-        With its `CameraEvidence`.
+        The series with its `CameraEvidence`.
 
     Raises
     ------
     OSError
-        Where the file is missing or is not netCDF-4.
+        If the file is missing or is not netCDF-4.
     InputError
-        Where another program wrote it.
+        If another program wrote it.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> time = np.arange(3) / 30.0
+    >>> series = AngleSeries("nod", time, np.sin(time), np.full(3, 1e-4), ("ok", "ok", "ok"))
+    >>> with TemporaryDirectory() as folder:
+    ...     write_netcdf(series, Path(folder, "nod.angles.nc"))
+    ...     back = read_netcdf(Path(folder, "nod.angles.nc"))
+    >>> np.array_equal(back.angle, series.angle)
+    True
     """
     import h5netcdf
 
@@ -148,7 +162,7 @@ def read_netcdf(path: Path) -> AngleSeries:
 
 
 def _write_exact(group: Any, series: AngleSeries) -> None:
-    """Write the fields of a series and of its evidence as they are; a field that is ``None`` is left out."""
+    """Write the fields of a series and of its evidence unchanged; a field that is ``None`` is left out."""
     group.dimensions = {"radius": len(series.bounds)}
     group.create_variable("radius", ("radius",), "f8", data=np.array(list(series.bounds)))
     bounds = np.array(list(series.bounds.values())).reshape(len(series.bounds), len(series.time))
@@ -159,7 +173,7 @@ def _write_exact(group: Any, series: AngleSeries) -> None:
     for name in ("mark_px", "pivot_px"):
         if getattr(series, name) is not None:
             group.create_variable(name, ("time", "space"), "f8", data=getattr(series, name))
-    group.attrs["name"] = np.frombuffer(os.fsencode(series.name), np.uint8)  # a file's name need not be text
+    group.attrs["name"] = np.frombuffer(os.fsencode(series.name), np.uint8)  # a file's name need not be valid text
     for field in fields(series.evidence):
         value = getattr(series.evidence, field.name)
         if value is not None:
@@ -171,21 +185,21 @@ def _is_whole(value: Any) -> bool:
 
 
 def _from_attribute(value: NDArray | None) -> Any:
-    """Return a flag or a pair as `_write_exact` was given it."""
+    """Return the flag or the pair that `_write_exact` stored as an attribute."""
     if value is None:
         return None
     return tuple(value.tolist()) if value.size == 2 else bool(value)
 
 
 def write_parquet(series: AngleSeries, path: Path) -> None:
-    """Write a series as Parquet with the columns of the CSV, and their units in the schema.
+    """Write a series as Parquet with the columns of the CSV and their units in the schema.
 
     Parameters
     ----------
     series : AngleSeries
-        Measured; what the CSV leaves empty is null.
+        A measured series; cells that are empty in the CSV are null.
     path : Path
-        The file; it appears whole or not at all.
+        The file; it is written whole or not at all.
     """
     import pyarrow as pa
     from pyarrow import parquet
@@ -196,17 +210,17 @@ def write_parquet(series: AngleSeries, path: Path) -> None:
         array = pa.array(values, from_pandas=True)  # NaN becomes null
         schema.append(pa.field(name, array.type, metadata=None if unit is None else {"unit": unit}))
         arrays.append(array)
-    about = {"source_software": f"anglecam {__version__}", "name": printable(series.name)}
-    with write_whole(path) as unfinished, unfinished.open("wb") as stream:  # of a name pyarrow makes an address
-        parquet.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(schema, metadata=about)), stream)
+    metadata = {"source_software": f"anglecam {__version__}", "name": printable(series.name)}
+    with write_whole(path) as unfinished, unfinished.open("wb") as stream:  # pyarrow would read a name as an address
+        parquet.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(schema, metadata=metadata)), stream)
 
 
-def _marks(places_px: NDArray[np.float64] | None, n: int) -> NDArray[np.float64]:
-    return np.full((n, 2), np.nan) if places_px is None else places_px
+def _points(points_px: NDArray[np.float64] | None, n: int) -> NDArray[np.float64]:
+    return np.full((n, 2), np.nan) if points_px is None else points_px
 
 
 def _rate_hz(time: NDArray[np.float64]) -> float:
-    """Return frames per second by the median interval; ``fps`` is a nominal figure, ``time`` holds the truth."""
+    """Return the frame rate from the median interval, Hz; it is nominal, and ``time`` holds the exact times."""
     return 1.0 / float(np.median(np.diff(time))) if len(time) > 1 else float("nan")
 
 

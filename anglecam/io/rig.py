@@ -1,4 +1,4 @@
-"""What is declared about a rig and its camera: ``rig.yaml``, every key optional, an unknown key an error."""
+"""``rig.yaml``: what is declared about a rig and its camera. Every key is optional; an unknown key is an error."""
 
 from __future__ import annotations
 
@@ -14,74 +14,78 @@ SlantDeg = Annotated[float, Field(gt=-80, lt=80, allow_inf_nan=False)]
 
 
 class RigMark(Declared):
-    """The mark at the far end of the lever: its colour, or ``None`` to find it."""
+    """The mark on the body, at the far end of the lever."""
 
     rgb: tuple[Byte, Byte, Byte] | None = None
+    """Its colour; ``None``: the colour is found from the clip."""
 
 
 class RigPivot(Declared):
-    """Where the mechanism turns and how that place is marked."""
+    """Where the mechanism turns, and how that place is marked."""
 
     near: tuple[Finite, Finite] | None = None
-    """A hint, px."""
+    """A point near the pivot, px."""
     marker: Literal["auto", "disc", "ring", "none"] = "auto"
-    """``none``: the centre of rotation fitted to the mouth's path."""
+    """Shape of the marker on the shaft; ``none``: the pivot is the centre of rotation, fitted to the mark's path."""
 
 
 class RigCamera(Declared):
     """What is known about the camera."""
 
     calibration: str | None = None
-    """A calibration file; in ``rig.yaml`` relative to it."""
+    """Path of a calibration file; in ``rig.yaml`` relative to that file."""
     focal_px: Positive | None = None
-    """Focal length where there is no calibration; counts only where the view is tilted."""
+    """Focal length, px, for a camera without a calibration; used only where the view is tilted."""
     tilt_deg: SlantDeg | None = None
-    """Between the line of sight to the pivot and the axis of rotation."""
+    """Angle between the line of sight to the pivot and the axis of rotation, degrees."""
     tilt_axis_deg: Finite = 0.0
-    """Of the axis in the picture about which the camera is turned: 0 looks from above, 90 from the side at the left;
-    counted as angles are, so that ``facing: left`` mirrors it."""
+    """Direction in the picture of the axis about which the camera is turned, degrees: at 0 it looks from above, at 90
+    from the left. It is counted as angles are, so ``facing: left`` mirrors it."""
     tilt_sigma_deg: Annotated[float, Field(ge=0, lt=45, allow_inf_nan=False)] = 0.0
-    """Standard uncertainty of ``tilt_deg``."""
+    """Standard uncertainty of ``tilt_deg``, degrees."""
     row_time_s: Positive | None = None
-    """How much later each row is exposed than the one above it."""
+    """Delay of the exposure from one row of the picture to the next, s."""
     exposure_s: Positive | None = None
+    """Length of the exposure, s."""
 
     @model_validator(mode="after")
     def _one_focal_length(self) -> RigCamera:
         if self.calibration is not None and self.focal_px is not None:
-            raise ValueError("focal_px stands in the calibration already; declare one of them")
+            raise ValueError("focal_px is already in the calibration; declare only one of them")
         return self
 
 
 class RigSync(Declared):
-    """What ties the command's clock to the clip's."""
+    """What relates the command's clock to the clip's clock."""
 
     lamp: tuple[Finite, Finite] | None = None
-    """Where in the picture a lamp stands that lights at the first command change, px."""
+    """Position in the picture of a lamp that lights at the first change of the command, px."""
 
 
 class RigModel(Declared):
     """Starting values of θ̈ = c·u − a·θ̇ − b·θ (Eq. (30) of the paper)."""
 
     a: Finite = 26.0
-    """1/s."""
+    """Damping, 1/s."""
     b: Finite = 524.0
-    """1/s²."""
+    """Stiffness, 1/s²."""
     c: Finite = 508.0
-    """1/s²."""
+    """Gain of the command, 1/s²."""
     gravity_deg: Finite | None = None
-    """The centre of mass from upright at neutral, degrees."""
+    """Direction of the centre of mass from upright at neutral, degrees."""
 
 
 class RigKeypoints(Declared):
-    """Which points that another program has tracked are mouth and pivot."""
+    """Which points that another program has tracked are the mark and the pivot."""
 
     mouth: str
+    """Name of the mark's point."""
     pivot: str
+    """Name of the pivot's point."""
     rate_hz: Positive | None = None
-    """Frames per second, where no clip stands beside the tracks to say when each frame was taken."""
+    """Frames per second, for tracks without their clip next to them, from which frame times would be read."""
     least_likelihood: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = None
-    """Points less likely than this are missing; ``None``: the tracking program's own default."""
+    """Likelihood below which a point counts as missing; ``None``: the tracking program's default."""
 
     @model_validator(mode="after")
     def _two_points(self) -> RigKeypoints:
@@ -91,24 +95,40 @@ class RigKeypoints(Declared):
 
 
 class Rig(Declared):
-    """One rig, as ``rig.yaml`` declares it."""
+    """One rig, as ``rig.yaml`` declares it.
+
+    Examples
+    --------
+    >>> rig = Rig.model_validate({"mouth": {"rgb": [190, 35, 40]}, "pivot": {"near": [218, 298]}})
+    >>> rig.mark_rgb
+    (190, 35, 40)
+    >>> rig.pivot.marker, rig.facing, rig.pixel_error_px
+    ('auto', 'right', (6.0, 10.0))
+    >>> Rig().mark_rgb is None
+    True
+    """
 
     mouth: RigMark | Literal["auto"] = "auto"
+    """The mark; ``auto``: it is found from the clip."""
     pivot: RigPivot = RigPivot()
     facing: Literal["right", "left"] = "right"
+    """Side that the face looks to; with ``left``, angles are counted clockwise in the picture."""
     neutral: Finite | Literal["auto"] = "auto"
-    """``line_deg`` that counts as zero; ``auto``: the rest before the first command change, else the median."""
+    """``line_deg`` that counts as zero; ``auto``: its mean over the rest before the first command change, without a
+    command its median over the clip."""
     pixel_error_px: tuple[Positive, ...] = (6.0, 10.0)
+    """Radii within which the mark may lie, px; each gives a worst-case error of the angle."""
     held_out: tuple[str, ...] = ()
+    """Names of the recordings that are only predicted and never fitted to."""
     camera: RigCamera = RigCamera()
     marks: RigKeypoints | None = None
-    """Of sessions whose recordings are tracks of points."""
+    """For sessions whose recordings are tracks of points."""
     sync: RigSync = RigSync()
     model: RigModel = RigModel()
 
     @property
-    def mouth_rgb(self) -> tuple[int, int, int] | None:
-        """The declared colour of the mouth, ``None`` where it is to be found."""
+    def mark_rgb(self) -> tuple[int, int, int] | None:
+        """The declared colour of the mark; ``None`` if it is to be found from the clip."""
         return None if self.mouth == "auto" else self.mouth.rgb
 
 
@@ -118,20 +138,32 @@ def read_rig(path: Path) -> Rig:
     Parameters
     ----------
     path : Path
-        A YAML file as the README describes it.
+        A YAML file; the classes of this module are its sections.
 
     Returns
     -------
     Rig
-        With the defaults in place of what is not declared.
+        What the file declares; the defaults for everything else. ``camera.calibration`` is resolved against the
+        file's folder.
 
     Raises
     ------
     RigError
-        Naming the file, the key and the cause.
+        If the file cannot be read, a key is unknown or a value is not allowed; the line names the file, the key and
+        the cause.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder, "rig.yaml")
+    ...     _ = path.write_text("{facing: left, neutral: -12.5, held_out: [stairs]}")
+    ...     rig = read_rig(path)
+    >>> rig.facing, rig.neutral, rig.held_out
+    ('left', -12.5, ('stairs',))
     """
     rig = read_declared(path, Rig)
     if rig.camera.calibration is None:
         return rig
-    beside = {"calibration": str(path.parent / rig.camera.calibration)}
-    return rig.model_copy(update={"camera": rig.camera.model_copy(update=beside)})
+    resolved = {"calibration": str(path.parent / rig.camera.calibration)}
+    return rig.model_copy(update={"camera": rig.camera.model_copy(update=resolved)})

@@ -1,6 +1,6 @@
-"""``NAME.angles.csv``: an angle series as a table for people, in degrees and pixels.
+"""``NAME.angles.csv``: an angle series as a table in degrees and pixels.
 
-A frame that could not be measured has empty cells and its cause as ``status``.
+A frame without an angle has empty cells, and its ``status`` is the cause.
 """
 
 from __future__ import annotations
@@ -20,67 +20,67 @@ from anglecam.io.files import write_atomically
 
 
 def write_series(series: AngleSeries, path: Path) -> None:
-    """Write ``NAME.angles.csv``: a row a frame, degrees, empty cells where a frame could not be measured.
+    """Write ``NAME.angles.csv``: one row for each frame, angles in degrees, empty cells for a frame without an angle.
 
     Parameters
     ----------
     series : AngleSeries
-        The recording; radii in ``series.bounds`` beyond 6 px and 10 px become columns after ``status``.
+        The recording. Radii of ``series.bounds`` other than 6 px and 10 px become columns after ``status``.
     path : Path
-        The file; it appears whole or not at all.
+        The file; it is written whole or not at all.
     """
     columns = series_columns(series)
     with write_atomically(path) as stream:
         rows = csv.writer(stream, lineterminator="\n")
         rows.writerow(columns)
         for cells in zip(*columns.values(), strict=True):
-            rows.writerow([_written(name, cell) for name, cell in zip(columns, cells, strict=True)])
+            rows.writerow([_cell(name, cell) for name, cell in zip(columns, cells, strict=True)])
 
 
 def series_columns(series: AngleSeries) -> dict[str, NDArray]:
-    """Return a series as the columns of its file, by name and in order: degrees, pixels, NaN for an empty cell.
+    """Return a series as the columns of its file, in order: degrees, pixels, NaN for an empty cell.
 
     Parameters
     ----------
     series : AngleSeries
-        The recording; radii in ``series.bounds`` beyond 6 px and 10 px become columns after ``status``.
+        The recording. Radii of ``series.bounds`` other than 6 px and 10 px become columns after ``status``.
 
     Returns
     -------
     dict of str to ndarray
-        Each of length n.
+        Columns by name, each of length n.
     """
     n = len(series.time)
     empty = np.full((n, 2), np.nan)
-    mouth = empty if series.mark_px is None else series.mark_px
+    mark = empty if series.mark_px is None else series.mark_px
     pivot = empty if series.pivot_px is None else series.pivot_px
     line = empty[:, 0] if series.line is None else series.line
-    more = sorted(set(series.bounds) - set(CONTRACT_RADII_PX))
-    bounds = {r: np.degrees(series.bounds.get(r, empty[:, 0])) for r in (*CONTRACT_RADII_PX, *more)}
+    further = sorted(set(series.bounds) - set(CONTRACT_RADII_PX))
+    bounds = {r: np.degrees(series.bounds.get(r, empty[:, 0])) for r in (*CONTRACT_RADII_PX, *further)}
     angle, sigma = np.degrees(series.angle), np.degrees(series.sigma)
-    known = [bounds[r] for r in CONTRACT_RADII_PX]
-    cells = [np.arange(n), series.time, angle, sigma, *known, np.degrees(line), *mouth.T, *pivot.T]
+    contract_bounds = [bounds[r] for r in CONTRACT_RADII_PX]
+    cells = [np.arange(n), series.time, angle, sigma, *contract_bounds, np.degrees(line), *mark.T, *pivot.T]
     columns = dict(zip(SERIES_COLUMNS, [*cells, np.array(series.status, dtype=str)], strict=True))
-    return columns | {f"bound_{r:g}px_deg": bounds[r] for r in more}
+    return columns | {f"bound_{r:g}px_deg": bounds[r] for r in further}
 
 
 def read_series(path: Path) -> AngleSeries:
-    """Read an angle series, ours or from elsewhere: ``time_s,angle_deg[,sigma_deg]`` and more columns.
+    """Read an angle series that anglecam or another program wrote; required are ``time_s,angle_deg``.
 
     Parameters
     ----------
     path : Path
-        ``NAME.angles.csv`` with a header; a row whose ``angle_deg`` is empty or NaN is a frame without a measurement.
+        ``NAME.angles.csv`` with a header. A row whose ``angle_deg`` is empty or NaN is a frame without an angle.
 
     Returns
     -------
     AngleSeries
-        With ``mark_px`` and ``pivot_px`` where the file holds them.
+        With ``mark_px`` and ``pivot_px`` if the file has their columns.
 
     Raises
     ------
     InputError
-        Where the file has no usable header, a cell is no number, times do not increase or nothing is measured.
+        If the header lacks a column, a cell is not a number, times do not increase or fewer than 3 angles are measured.
     """
     table = read_columns(path, required=("time_s", "angle_deg"), may_be_empty=True)
     time, angle = table["time_s"], np.radians(table["angle_deg"])
@@ -99,17 +99,17 @@ def read_series(path: Path) -> AngleSeries:
         raise InputError(f"{path}: fewer than 3 measured angles in {n} rows")
     sigma = np.radians(table["sigma_deg"]) if "sigma_deg" in table else np.full(n, np.nan)
     points = {
-        mark: np.column_stack([table[f"{mark}_x_px"], table[f"{mark}_y_px"]])
-        for mark in ("mouth", "pivot")
-        if f"{mark}_x_px" in table and f"{mark}_y_px" in table
+        point: np.column_stack([table[f"{point}_x_px"], table[f"{point}_y_px"]])
+        for point in ("mouth", "pivot")
+        if f"{point}_x_px" in table and f"{point}_y_px" in table
     }
     line = np.radians(table["line_deg"]) if "line_deg" in table else None
     name = path.name.removesuffix(".csv").removesuffix(".angles")
     return AngleSeries(name, time, angle, sigma, status, line, points.get("mouth"), points.get("pivot"))
 
 
-def _written(column: str, value: Any) -> str:
-    """Write a cell: time to nine digits, angles to a millionth of a degree, else four digits."""
+def _cell(column: str, value: Any) -> str:
+    """Return a cell's text: times with nine significant digits, angles with six decimals, all else with four."""
     if column in ("frame", "status"):
         return str(value)
     if column == "time_s":

@@ -1,4 +1,4 @@
-"""Files in which something is declared: YAML whose every key is optional and whose unknown key is an error."""
+"""YAML files of declarations: every key is optional, an unknown key is an error."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from anglecam.errors import RigError
 from anglecam.io.files import read_text
 
 _MOST_BYTES = 256 * 1024
-"""A file that names a thousand recordings has a tenth of it."""
+"""Size above which a file is not read; one that names a thousand recordings has a tenth of it."""
 _DEEPEST = 20
-"""Levels of nesting; a rig has four."""
+"""Levels of nesting that are read; a rig file has four."""
 
 _LARGEST = 1e12
-"""Nothing about a rig or a neck is larger in its unit, nor smaller than the inverse: powers of it stay finite."""
+"""Largest value of a quantity of a rig or a neck in its unit; its inverse is the smallest. Powers of it stay finite."""
 
 
 def _not_tiny(value: float) -> float:
@@ -32,7 +32,7 @@ Finite = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST, allow_inf_nan=False)]
 
 
 class Declared(BaseModel):
-    """A section of such a file."""
+    """A section of such a file; frozen, and an unknown key is an error."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -41,24 +41,24 @@ Section = TypeVar("Section", bound=Declared)
 
 
 def read_declared(path: Path, kind: type[Section]) -> Section:
-    """Read and validate a file in which something is declared.
+    """Read and validate a file of declarations.
 
     Parameters
     ----------
     path : Path
-        A YAML file; an empty one declares nothing.
+        A YAML file; an empty file declares nothing.
     kind : type
-        What is declared in it.
+        The class that the file's content is validated against.
 
     Returns
     -------
     Declared
-        With the defaults in place of what is not declared.
+        What the file declares; the defaults for everything else.
 
     Raises
     ------
     RigError
-        Naming the file, the key and the cause.
+        If the file cannot be read or its content is not valid; the line names the file, the key and the cause.
     """
     try:
         text = read_text(path, _MOST_BYTES)
@@ -84,10 +84,10 @@ def read_declared(path: Path, kind: type[Section]) -> Section:
 
 
 def _require_plain(path: Path, text: str) -> None:
-    """Refuse what YAML can do beyond keys and values, before anything is built of it.
+    """Refuse YAML's aliases, tags and deep nesting before any object is built.
 
-    Aliases make a page into more values than a memory holds, nesting can be deeper than Python's stack, and tags ask
-    for types that nothing here declares.
+    Aliases can expand one page into more values than the memory holds, nesting can be deeper than Python's stack, and
+    tags request types that no declaration uses.
     """
     depth = 0
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
@@ -95,29 +95,29 @@ def _require_plain(path: Path, text: str) -> None:
             depth += 1
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
-        more = "an alias" if isinstance(event, yaml.AliasEvent) else "a tag" if getattr(event, "tag", None) else None
+        fault = "an alias" if isinstance(event, yaml.AliasEvent) else "a tag" if getattr(event, "tag", None) else None
         if depth > _DEEPEST:
-            more = f"more than {_DEEPEST} levels"
-        if more:
+            fault = f"more than {_DEEPEST} levels"
+        if fault:
             line = "" if event.start_mark is None else f"line {event.start_mark.line + 1}: "
-            raise RigError(f"{path}: {line}{more}; only plain keys and values are read")
+            raise RigError(f"{path}: {line}{fault}; only plain keys and values are read")
 
 
 def _first(error: ValidationError) -> str:
-    """Say the most telling of pydantic's findings in one line."""
+    """Return pydantic's most informative finding as one line: an unknown key if there is one, else the first."""
     findings = error.errors()
     unknown = [f for f in findings if f["type"] == "extra_forbidden"]
     finding = (unknown or findings)[0]
-    kinds = {"literal['auto']", "float", *(section.__name__ for section in Declared.__subclasses__())}
-    key = ".".join(str(part)[:60] for part in finding["loc"] if part not in kinds)
+    types = {"literal['auto']", "float", *(section.__name__ for section in Declared.__subclasses__())}
+    key = ".".join(str(part)[:60] for part in finding["loc"] if part not in types)  # of a union, pydantic adds the type
     if unknown:
         return f"unknown key {key}"
-    said = finding["msg"].removeprefix("Value error, ").replace("tuple", "list")
+    cause = finding["msg"].removeprefix("Value error, ").replace("tuple", "list")
     got = "" if finding["type"] == "value_error" else f" (got {_shown(finding['input'])})"
-    return f"{key}: {said[0].lower()}{said[1:]}{got}"
+    return f"{key}: {cause[0].lower()}{cause[1:]}{got}"
 
 
 def _shown(value: object) -> str:
-    if isinstance(value, int) and value.bit_length() > 200:  # Python does not write out what is longer than its limit
+    if isinstance(value, int) and value.bit_length() > 200:  # Python refuses to write out very long numbers
         return f"a number of {value.bit_length()} bits"
     return str(value)[:60]

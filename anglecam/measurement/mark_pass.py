@@ -70,9 +70,9 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
     def placed(i: int, point: Floats) -> Floats:
         return lens.rectify(moves[i].to_reference(point) if moves else point)
 
-    found = find_mark(images, rig.mouth_rgb, near, placed) if images else None
+    found = find_mark(images, rig.mark_rgb, near, placed) if images else None
     if found is None:
-        body = detect_rigid_body(film, rig) if rig.mouth_rgb is None and images else None
+        body = detect_rigid_body(film, rig) if rig.mark_rgb is None and images else None
         if isinstance(body, Detections):
             return body
         besides = "" if body is None else f"; nor can the body be followed without a mark: {body}"
@@ -212,7 +212,7 @@ def _read_regions(
 
 
 def _colour(rig: Rig) -> str:
-    return "auto" if rig.mouth_rgb is None else ",".join(map(str, rig.mouth_rgb))
+    return "auto" if rig.mark_rgb is None else ",".join(map(str, rig.mark_rgb))
 
 
 def _no_mark(path: Path, sample: Sample, rig: Rig) -> str:

@@ -1,4 +1,4 @@
-"""``NAME.budget.html`` and ``NAME.budget.json``: every term of the angle's uncertainty, and what checks it."""
+"""``NAME.budget.html`` and ``NAME.budget.json``: every term of the angle's uncertainty, checked by Monte Carlo."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from anglecam.video.film import Film
 
 _HUES = ("#1f6f8b", "#c4432b", "#d39b23", "#6a4c93", "#3d7a4a", "#8a939c", "#b5651d", "#2b6cff", "#444b53")
 _MANY = 1000
-"""Degrees of freedom beyond which Student's t is the normal distribution to three digits."""
+"""Degrees of freedom beyond which Student's t equals the normal distribution to three digits."""
 _GAP = 1.5
-"""Frame intervals; where frames are missing a curve is broken."""
+"""Gap between frames, in median frame intervals, at which a curve is interrupted."""
 
 
 def write_budget(film: Film, measured: Measurement, rig: Rig, out: Path) -> Budget:
@@ -35,23 +35,23 @@ def write_budget(film: Film, measured: Measurement, rig: Rig, out: Path) -> Budg
     Parameters
     ----------
     film : Film
-        The clip; one frame of it is shown.
+        The clip; the page shows one frame of it.
     measured : Measurement
-        What was measured in it.
+        The measured clip.
     rig : Rig
-        That it was measured with.
+        The rig that it was measured with.
     out : Path
-        A folder; made if missing.
+        A folder; created if missing.
 
     Returns
     -------
     Budget
-        What the files hold.
+        The content of the files.
 
     Raises
     ------
     InputError
-        Where the film can no longer be read.
+        If the film can no longer be read.
     """
     budget = budget_of(film.path.stem, error_sources(measured, rig), rig.pixel_error_px)
     write_json(out / f"{film.path.stem}.budget.json", budget_as_dict(budget))
@@ -60,16 +60,16 @@ def write_budget(film: Film, measured: Measurement, rig: Rig, out: Path) -> Budg
 
 
 def write_page(path: Path, budget: Budget, scene: Scene | None) -> None:
-    """Write the page of a budget, one file that opens anywhere.
+    """Write the page of a budget as one HTML file without external resources.
 
     Parameters
     ----------
     path : Path
         The HTML file.
     budget : Budget
-        Of a clip.
+        A clip's budget.
     scene : Scene, optional
-        The frame for Fig. 8, where there is one.
+        The frame for Fig. 8; without it the figure is left out.
     """
     environment = Environment(loader=PackageLoader("anglecam.report", "."), autoescape=True, undefined=StrictUndefined)
     environment.filters["g"] = lambda value: f"{value:.3g}"
@@ -77,8 +77,8 @@ def write_page(path: Path, budget: Budget, scene: Scene | None) -> None:
     content = budget_as_dict(budget)
     frames = (("typical frame", budget.typical), ("worst frame", budget.worst))
     drawings = {
-        "course": _course_figure(budget),
-        "drawn": _drawn_figure(budget),
+        "over_time": _figure_over_time(budget),
+        "distributions": _distribution_figure(budget),
         "figure8": None if scene is None else figure8(scene),
     }
     text = environment.get_template("budget.html").render(
@@ -89,8 +89,8 @@ def write_page(path: Path, budget: Budget, scene: Scene | None) -> None:
         pivot_sigma=np.sqrt(np.diag(budget.sources.pivot_covariance_px2)),
         median_sigma=math.degrees(float(np.median(budget.sigma))),
         registered=budget.sources.registration is not None,
-        timed=not all(course.in_sigma for course in budget.terms_over_time),
-        frames=[_shown(title, one, content[title.split()[0]]) for title, one in frames],
+        timed=not all(term.in_sigma for term in budget.terms_over_time),
+        frames=[_frame_content(title, one, content[title.split()[0]]) for title, one in frames],
         decimals=_decimals(budget.typical.combined.standard, 3),
         paper=[
             {
@@ -109,7 +109,7 @@ def write_page(path: Path, budget: Budget, scene: Scene | None) -> None:
 
 
 def budget_table(budget: Budget) -> Table:
-    """Tabulate a budget for the terminal: its typical frame term by term, the clip, and the pixel bounds."""
+    """Return a budget as a table for the terminal: the typical frame term by term, the clip and the pixel bounds."""
     one = budget.typical
     combined, digits = one.combined, _decimals(one.combined.standard, 3)
     table = Table(
@@ -141,7 +141,7 @@ def budget_table(budget: Budget) -> Table:
         "expanded, 95 %", "", "", "", f"k = {combined.coverage_factor:.2f}", f"{combined.expanded:.{digits}f}"
     )
     half = (one.drawn.high - one.drawn.low) / 2.0
-    table.add_row("the same drawn", "", "", "", f"{one.drawn.trials} trials", f"{half:.{digits}f}")
+    table.add_row("by Monte Carlo, 95 %", "", "", "", f"{one.drawn.trials} trials", f"{half:.{digits}f}")
     table.add_section()
     rms, worst = math.sqrt(float((budget.total**2).mean())), float(budget.total.max())
     table.add_row("combined, RMS of the clip", "", "", "", "", f"{math.degrees(rms):.{digits}f}")
@@ -157,15 +157,15 @@ def budget_table(budget: Budget) -> Table:
 
 def _scene(film: Film, measured: Measurement, frame: int) -> Scene | None:
     contour = measured.contours_px[frame]
-    mouth, pivot = measured.series.mark_px, measured.series.pivot_px
+    mark, pivot = measured.series.mark_px, measured.series.pivot_px
     image = next((f.image for f in film.frames() if f.index == frame), None)
-    if image is None or contour is None or mouth is None or pivot is None:
+    if image is None or contour is None or mark is None or pivot is None:
         return None
-    return Scene(image, contour, mouth[frame], pivot[frame])
+    return Scene(image, contour, mark[frame], pivot[frame])
 
 
-def _shown(title: str, one: FrameBudget, content: dict[str, Any]) -> dict[str, Any]:
-    """Gather what the page says of one frame; the last digit of U sets the last digit of the angle (GUM 7.2.6)."""
+def _frame_content(title: str, one: FrameBudget, content: dict[str, Any]) -> dict[str, Any]:
+    """Return the page's content for one frame; the last digit of U sets the last digit of the angle (GUM 7.2.6)."""
     stated = _decimals(one.combined.expanded, 2)
     fine = _decimals(one.combined.standard, 4)
 
@@ -174,7 +174,7 @@ def _shown(title: str, one: FrameBudget, content: dict[str, Any]) -> dict[str, A
 
     known = 1.959964 * one.combined.standard
     low, high = one.angle_deg - one.combined.expanded, one.angle_deg + one.combined.expanded
-    # where the linear budget does not hold, the drawn interval is the one to state (JCGM 101, 5.8)
+    # if the linear budget is not validated, the Monte Carlo interval is stated (JCGM 101, 5.8)
     ends = (one.drawn.low, one.drawn.high)
     half = one.combined.expanded if one.comparison.agrees else max(abs(end - one.angle_deg) for end in ends)
     return {
@@ -198,8 +198,8 @@ def _shown(title: str, one: FrameBudget, content: dict[str, Any]) -> dict[str, A
     }
 
 
-def _course_figure(budget: Budget) -> str:
-    """Draw angle, uncertainty and every term's contribution over time, as SVG."""
+def _figure_over_time(budget: Budget) -> str:
+    """Draw the angle, its uncertainty and every term's contribution over time, as SVG."""
     s = budget.sources
     with plt.rc_context(STYLE):
         figure, (top, bottom) = plt.subplots(
@@ -217,8 +217,8 @@ def _course_figure(budget: Budget) -> str:
         plot(bottom, budget.total, color=MEASURED, lw=1.8, label="combined")
         if not np.allclose(budget.sigma, budget.total):
             plot(bottom, budget.sigma, color=MEASURED, lw=1.0, ls=":", label="sigma of the series")
-        for course, hue in zip(budget.terms_over_time, _HUES, strict=False):
-            plot(bottom, course.contribution, color=hue, lw=1.0, label=course.name)
+        for term, hue in zip(budget.terms_over_time, _HUES, strict=False):
+            plot(bottom, term.contribution, color=hue, lw=1.0, label=term.name)
         for one, name in ((budget.typical, "typical"), (budget.worst, "worst")):
             for ax in (top, bottom):
                 ax.axvline(one.time, color=FAINT, lw=4, zorder=0)
@@ -230,8 +230,8 @@ def _course_figure(budget: Budget) -> str:
         return _svg(figure)
 
 
-def _drawn_figure(budget: Budget) -> str:
-    """Draw the drawn densities against what the GUM assumes, with both 95 % intervals, as SVG."""
+def _distribution_figure(budget: Budget) -> str:
+    """Draw the Monte Carlo densities with the densities that the GUM assumes and both 95 % intervals, as SVG."""
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(1, 2, figsize=(9, 2.9), layout="constrained")
         for ax, one, name in zip(axes, (budget.typical, budget.worst), ("typical frame", "worst frame"), strict=True):
@@ -244,17 +244,17 @@ def _drawn_figure(budget: Budget) -> str:
 
 
 def _draw_density(ax: Any, one: FrameBudget, drawn: Propagated) -> None:
-    from scipy import stats  # takes most of a second to load, which other pages are spared
+    from scipy import stats  # loading takes most of a second, which other pages do not need
 
     c = one.combined
-    ax.stairs(drawn.density, drawn.edges - one.angle_deg, fill=True, color=FAINT, label="drawn")
+    ax.stairs(drawn.density, drawn.edges - one.angle_deg, fill=True, color=FAINT, label="Monte Carlo")
     x = np.linspace(drawn.edges[0], drawn.edges[-1], 400) - one.angle_deg
     pdf = stats.norm.pdf(x / c.standard) if math.isinf(c.dof) else stats.t.pdf(x / c.standard, c.dof)
     ax.plot(
         x, pdf / c.standard, color=AFTER, lw=1.2, label="GUM: Student's t" if math.isfinite(c.dof) else "GUM: normal"
     )
     for ends, colour, style, label in (
-        ((drawn.low - one.angle_deg, drawn.high - one.angle_deg), MEASURED, "-", "95 % drawn"),
+        ((drawn.low - one.angle_deg, drawn.high - one.angle_deg), MEASURED, "-", "95 % Monte Carlo"),
         ((-c.expanded, c.expanded), BEFORE, "--", "95 % GUM"),
     ):
         for k, end in enumerate(ends):
@@ -266,5 +266,5 @@ def _nu(dof: float | None) -> str:
 
 
 def _decimals(value: float, digits: int) -> int:
-    """Return how many decimals show so many significant digits."""
+    """Return the number of decimals that show a number of significant digits."""
     return 3 if value <= 0.0 else max(digits - 1 - math.floor(math.log10(value)), 0)

@@ -1,4 +1,4 @@
-"""The figure beside a calibration: where the board's corners were seen, what they left over, what the lens does."""
+"""The figure of a calibration: the positions of the board's corners, their residuals and the lens distortion."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from anglecam.errors import printable
 from anglecam.report.figures import AFTER, FAINT, MEASURED, STYLE
 
 _ARROW_SHARE = 0.05
-"""Of the picture's width: the length of the largest residual as it is drawn."""
+"""Length at which the largest residual is drawn, as a share of the picture's width."""
 
 
 def plot_calibration(found: BoardCalibration, path: Path, title: str) -> None:
-    """Draw a calibration: corners over the picture with their residuals, residuals as a cloud, and the distortion.
+    """Draw a calibration: the corners over the picture, the residuals as a scatter plot, and the distortion.
 
     Parameters
     ----------
     found : BoardCalibration
-        What `calibrate_clip` returned.
+        The result of `calibrate_clip`.
     path : Path
-        A PNG file; its folder is made if missing.
+        A PNG file; its folder is created if missing.
     title : str
-        Heading, the clip's name.
+        The heading, which is the clip's name.
     """
     with plt.rc_context(STYLE):
         figure, axes = plt.subplots(1, 3, figsize=(11.5, 4.0), width_ratios=(1.7, 1.0, 1.1), layout="constrained")
@@ -56,7 +56,7 @@ def _draw_coverage(axes: Axes, found: BoardCalibration) -> None:
     axes.quiver(*corners.T, *(scale * residuals).T, angles="xy", scale_units="xy", scale=1, color=AFTER, width=0.0015)
     axes.plot(*corners.T, ".", color=MEASURED, ms=1.5)
     axes.set(xlim=(0, size[0] - 1), ylim=(size[1] - 1, 0), aspect="equal", xlabel="x, px", ylabel="y, px")
-    axes.set_title(f"corners, and what they left over, {scale:.0f} times as long", loc="left", fontsize=9)
+    axes.set_title(f"corners, with residuals enlarged {scale:.0f} times", loc="left", fontsize=9)
 
 
 def _draw_residuals(axes: Axes, found: BoardCalibration) -> None:
@@ -67,7 +67,7 @@ def _draw_residuals(axes: Axes, found: BoardCalibration) -> None:
 
 
 def _draw_distortion(axes: Axes, found: BoardCalibration) -> None:
-    """Draw how far the lens moves a point, along the picture's diagonal, with two standard deviations."""
+    """Draw the displacement of a point by the lens along the picture's diagonal, with two standard deviations."""
     lens = Lens(found.calibration)
     assert found.calibration.size is not None
     corner = np.array(found.calibration.size) - 1.0
@@ -81,7 +81,7 @@ def _draw_distortion(axes: Axes, found: BoardCalibration) -> None:
     axes.plot(place, moved, color=AFTER, lw=1.0, label="distortion")
     for sign in (-1, 1):
         edge = sign * found.reach * np.hypot(*corner) / 2.0
-        axes.axvline(edge, color=MEASURED, lw=0.6, ls=":", label="farthest corner seen" if sign > 0 else None)
-    axes.set(xlabel="along the diagonal, px from the middle", ylabel="moved along it, px")
-    axes.set_title("what the lens does", loc="left", fontsize=9)
+        axes.axvline(edge, color=MEASURED, lw=0.6, ls=":", label="farthest corner found" if sign > 0 else None)
+    axes.set(xlabel="position on the diagonal, px from the middle", ylabel="displacement, px")
+    axes.set_title("distortion by the lens", loc="left", fontsize=9)
     axes.legend(fontsize=7)

@@ -1,4 +1,4 @@
-"""Fig. 8 of the paper, redrawn on the user's own frame: how an edge that is off by some pixels turns the line."""
+"""Fig. 8 of the paper, drawn for a frame of the user's clip: how an edge off by some pixels rotates the line."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ RADII_PX = (6.0, 10.0)
 _TRUE, _SIX, _TEN, _PIVOT = "#d7191c", "#2b6cff", "#12a150", "#ffd400"
 _LINES = ((_SIX, "--"), (_TEN, "-."))
 _CASING = [Stroke(linewidth=2.8, foreground="white", alpha=0.8), Normal()]
-"""A red line is to be seen on red lips."""
-_ROOM_PX = 14
-"""Around the mouth's outline, so that both circles have room."""
+"""White border of a red line, so that it is visible on a red mark."""
+_MARGIN_PX = 14
+"""Margin around the mark's outline, px, so that both circles fit in."""
 _INNER_PX = 2
-"""Pixels this near to the outline are neither mouth nor surroundings."""
+"""Distance from the outline, px, within which a pixel counts neither as mark nor as background."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """One frame and what was measured in it."""
+    """One frame and the outline and points measured in it."""
 
     image: Image
     """(h, w, 3) blue, green, red."""
     contour_px: NDArray[np.int32]
-    """(k, 2) outline of the mouth."""
+    """(k, 2) outline of the mark, px."""
     mark_px: Floats
-    """(2,)."""
+    """(2,) px."""
     pivot_px: Floats
-    """(2,)."""
+    """(2,) px."""
 
 
 def figure8(scene: Scene) -> str:
     """Draw the six panels of Fig. 8, as SVG.
 
-    (a) the mouth, zoomed; (b) lines from the pivoting axis: the one measured and two erroneous ones, each touching
-    its circle, the farthest that a point within 6 px or 10 px can turn it; (c) the cropped image; (d) Canny edges of
-    the mouth's fraction; (e) the boundary filled; (f) the filled boundary with both circles.
+    (a) The mark, zoomed. (b) Lines from the pivoting axis: the measured line, and the tangents of the circles of 6 px
+    and 10 px, the largest rotations that a point within the circle can cause. (c) The cropped image. (d) Canny edges of
+    the map of the mark's fraction in each pixel. (e) The boundary filled. (f) The filled boundary with both circles.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def figure8(scene: Scene) -> str:
     Returns
     -------
     str
-        An ``<svg>`` element, the picture within it.
+        An ``<svg>`` element that contains the pictures.
     """
     rows, columns = _window(scene)
     crop = scene.image[rows, columns]
@@ -67,7 +67,7 @@ def figure8(scene: Scene) -> str:
         figure, axes = plt.subplots(2, 3, figsize=(10, 6.4), layout="constrained")
         pictures = (scene.image, scene.image, crop, edges, filled, filled)
         titles = (
-            "(a) zoomed mouth",
+            "(a) zoomed mark",
             "(b) lines from the pivoting axis",
             "(c) cropped image",
             "(d) Canny edges",
@@ -96,21 +96,26 @@ def figure8(scene: Scene) -> str:
 
 
 def touching_point(pivot_px: Floats, mark_px: Floats, radius_px: float, side: float) -> Floats:
-    """Return where a line from the pivot touches the circle about the mouth: the worst place within it.
+    """Return the point where a tangent from the pivot touches the circle around the mark: the worst case within it.
 
     Parameters
     ----------
     pivot_px, mark_px : ndarray
         (2,) px.
     radius_px : float
-        Of the circle, less than the lever arm.
+        Radius r of the circle, px, smaller than the lever arm R.
     side : float
-        1 or −1: which of the two.
+        1 or −1: which of the two tangents.
 
     Returns
     -------
     ndarray
-        (2,) px, at √(R² − r²) from the pivot, asin(r/R) off the line to the mouth.
+        (2,) px, at a distance √(R² − r²) from the pivot and rotated by asin(r/R) from the line to the mark.
+
+    Examples
+    --------
+    >>> touching_point(np.array([0.0, 0.0]), np.array([10.0, 0.0]), 6.0, 1.0).round(6)
+    array([6.4, 4.8])
     """
     arm = mark_px - pivot_px
     lever = float(np.hypot(*arm))
@@ -124,8 +129,8 @@ def _window(scene: Scene) -> tuple[slice, slice]:
     height, width = scene.image.shape[:2]
     (left, top), (right, bottom) = scene.contour_px.min(axis=0), scene.contour_px.max(axis=0)
     return (
-        slice(max(int(top) - _ROOM_PX, 0), min(int(bottom) + _ROOM_PX + 1, height)),
-        slice(max(int(left) - _ROOM_PX, 0), min(int(right) + _ROOM_PX + 1, width)),
+        slice(max(int(top) - _MARGIN_PX, 0), min(int(bottom) + _MARGIN_PX + 1, height)),
+        slice(max(int(left) - _MARGIN_PX, 0), min(int(right) + _MARGIN_PX + 1, width)),
     )
 
 
@@ -135,7 +140,7 @@ def _filled(scene: Scene) -> Image:
 
 
 def _edges(crop: Image, filled: Image) -> Image:
-    """Return Canny's edges of the fraction of mouth in each pixel, as the measuring sees it."""
+    """Return Canny edges of the mark's fraction in each pixel, computed as in the measurement."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _INNER_PX + 1,) * 2)
     inside, outside = cv2.erode(filled, disc) > 0, cv2.dilate(filled, disc) == 0
     model = learn_colour(crop[inside], crop[outside], crop[outside])
@@ -169,7 +174,7 @@ def _limit(ax: Axes, corners: Floats) -> None:
 
 
 def _widened(points: Floats, shape: tuple[int, ...]) -> Floats:
-    """Return the corners of a square window about points, within the picture."""
+    """Return the corners of a square window around points, within the picture."""
     half = 0.5 * float(np.ptp(points, axis=0).max()) + 3.0 * max(RADII_PX)
     middle = points.mean(axis=0)
     corners = np.stack([middle - half, middle + half])

@@ -1,4 +1,4 @@
-"""How figures look, and the plot beside every measured clip; drawn with matplotlib."""
+"""The common style of all figures, and the plot of a measured clip; drawn with matplotlib."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import matplotlib
 
-matplotlib.use("Agg")  # no screen
+matplotlib.use("Agg")  # draws without a display
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -34,12 +34,12 @@ STYLE: Any = {
 
 
 def plot_series(series: AngleSeries, path: Path) -> None:
-    """Draw a measured clip: angle over time with its 6 px bound, its sigma, and the frames without an angle.
+    """Draw a measured clip: the angle over time with its 6 px bound, its sigma, and the frames without an angle.
 
     Parameters
     ----------
     series : AngleSeries
-        What was measured.
+        The measured series.
     path : Path
         A PNG file.
     """
@@ -67,7 +67,7 @@ def plot_series(series: AngleSeries, path: Path) -> None:
 
 
 def _svg(figure: Figure) -> str:
-    """Return a figure as an ``<svg>`` element that is the same each time, and close it."""
+    """Return a figure as an ``<svg>`` element whose text is reproducible, and close the figure."""
     text = io.StringIO()
     figure.savefig(text, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     plt.close(figure)

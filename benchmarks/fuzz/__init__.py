@@ -1,1 +1,1 @@
-"""Damaged files: whatever is wrong with one, it is measured or refused in one line that names it."""
+"""Fuzzing with damaged files: each must be measured, or refused in one line that names it."""

@@ -1,10 +1,10 @@
-"""Measure damaged clips: none may cost more than itself.
+"""Measure damaged clips: none may affect anything but its own result.
 
     PYTHONPATH=.:tests .venv/bin/python -m benchmarks.fuzz.clips [2000] [--seed 1] [--first 0] [--keep build/fuzz]
 
-A head nods for ten frames of 160 × 120 px; it is filmed as FFV1 in Matroska, MJPEG in AVI, H.264 in MP4 and MJPEG in
-MOV, and each film is damaged in ways that follow from seed and number alone. `measure_clip` reads what
-is left of it, in a process of its own with limits on time and memory.
+A rig moves for ten frames of 160 × 120 px. It is filmed as FFV1 in Matroska, MJPEG in AVI, H.264 in MP4 and MJPEG in
+MOV, and each film is damaged in a way that depends on seed and number alone. `measure_clip` reads the damaged film in a
+separate process with limits on time and memory.
 """
 
 from __future__ import annotations
@@ -32,15 +32,16 @@ FILMS = {
 SECONDS, MOST_BYTES = 120.0, 1024 * 2**20
 ABSURD = (0, 1, 2, 0x7FFF, 0x8000, 0xFFFF, 100_000_000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
 BOXES = (b"moov", b"trak", b"mdia", b"minf", b"stbl", b"dinf", b"edts", b"udta")
-"""Of MP4 and MOV, those that hold others."""
+"""Boxes of MP4 and MOV that contain other boxes."""
 CHUNKS = (b"RIFF", b"LIST")
+"""Chunks of AVI that contain other chunks."""
 
 Damage = Callable[[np.random.Generator, str, bytes], bytes]
 
 
 @cache
 def films() -> dict[str, bytes]:
-    """Film the head once in every container."""
+    """Return the undamaged film in every container, by its ending."""
     angles = 9 * np.cos(np.pi * np.arange(FRAMES) / (FRAMES - 1))
     drawn = [
         cv2.resize(f, SIZE, interpolation=cv2.INTER_AREA) for f in draw_frames(Look(marker="ring"), angles, seed=1)
@@ -72,7 +73,7 @@ def cases(count: int, seed: int, first: int = 0) -> Iterator[tuple[int, Case]]:
 
 
 def flip_bits(rng: np.random.Generator, ending: str, film: bytes, within: slice = slice(None)) -> bytes:
-    """Turn over 1 to 64 bits."""
+    """Flip 1 to 64 bits."""
     data = np.frombuffer(film, np.uint8).copy()
     part = data[within]
     at = rng.integers(0, len(part), int(2 ** rng.uniform(0, 6)))
@@ -81,38 +82,38 @@ def flip_bits(rng: np.random.Generator, ending: str, film: bytes, within: slice 
 
 
 def flip_header_bits(rng: np.random.Generator, ending: str, film: bytes) -> bytes:
-    """Turn over bits where a container tells of its content: at the start, in MP4 and MOV at the end."""
+    """Flip bits where a container describes its content: at the start, in MP4 and MOV at the end."""
     return flip_bits(rng, ending, film, slice(-1200, None) if ending in ("mp4", "mov") else slice(0, 600))
 
 
 def cut(rng: np.random.Generator, ending: str, film: bytes) -> bytes:
-    """Lose the end, or the start."""
+    """Remove the end or the start."""
     at = int(rng.integers(0, len(film)))
     return film[:at] if rng.uniform() < 0.8 else film[at:]
 
 
 def swap_header(rng: np.random.Generator, ending: str, film: bytes) -> bytes:
-    """Begin like another film."""
+    """Replace the start by that of another film."""
     n = int(2 ** rng.uniform(2, 11))
     return _other(rng, ending)[:n] + film[n:]
 
 
 def zero_bytes(rng: np.random.Generator, ending: str, film: bytes) -> bytes:
-    """Overwrite up to all of it with zeros, or with noise."""
+    """Overwrite a part, or all of it, with zeros or noise."""
     n = int(len(film) ** rng.uniform(0.1, 1.0))
     at = int(rng.integers(0, len(film) - n + 1))
     return film[:at] + (bytes(n) if rng.uniform() < 0.7 else rng.bytes(n)) + film[at + n :]
 
 
 def keep(rng: np.random.Generator, ending: str, film: bytes) -> bytes:
-    """Leave it as it is, under another ending."""
+    """Leave the content unchanged; the file gets another ending."""
     return film
 
 
 def absurd_size(rng: np.random.Generator, ending: str, film: bytes) -> bytes:
-    """Claim other widths and heights, wherever the true ones stand."""
+    """Replace width and height by absurd ones wherever they are stored."""
     width, height = (int(rng.choice([0, 1, 33, 4096, 16_384, 32_768, 65_535, 2**31 - 1, 2**32 - 1])) for _ in range(2))
-    if ending == "mkv":  # PixelWidth, PixelHeight, and the two of the display, which give way
+    if ending == "mkv":  # PixelWidth and PixelHeight; they overwrite the display's width and height
         start = film.index(bytes([0xB0, 0x81, SIZE[0], 0xBA, 0x81, SIZE[1]]))
         sizes = b"\xb0\x84" + width.to_bytes(4, "big") + b"\xba\x84" + height.to_bytes(4, "big") + b"\xec\x80"
         return film[:start] + sizes + film[start + len(sizes) :]
@@ -138,13 +139,13 @@ def absurd_number(rng: np.random.Generator, ending: str, film: bytes) -> bytes:
 
 
 def splice(rng: np.random.Generator, ending: str, film: bytes) -> bytes:
-    """Go on as another film, or as the same once more."""
+    """Continue with a part of another film, or of the same film again."""
     other = _other(rng, ending) if rng.uniform() < 0.7 else film
     return film[: int(rng.integers(1, len(film)))] + other[int(rng.integers(0, len(other))) :]
 
 
 def duplicate(rng: np.random.Generator, ending: str, film: bytes) -> bytes:
-    """Repeat a box or chunk up to a thousand times, with the lengths about it put right or not."""
+    """Repeat a box or chunk up to a thousand times; the lengths of the boxes around it are corrected or not."""
     parts = _parts(ending, film)
     start, end = parts[rng.integers(len(parts))]
     again = film[start:end] * max(1, min(int(10 ** rng.uniform(0, 3)), 2_000_000 // (end - start)))
@@ -177,7 +178,7 @@ def _other(rng: np.random.Generator, ending: str) -> bytes:
 
 
 def _parts(ending: str, film: bytes) -> list[tuple[int, int]]:
-    """Return where the boxes of a film are, those within others too; of Matroska, evenly spread pieces."""
+    """Return start and end of every box or chunk, including nested ones; in Matroska, of evenly spaced pieces."""
     if ending == "mkv":
         return [(at, at + 64) for at in range(0, min(len(film), 4096) - 64, 16)]
     found: list[tuple[int, int]] = []
@@ -202,7 +203,7 @@ def _parts(ending: str, film: bytes) -> list[tuple[int, int]]:
 
 
 def readers() -> dict[str, Reader]:
-    """Return the one reader of clips."""
+    """Return the reader of clips."""
     from anglecam.io.rig import Rig
     from anglecam.measurement.clip import measure_clip
     from anglecam.video.film import open_film
@@ -213,10 +214,10 @@ def readers() -> dict[str, Reader]:
 
 
 def main() -> None:
-    """Run the cases; status 1 where there is a finding."""
-    asked = arguments(__doc__)
+    """Run the cases; exit status 1 if there is a finding."""
+    options = arguments(__doc__)
     trial = Trial(readers, seconds=SECONDS, most_bytes=MOST_BYTES)
-    sys.exit(1 if run_all(cases(asked.cases, asked.seed, asked.first), trial, asked.keep) else 0)
+    sys.exit(1 if run_all(cases(options.cases, options.seed, options.first), trial, options.keep) else 0)
 
 
 if __name__ == "__main__":

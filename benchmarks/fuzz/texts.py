@@ -1,9 +1,10 @@
-"""Read damaged rig, neck, calibration, command, series, track and model files: each is read or refused in one line.
+"""Read damaged rig, neck, calibration, command, series, track and model files: each is read, or refused in one line.
 
     PYTHONPATH=.:tests .venv/bin/python -m benchmarks.fuzz.texts [2000] [--seed 1] [--first 0] [--keep build/fuzz]
 
-Good files are damaged as bytes (bits, cuts, zeros, other encodings) and as what they mean: numbers that are absurd or
-none, keys and cells that are missing, doubled, moved or of another kind, nesting and aliases without end.
+Valid files are damaged in their bytes (bits, cuts, zeros, other encodings) and in their meaning: absurd numbers and
+words in place of numbers; keys and cells that are missing, doubled, moved or of another type; endless nesting and
+aliases.
 """
 
 from __future__ import annotations
@@ -153,7 +154,7 @@ def _bytes(text: str) -> bytes:
 
 
 def flip_bits(rng: np.random.Generator, text: str) -> bytes:
-    """Turn over 1 to 8 bits."""
+    """Flip 1 to 8 bits."""
     data = np.frombuffer(_bytes(text), np.uint8).copy()
     at = rng.integers(0, len(data), int(2 ** rng.uniform(0, 3)))
     np.bitwise_xor.at(data, at, (1 << rng.integers(0, 8, len(at))).astype(np.uint8))
@@ -161,7 +162,7 @@ def flip_bits(rng: np.random.Generator, text: str) -> bytes:
 
 
 def cut(rng: np.random.Generator, text: str) -> bytes:
-    """Lose the end, the start or the middle."""
+    """Remove the end, the start or the middle."""
     a, b = sorted(int(v) for v in rng.integers(0, len(text), 2))
     return _bytes([text[:a], text[a:], text[:a] + text[b:]][rng.integers(3)])
 
@@ -175,7 +176,7 @@ def overwrite(rng: np.random.Generator, text: str) -> bytes:
 
 
 def recode(rng: np.random.Generator, text: str) -> bytes:
-    """Write it in another encoding or with other ends of line."""
+    """Write the text in another encoding, or with other line ends or separators."""
     words = re.sub("(?<=[a-z])e", "é", text)
     return [
         words.encode("latin-1", "replace"),
@@ -190,7 +191,7 @@ def recode(rng: np.random.Generator, text: str) -> bytes:
 
 
 def put_value(rng: np.random.Generator, text: str) -> bytes:
-    """Put something else in the place of one to three numbers or words."""
+    """Replace one to three numbers or words by absurd values."""
     for _ in range(int(rng.integers(1, 4))):
         found = list(re.finditer(r"[\w.+-]+", text))
         one = found[rng.integers(len(found))]
@@ -199,7 +200,7 @@ def put_value(rng: np.random.Generator, text: str) -> bytes:
 
 
 def other_digits(rng: np.random.Generator, text: str) -> bytes:
-    """Put other digits, signs or exponents in the place of one to eight digits: numbers still, but not those."""
+    """Replace one to eight digits by other digits, signs or exponents, so that most numbers remain numbers."""
     digits = [found.start() for found in re.finditer(r"\d", text)]
     for at in sorted(rng.permutation(digits)[: int(2 ** rng.uniform(0, 3))], reverse=True):
         text = text[:at] + str(rng.choice([*"0123456789", "-", "e5"])) + text[at + 1 :]
@@ -207,7 +208,7 @@ def other_digits(rng: np.random.Generator, text: str) -> bytes:
 
 
 def shuffle(rng: np.random.Generator, text: str) -> bytes:
-    """Double, drop, move or indent lines, or swap two cells."""
+    """Double, remove, move or indent lines, or shuffle the cells of a line."""
     lines = text.splitlines(keepends=True)
     for _ in range(int(rng.integers(1, 4))):
         i, j = rng.integers(0, len(lines), 2)
@@ -226,13 +227,13 @@ def shuffle(rng: np.random.Generator, text: str) -> bytes:
 
 
 def other_kind(rng: np.random.Generator, text: str) -> bytes:
-    """Be a file of another kind, or begin as one."""
+    """Replace the text by a file of another kind, or put the start of such a file before it."""
     other = list(FILES.values())[rng.integers(len(FILES))][1]
     return _bytes(other if rng.uniform() < 0.5 else other[: int(rng.integers(1, 200))] + text)
 
 
 def too_much(rng: np.random.Generator, text: str) -> bytes:
-    """Be far too large, too deep or too many in one way or another."""
+    """Make the text far too large, too deeply nested or too repetitive."""
     n = int(10 ** rng.uniform(2, 5.5))
     laughs = "".join(f"a{k}: &a{k} [{', '.join([f'*a{k - 1}' if k else 'x'] * 9)}]\n" for k in range(12))
     brackets = str(rng.choice(["[", "{", "[{", '{"a":', "<a>", "- ", "a: ", "? ", "&a [*a, ", "!!map {"]))
@@ -268,7 +269,7 @@ DAMAGES: dict[str, Damage] = {
 
 
 def readers() -> dict[str, Reader]:
-    """Return who reads each kind of file, as the commands do."""
+    """Return the reader of each kind of file, the same as the commands use."""
     from anglecam.camera.calibration import read_calibration
     from anglecam.camera.lens import lens_from_rig
     from anglecam.data.record import record_from_series
@@ -300,10 +301,10 @@ def readers() -> dict[str, Reader]:
 
 
 def main() -> None:
-    """Run the cases; status 1 where there is a finding."""
-    asked = arguments(__doc__)
+    """Run the cases; exit status 1 if there is a finding."""
+    options = arguments(__doc__)
     trial = Trial(readers, seconds=SECONDS, most_bytes=MOST_BYTES)
-    sys.exit(1 if run_all(cases(asked.cases, asked.seed, asked.first), trial, asked.keep) else 0)
+    sys.exit(1 if run_all(cases(options.cases, options.seed, options.first), trial, options.keep) else 0)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
-"""Reading a damaged file and judging what came of it, here or in a process that may die of it.
+"""Read a damaged file and judge the outcome, in this process or in a separate one that may die.
 
-Allowed are a result, and an `InputError` or `RigError` of one line that names the file. Everything else is a finding:
-another exception, a warning, a line that says nothing, too much time or memory. A death by signal is counted apart.
+Allowed outcomes are a result, and an `InputError` or `RigError` of one line that names the file. Everything else is a
+finding: another exception, a warning, a line without a cause, too much time or memory. A death by signal is counted
+separately.
 """
 
 from __future__ import annotations
@@ -34,39 +35,40 @@ class Case:
     """One damaged file."""
 
     damage: str
-    """What was done to it."""
+    """Name of the damage."""
     name: str
-    """The file's."""
+    """Name of the file."""
     content: bytes
     reader: str = "clip"
-    """Who is to read it, by its key."""
+    """Key of the reader."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a case."""
+    """The outcome of a case."""
 
     kind: str
     """`RESULT`, `REFUSED`, `FINDING` or `DIED`."""
     said: str = ""
+    """The refusal's line, or the description of the finding."""
 
 
 def judge(read: Reader, path: Path, most_bytes: int | None = None) -> Outcome:
-    """Read a file in this process.
+    """Read a file in this process and judge the outcome.
 
     Parameters
     ----------
     read : callable
-        Takes the file's path.
+        Called with the file's path.
     path : Path
         The damaged file.
     most_bytes : int, optional
-        Of resident memory, above what the process holds before.
+        Largest allowed growth of the resident memory, bytes.
 
     Returns
     -------
     Outcome
-        Never `DIED`: of that only another process can tell.
+        Never `DIED`, which only another process can observe.
     """
     before = _forget_peak()
     try:
@@ -76,7 +78,7 @@ def judge(read: Reader, path: Path, most_bytes: int | None = None) -> Outcome:
         outcome = Outcome(RESULT)
     except (InputError, RigError) as refusal:
         outcome = _judge_line(refusal, path)
-    except Exception:  # noqa: BLE001 - the fault that is being looked for
+    except Exception:  # noqa: BLE001 - any other exception is a finding
         outcome = Outcome(FINDING, traceback.format_exc())
     grown = _peak() - before
     if most_bytes is not None and grown > most_bytes:
@@ -86,7 +88,7 @@ def judge(read: Reader, path: Path, most_bytes: int | None = None) -> Outcome:
 
 def _judge_line(refusal: AnglecamError, path: Path) -> Outcome:
     line = str(refusal)
-    named = printable(path.name.removesuffix(".angles.csv"))  # a series may be called by its recording's name
+    named = printable(path.name.removesuffix(".angles.csv"))  # a series may be named by its recording
     if len(line.splitlines()) != 1 or named not in line or "internal error" in line:
         return Outcome(FINDING, f"{type(refusal).__name__} says {line!r}")
     cause = line.split(named, 1)[1].strip(": ")
@@ -94,8 +96,8 @@ def _judge_line(refusal: AnglecamError, path: Path) -> Outcome:
 
 
 def _forget_peak() -> int:
-    """Begin to count anew the most memory held, and return what is held now, bytes."""
-    with contextlib.suppress(OSError):  # not Linux, or not allowed: the peak is then that of the process's whole life
+    """Reset the peak of the resident memory, and return the present peak, bytes."""
+    with contextlib.suppress(OSError):  # not Linux, or not allowed: the peak then covers the whole life of the process
         Path("/proc/self/clear_refs").write_text("5")
     return _peak()
 
@@ -109,7 +111,7 @@ def _peak() -> int:
 
 
 class Trial:
-    """A process that reads damaged files one after another, and is started anew when it dies or hangs."""
+    """A process that reads damaged files one after another and is restarted when it dies or hangs."""
 
     def __init__(self, readers: Callable[[], dict[str, Reader]], *, seconds: float, most_bytes: int) -> None:
         self._readers, self._seconds, self._most_bytes = readers, seconds, most_bytes
@@ -117,7 +119,7 @@ class Trial:
         self._process: multiprocessing.process.BaseProcess | None = None
 
     def run(self, reader: str, path: Path) -> Outcome:
-        """Have one file read."""
+        """Let the process read one file."""
         if self._process is None:
             self._pipe, theirs = self._context.Pipe()
             self._process = self._context.Process(target=_serve, args=(theirs, self._readers, self._most_bytes))
@@ -155,7 +157,7 @@ def _serve(pipe, readers: Callable[[], dict[str, Reader]], most_bytes: int) -> N
 
 
 def arguments(text: str | None) -> argparse.Namespace:
-    """Read the command line that both programs have."""
+    """Parse the command line of both programs."""
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cases", type=int, nargs="?", default=2000)
     parser.add_argument("--seed", type=int, default=1)
@@ -165,7 +167,7 @@ def arguments(text: str | None) -> argparse.Namespace:
 
 
 def run_all(cases: Iterable[tuple[int, Case]], trial: Trial, keep: Path) -> int:
-    """Run cases, keep what is found, print a table, and return how many findings there are."""
+    """Run cases, keep the files of findings, print a table, and return the number of findings."""
     counts: dict[str, Counter[str]] = {}
     longest, began = 0.0, time.monotonic()
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""A clip's budget holds where the geometry is linear, says so where it does not, and bounds what the paper bounds."""
+"""A clip's budget is validated where the geometry is linear and not elsewhere, and its bounds are the paper's."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def test_the_budget_states_degrees_and_is_validated_where_uncertainties_are_know
     assert content["rms"]["sigma_deg"] == pytest.approx(math.degrees(math.sqrt(np.mean(budget.sigma**2))))
 
 
-def test_few_degrees_of_freedom_show_as_a_difference_between_both_ways_and_not_as_curvature():
+def test_few_degrees_of_freedom_fail_the_comparison_and_not_the_linearity():
     budget = budget_of("nod", nod_sources(pivot_dof=6.0, noise_dof=5.0)[0])
     assert not budget.worst.comparison.agrees
     assert budget.worst.linearity.agrees
     assert budget.worst.drawn.high - budget.worst.drawn.low > 2.0 * budget.worst.combined.expanded
 
 
-def test_a_bad_lever_is_where_linearisation_fails():
+def test_linearisation_fails_for_a_short_lever():
     sources, _ = nod_sources(noise=0.6, lever_px=np.full(N, 3.0))
     assert not budget_of("short", sources).worst.linearity.agrees
 

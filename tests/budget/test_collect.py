@@ -1,4 +1,4 @@
-"""What errs in a measured clip is what its sigma was made of, whichever way the angles were read."""
+"""The error sources of a measured clip combine to its sigma, however the angles were measured."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def clip(tmp_path_factory):
 
 
 def _once(function):
-    """Return what calls a function the first time and gives the same answer ever after."""
+    """Return a function that calls ``function`` once and then always returns the same result."""
     found = []
 
     def once(*arguments):
@@ -42,8 +42,8 @@ def _once(function):
 
 
 @pytest.fixture(scope="module")
-def sighted():
-    """Go over the clip once for all tests of this file: what they change, command and neutral, is not looked at."""
+def detected():
+    """Detect the mark once for all tests of this file; it does not depend on command and neutral, which they vary."""
     return _once(detect_mark)
 
 
@@ -53,36 +53,36 @@ def registered():
     return _once(register_clip)
 
 
-def _now_and_then(found: Registered) -> Registered:
-    turn, noise, pose, pull = (x.copy() for x in (found.turn, found.noise, found.pose, found.pivot_sensitivity))
+def _sometimes(found: Registered) -> Registered:
+    turn, noise, pose, sensitivity = (x.copy() for x in (found.turn, found.noise, found.pose, found.pivot_sensitivity))
     turn[LOST] = noise[LOST] = pose[LOST] = np.nan
-    pull[LOST] = np.nan
-    return replace(found, turn=turn, noise=noise, pose=pose, pivot_sensitivity=pull)
+    sensitivity[LOST] = np.nan
+    return replace(found, turn=turn, noise=noise, pose=pose, pivot_sensitivity=sensitivity)
 
 
 @pytest.mark.parametrize(
-    ("head", "neutral"),
-    [("never", "rest"), ("never", "declared"), ("always", "rest"), ("always", "median"), ("now and then", "declared")],
+    ("registration", "neutral"),
+    [("never", "rest"), ("never", "declared"), ("always", "rest"), ("always", "median"), ("sometimes", "declared")],
 )
-def test_a_measured_clips_terms_join_to_its_sigma(clip, sighted, registered, monkeypatch, head, neutral):
+def test_a_measured_clips_terms_combine_to_its_sigma(clip, detected, registered, monkeypatch, registration, neutral):
     path, rig, command = clip
     readings = {
-        "never": lambda *_: "not asked for",
+        "never": lambda *_: "not requested",
         "always": registered,
-        "now and then": lambda *arguments: _now_and_then(registered(*arguments)),
+        "sometimes": lambda *arguments: _sometimes(registered(*arguments)),
     }
-    monkeypatch.setattr(import_module("anglecam.measurement.clip"), "detect_mark", sighted)
-    monkeypatch.setattr(import_module("anglecam.measurement.clip"), "register_clip", readings[head])
+    monkeypatch.setattr(import_module("anglecam.measurement.clip"), "detect_mark", detected)
+    monkeypatch.setattr(import_module("anglecam.measurement.clip"), "register_clip", readings[registration])
     if neutral == "declared":
         rig = rig.model_copy(update={"neutral": -12.0})
     measured = measure_clip(open_film(path), rig, command if neutral == "rest" else None)
     sources = error_sources(measured, rig)
     sigma = measured.series.sigma[measured.series.ok]
-    joined = np.sqrt(sum(c.contribution**2 for c in terms_over_time(sources) if c.in_sigma))
-    assert joined == pytest.approx(sigma, rel=1e-6)
+    combined = np.sqrt(sum(c.contribution**2 for c in terms_over_time(sources) if c.in_sigma))
+    assert combined == pytest.approx(sigma, rel=1e-6)
     names = {c.name for c in terms_over_time(sources)}
-    assert ("registration" in names) == (head != "never")
-    assert ("picture noise" in names) == (head != "always")
+    assert ("registration" in names) == (registration != "never")
+    assert ("picture noise" in names) == (registration != "always")
     certain = replace(sources, noise_dof=np.inf, pose_dof=np.inf, pivot_dof=np.inf)
     for i in (5, int(np.argmax(np.abs(sources.angle)))):
         spread = np.std(angle_draws(certain, i)(np.random.default_rng(3), 200_000))

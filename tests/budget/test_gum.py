@@ -1,4 +1,4 @@
-"""The GUM's arithmetic against the examples that the GUM and its Supplement work out themselves."""
+"""The GUM's arithmetic against the worked examples of the GUM and its Supplement 1."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_one_wide_uniform_input_is_not_validated():
     assert not compare(0.0, combined, drawn).agrees
 
 
-def test_drawing_goes_on_until_the_error_is_within_the_tolerance():
+def test_trials_are_added_until_the_error_is_within_the_tolerance():
     few = propagate(lambda rng, m: 1.0 + 0.011 * rng.standard_normal(m))
     many = propagate(lambda rng, m: 1.0 + 0.024 * rng.standard_normal(m))
     for drawn in (few, many):
@@ -79,7 +79,7 @@ def test_drawing_goes_on_until_the_error_is_within_the_tolerance():
     assert short.error > short.tolerance
 
 
-def test_the_stated_error_is_how_much_another_drawing_differs():
+def test_the_stated_error_is_the_scatter_between_seeds():
     results = [propagate(lambda rng, m: rng.standard_normal(m), seed=seed, most=200_000) for seed in range(30)]
     ends = np.array([(r.low, r.high) for r in results])
     stated = np.median([r.error for r in results])
@@ -95,7 +95,7 @@ def test_the_shortest_interval_of_a_skewed_distribution_starts_at_its_mode():
     assert (low, high) == pytest.approx((-1.96, 1.96), abs=0.015)
 
 
-def test_an_uncertain_uncertainty_widens_the_normal_to_student():
+def test_an_uncertain_uncertainty_widens_a_normal_to_students_t():
     rng = np.random.default_rng(3)
     drawn = rng.standard_normal(400_000) * widening(rng, 8.0, 400_000)
     assert drawn.var() == pytest.approx(8.0 / 6.0, rel=0.02)

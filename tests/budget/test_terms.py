@@ -1,4 +1,4 @@
-"""The terms of a budget are the series' sigma taken apart, and what is drawn through the geometry agrees."""
+"""The terms of a budget combine to the series' sigma, and Monte Carlo through the geometry agrees."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from anglecam.measurement.sigma import PlaceErrors, angle_sigma
 from support.nod import COVARIANCE, PIVOT, REST, N, nod_sources
 
 
-def _joined(sources: ErrorSources) -> np.ndarray:
+def _combined(sources: ErrorSources) -> np.ndarray:
     return np.sqrt(sum(c.contribution**2 for c in terms_over_time(sources) if c.in_sigma))
 
 
@@ -25,29 +25,29 @@ def _spread(sources: ErrorSources, i: int, m: int = 400_000) -> float:
 
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("neutral", [REST, None])
-def test_terms_join_to_the_sigma_of_the_series(mirrored, neutral):
+def test_terms_combine_to_the_sigma_of_the_series(mirrored, neutral):
     sources, mouth = nod_sources(mirrored=mirrored, neutral=neutral)
     sigma = angle_sigma(mouth, PIVOT, COVARIANCE, PlaceErrors(sources.noise_px, sources.pose_px), neutral)
-    assert _joined(sources) == pytest.approx(sigma, rel=1e-9)
+    assert _combined(sources) == pytest.approx(sigma, rel=1e-9)
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("neutral", [REST, None])
 @pytest.mark.parametrize("i", [5, 40, 79])
-def test_what_is_drawn_through_the_geometry_spreads_as_sigma_says(mirrored, neutral, i):
+def test_the_monte_carlo_spread_through_the_geometry_equals_sigma(mirrored, neutral, i):
     sources, _ = nod_sources(mirrored=mirrored, neutral=neutral)
-    assert _spread(sources, i) == pytest.approx(_joined(sources)[i], rel=0.006)
+    assert _spread(sources, i) == pytest.approx(_combined(sources)[i], rel=0.006)
 
 
 @pytest.mark.parametrize("only", ["noise", "pose", "pivot"])
-def test_each_term_alone_is_what_is_drawn_of_it_alone(only):
+def test_each_term_alone_equals_its_monte_carlo_spread(only):
     chosen = {
         "noise": 0.03 * (only == "noise"),
         "pose": 0.02 * (only == "pose"),
         "pivot_covariance_px2": COVARIANCE * (only == "pivot"),
     }
     sources, _ = nod_sources(**chosen)
-    assert _spread(sources, 60) == pytest.approx(_joined(sources)[60], rel=0.006)
+    assert _spread(sources, 60) == pytest.approx(_combined(sources)[60], rel=0.006)
     names = {c.name for c in terms_over_time(sources)}
     expected = {"noise": {"picture noise", "neutral line"}, "pose": {"pixel grid and codec"}, "pivot": {"pivot"}}
     assert names == expected[only]
@@ -60,29 +60,31 @@ def test_a_pivots_error_cancels_at_neutral_and_grows_as_the_line_turns():
     assert pivot.contribution == pytest.approx(expected, abs=1e-8)
 
 
-def test_registration_errs_by_its_own_sigma_and_its_own_pull_of_the_pivot():
-    pull = np.column_stack([np.linspace(0.0, 4e-4, N), np.linspace(1e-4, -3e-4, N)])
+def test_registration_contributes_its_sigma_and_its_pivot_sensitivity():
+    sensitivity = np.column_stack([np.linspace(0.0, 4e-4, N), np.linspace(1e-4, -3e-4, N)])
     sigma = np.full(N, 4e-5)
     plain, _ = nod_sources(noise=0.0, pose=0.0)
     neutral = replace(
-        plain.neutral, registration=4e-5 / math.sqrt(REST.sum()), pivot_sensitivity=pull[REST].mean(axis=0)
+        plain.neutral, registration=4e-5 / math.sqrt(REST.sum()), pivot_sensitivity=sensitivity[REST].mean(axis=0)
     )
-    sources = replace(plain, registration=sigma, pivot_sensitivity=pull, neutral=neutral)
-    off = pull - pull[REST].mean(axis=0)
+    sources = replace(plain, registration=sigma, pivot_sensitivity=sensitivity, neutral=neutral)
+    off = sensitivity - sensitivity[REST].mean(axis=0)
     expected = sigma**2 * (1.0 + 1.0 / REST.sum()) + np.einsum("ni,ij,nj->n", off, COVARIANCE, off)
-    assert _joined(sources) == pytest.approx(np.sqrt(expected), rel=1e-9)
-    assert _spread(sources, 70) == pytest.approx(_joined(sources)[70], rel=0.006)
+    assert _combined(sources) == pytest.approx(np.sqrt(expected), rel=1e-9)
+    assert _spread(sources, 70) == pytest.approx(_combined(sources)[70], rel=0.006)
 
 
-def test_the_geometrys_own_pull_is_the_geometry():
+def test_the_pivot_sensitivity_of_the_geometry_gives_the_sigma_of_the_geometry():
     sources, _ = nod_sources(lever_px=np.full(N, 200.0))
     along = np.column_stack([np.sin(sources.line), np.cos(sources.line)])
-    pull = along / 200.0
-    pulled = replace(
-        sources, pivot_sensitivity=pull, neutral=replace(sources.neutral, pivot_sensitivity=pull[REST].mean(axis=0))
+    sensitivity = along / 200.0
+    registered = replace(
+        sources,
+        pivot_sensitivity=sensitivity,
+        neutral=replace(sources.neutral, pivot_sensitivity=sensitivity[REST].mean(axis=0)),
     )
-    assert _joined(pulled) == pytest.approx(_joined(sources), rel=1e-9)
-    assert _spread(pulled, 60) == pytest.approx(_spread(sources, 60), rel=0.006)
+    assert _combined(registered) == pytest.approx(_combined(sources), rel=1e-9)
+    assert _spread(registered, 60) == pytest.approx(_spread(sources, 60), rel=0.006)
 
 
 def test_a_tilt_stretches_the_picture_across_its_axis():
@@ -105,10 +107,10 @@ def test_a_wrong_tilt_turns_a_line_as_undoing_it_does(axis_deg):
     assert np.arctan2(-y, x) == pytest.approx(Tilt(tilt, axis, 0.0).turned(line, error), abs=1e-9)
 
 
-def test_the_tilts_term_is_what_is_drawn_of_it():
+def test_the_term_of_the_tilt_equals_its_monte_carlo_spread():
     tilt = Tilt(math.radians(15.0), math.radians(20.0), math.radians(1.0))
     sources, _ = nod_sources(noise=0.0, pose=0.0, pivot_covariance_px2=np.zeros((2, 2)), tilt=tilt)
-    assert _spread(sources, 60) == pytest.approx(_joined(sources)[60], rel=0.06)  # the slope itself changes by 1/15
+    assert _spread(sources, 60) == pytest.approx(_combined(sources)[60], rel=0.06)  # the slope itself changes by 1/15
 
 
 def test_errors_of_the_time_count_by_the_speed_and_are_not_in_sigma():
@@ -116,7 +118,7 @@ def test_errors_of_the_time_count_by_the_speed_and_are_not_in_sigma():
     sources = replace(without, exposure_s=0.01, clock_s=0.001)
     timed = {c.name: c for c in terms_over_time(sources) if not c.in_sigma}
     assert timed["instant within the exposure"].at(40).uncertainty == pytest.approx(0.01 / math.sqrt(12.0))
-    assert _joined(sources) == pytest.approx(_joined(without))
+    assert _combined(sources) == pytest.approx(_combined(without))
     total = np.sqrt(sum(c.contribution[40] ** 2 for c in terms_over_time(sources)))
-    assert total > 1.5 * _joined(sources)[40]
+    assert total > 1.5 * _combined(sources)[40]
     assert _spread(sources, 40) == pytest.approx(total, rel=0.006)

@@ -1,4 +1,4 @@
-"""A clip of a chessboard gives back the lens that filmed it, as surely as it says."""
+"""Calibration from a clip of a chessboard recovers the lens within its stated uncertainty."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_rectified_points_lie_where_a_pinhole_shows_them(found):
     assert np.hypot(*left.T).max() < 0.1
 
 
-def test_smeared_frames_are_passed_over(found):
+def test_blurred_frames_are_not_used(found):
     assert all(view.frame % 2 == 1 for view in found.views)
 
 
@@ -74,7 +74,7 @@ def test_corners_are_found_to_a_fiftieth_of_a_pixel():
 
 
 def _corners(camera: BoardCamera, count: int, seed: int) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Corners as the detector leaves them, 0.02 px off, without drawing."""
+    """Return corners with the detector's error of 0.02 px, without drawing pictures."""
     rng = np.random.default_rng(seed)
     X = np.zeros((54, 3))
     X[:, :2] = 0.025 * np.mgrid[:9, :6].T.reshape(-1, 2)
@@ -116,22 +116,22 @@ def test_stated_uncertainties_are_true():
     np.testing.assert_allclose(np.sqrt(np.mean(np.square(ratios), axis=0)), 1.0, atol=0.35)
 
 
-def test_a_view_seen_wrongly_is_left_out():
+def test_a_view_with_wrong_corners_is_rejected():
     X, views = _corners(CAMERA, 12, 5)
     views[4] = views[4] + np.random.default_rng(0).normal(0, 0.5, views[4].shape)
     kept = calibrate._without_bad_views(X, list(enumerate(views)), CAMERA.size)
     assert [i for i, _ in kept] == [i for i in range(12) if i != 4]
 
 
-def test_a_clip_without_a_board_is_said_so(tmp_path):
+def test_a_clip_without_a_board_is_refused(tmp_path):
     write_pictures(tmp_path / "wall.mkv", [np.full((480, 640), 120.0)] * 3)
-    with pytest.raises(InputError, match=r"wall.mkv: chessboard of 9×6 inner corners not seen in any of 3 frames"):
+    with pytest.raises(InputError, match=r"wall.mkv: chessboard of 9×6 inner corners not found in any of 3 frames"):
         calibrate_clip(tmp_path / "wall.mkv", BOARD)
 
 
-def test_too_few_poses_are_said_so(tmp_path):
+def test_too_few_poses_are_refused(tmp_path):
     film_board(tmp_path / "still.mkv", CAMERA, poses(2, camera=CAMERA), hold=4)
-    with pytest.raises(InputError, match=r"seen in . of 8 frames searched, but in only 2 different poses"):
+    with pytest.raises(InputError, match=r"found in . of 8 frames searched, but in only 2 different poses"):
         calibrate_clip(tmp_path / "still.mkv", BOARD)
 
 

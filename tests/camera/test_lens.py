@@ -1,4 +1,4 @@
-"""Points are undone, not frames: what turns in the plane of motion turns in the rectified picture by the same angle."""
+"""Rectified points turn by the same angle as the points in the plane of motion."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _calibration(k1: float = -0.15, focal: float = 800.0, size=SIZE, **more) -> 
 
 
 def _filmed(tilt_deg=0.0, axis_deg=0.0, k1=0.0, focal=800.0, radius=200.0, height=0.0, mirrored=False) -> np.ndarray:
-    """Pixels (n, 2) of a mark that turns about `PIVOT` by `ANGLES`, worked out in space, lens and all."""
+    """Return pixels (n, 2) of a mark that turns about `PIVOT` by `ANGLES`, projected from space through the lens."""
     axis = np.radians(axis_deg)
     turn = Rotation.from_rotvec(np.radians(tilt_deg) * np.array([np.cos(axis), np.sin(axis), 0.0]))
     around = radius * np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
@@ -84,7 +84,7 @@ def test_facing_left_mirrors_the_tilts_axis():
 
 
 @pytest.mark.parametrize("height", [30.0, -60.0])
-def test_what_turns_nearer_to_the_camera_turns_by_the_same_angle_about_a_centre_of_its_own(height):
+def test_nearer_points_turn_by_the_same_angle_about_a_different_centre(height):
     lens = lens_from_rig(_rig(tilt_deg=15, tilt_axis_deg=60, focal_px=800.0), SIZE, None)
     cosine = np.cos(np.radians(15.0))
     centre = lens.pivot_px + lens.parallax * height * cosine / (cosine - height / 800.0)
@@ -195,7 +195,7 @@ def test_our_own_file_keeps_every_digit(tmp_path):
         ("camera_matrix: [8, 0, 3, 0, 8, 2, 0, 0, 1]\nD: [0, 0, 0, 0]\ndistortion_model: equidistant\n", "fisheye"),
     ],
 )
-def test_a_file_that_is_no_calibration_is_said_so_in_one_line(tmp_path, text, said, capfd):
+def test_a_file_that_is_not_a_calibration_is_refused_in_one_line(tmp_path, text, said, capfd):
     path = tmp_path / "camera.yaml"
     if text is not None:
         path.write_text(text)
@@ -214,7 +214,7 @@ def test_a_calibration_of_another_picture_is_refused(tmp_path):
 
 def test_a_distortion_that_turns_back_within_the_picture_is_refused(tmp_path):
     write_calibration(_calibration(-0.9, 400.0), tmp_path / "c.yaml")
-    with pytest.raises(RigError, match="cannot be undone at pixel"):
+    with pytest.raises(RigError, match="cannot be inverted at pixel"):
         lens_from_rig(_rig(calibration=str(tmp_path / "c.yaml")), SIZE, "swing.avi")
 
 
@@ -223,16 +223,16 @@ def test_a_distortion_that_turns_back_within_the_picture_is_refused(tmp_path):
     [
         ("{tilt_deg: 85}", "camera.tilt_deg: input should be less than 80"),
         ("{tilt: 15}", "unknown key camera.tilt"),
-        ("{calibration: c.yaml, focal_px: 800}", "camera: focal_px stands in the calibration already"),
+        ("{calibration: c.yaml, focal_px: 800}", "camera: focal_px is already in the calibration"),
     ],
 )
-def test_a_wrong_declaration_is_said_in_one_line(tmp_path, text, said):
+def test_a_wrong_declaration_is_refused_in_one_line(tmp_path, text, said):
     (tmp_path / "rig.yaml").write_text(f"camera: {text}\n")
     with pytest.raises(RigError, match=said):
         read_rig(tmp_path / "rig.yaml")
 
 
-def test_a_rolling_shutter_shifts_time_by_the_mouths_row():
+def test_a_rolling_shutter_shifts_time_by_the_marks_row():
     time = measurement_time([1.0, 2.0, 3.0], [0.0, 239.5, np.nan], 480, 2e-5)
     np.testing.assert_allclose(time, [1.0 - 239.5 * 2e-5, 2.0, 3.0], atol=1e-15)
     np.testing.assert_array_equal(measurement_time([1.0, 2.0], [0.0, 9.0], 480, None), [1.0, 2.0])

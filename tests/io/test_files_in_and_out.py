@@ -1,4 +1,4 @@
-"""Series, commands and rig files: what is written can be read back, and what is wrong is said in one line."""
+"""Series, commands and rig files are read back as they were written, and faults are refused in one line."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_a_series_reads_back_as_it_was_written(tmp_path):
     np.testing.assert_allclose(back.mark_px, series.mark_px, atol=1e-4)
 
 
-def test_columns_are_the_contracts_and_an_unmeasured_row_is_empty(tmp_path):
+def test_columns_are_those_of_the_contract_and_an_unmeasured_row_is_empty(tmp_path):
     path = tmp_path / "clip.angles.csv"
     write_series(_series(), path)
     header, *rows = list(csv.reader(path.open()))
@@ -88,7 +88,7 @@ def test_a_bad_series_is_one_line_with_file_and_cause(tmp_path, text, says):
     assert "\n" not in message
 
 
-def test_words_in_an_angle_column_are_told(tmp_path):
+def test_words_in_an_angle_column_are_refused(tmp_path):
     path = broken.angles_with_text(tmp_path)
     with pytest.raises(InputError, match="not a number"):
         read_series(path)
@@ -142,14 +142,14 @@ def test_one_bad_command_costs_its_recording_only(tmp_path):
     assert "b.command.csv" in str(session.problems[0])
 
 
-def test_a_held_out_name_that_is_no_recording_is_the_rigs_fault(tmp_path):
+def test_an_unknown_held_out_name_is_a_rig_error(tmp_path):
     (tmp_path / "a.angles.csv").write_text("time_s,angle_deg\n0,1\n1,2\n2,3\n")
     (tmp_path / "rig.yaml").write_text("held_out: [nowhere]")
     with pytest.raises(RigError, match="held_out names nowhere"):
         read_session(tmp_path)
 
 
-def test_a_command_without_a_recording_is_told(tmp_path):
+def test_a_command_without_a_recording_is_noted(tmp_path):
     (tmp_path / "a.angles.csv").write_text("time_s,angle_deg\n0,1\n1,2\n2,3\n")
     (tmp_path / "b.command.csv").write_text("time_s,command_deg\n0,0\n")
     session = read_session(tmp_path)
@@ -166,7 +166,7 @@ def test_a_declared_centre_of_mass_comes_with_every_recording(tmp_path):
         assert record.mass_from_upright == upright
 
 
-def test_what_looks_like_a_swing_or_a_command_is_said_to_be_taken_for_what_it_is(tmp_path):
+def test_unused_files_and_free_swings_are_noted(tmp_path):
     rows = "".join(f"{k / 30:.4f},{10 * np.sin(k / 5):.4f}\n" for k in range(60))
     (tmp_path / "swing.angles.csv").write_text("time_s,angle_deg\n" + rows)
     (tmp_path / "swing.commands.csv").write_text("time_s,command_deg\n0,0\n1,5\n")
@@ -196,7 +196,7 @@ def test_a_command_that_changes_after_the_recording_costs_that_recording(tmp_pat
     assert [str(problem).partition(";")[0] for problem in measured.problems] == [said]
 
 
-def test_tracks_stand_in_the_place_of_their_clip_where_the_rig_tells_them(tmp_path):
+def test_tracks_replace_their_clip_if_the_rig_names_their_points(tmp_path):
     for name in ("a.avi", "b.avi"):
         (tmp_path / name).touch()
     head = "scorer,x,x,x\nbodyparts,nose,nose,nose\ncoords,x,y,likelihood\n"
@@ -206,4 +206,4 @@ def test_tracks_stand_in_the_place_of_their_clip_where_the_rig_tells_them(tmp_pa
     assert find_measurable(tmp_path, rig) == ([tracks, tmp_path / "b.avi"], [])
     clips, (idle,) = find_measurable(tmp_path, Rig())
     assert [clip.name for clip in clips] == ["a.avi", "b.avi"]
-    assert "not used; say which of its points are which" in idle
+    assert "not used; name its points with marks: {mouth: …, pivot: …} in rig.yaml" in idle

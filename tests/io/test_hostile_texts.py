@@ -1,4 +1,4 @@
-"""Rig, command, series, calibration and model files that were made to do harm cost one line, little time and memory."""
+"""Harmful rig, command, series, calibration and model files are refused in one line, with little time and memory."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def refusal(read, path) -> str:
 
 @pytest.mark.parametrize("name", READERS)
 @pytest.mark.parametrize("kind", ["pipe", "folder", "nothing", "device", "binary", "sparse"])
-def test_what_is_no_text_file_is_refused_at_once(tmp_path, name, kind):
+def test_anything_but_a_text_file_is_refused_at_once(tmp_path, name, kind):
     path = tmp_path / name
     if kind == "pipe":
         os.mkfifo(path)  # to open it for reading waits until somebody writes
@@ -63,7 +63,7 @@ def test_what_is_no_text_file_is_refused_at_once(tmp_path, name, kind):
     refusal(READERS[name], path)
 
 
-def test_a_pipe_beside_a_clip_does_not_make_it_wait(tmp_path):
+def test_a_pipe_next_to_a_clip_does_not_block(tmp_path):
     os.mkfifo(tmp_path / "rig.yaml")
     os.mkfifo(tmp_path / "a.command.csv")
     with pytest.raises(RigError, match="not an ordinary file"):
@@ -98,7 +98,7 @@ def test_a_rig_file_beyond_keys_and_values_is_refused(tmp_path, text, says):
     assert re.search(says, line)
 
 
-def test_a_calibration_whose_name_no_file_can_have_is_refused(tmp_path):
+def test_a_calibration_with_an_impossible_file_name_is_refused(tmp_path):
     path = tmp_path / "rig.yaml"
     path.write_text('camera: {calibration: "a\\0b"}')
     named = read_rig(path).camera.calibration
@@ -138,7 +138,7 @@ def test_a_calibration_nested_without_end_does_not_end_the_process(tmp_path, kin
         ("linkage: {ground_m: 5.0, coupler_m: 0.01, rocker_m: 0.01, crank_m: 0.01}", ""),
     ],
 )
-def test_a_neck_that_cannot_be_is_the_files_fault(tmp_path, text, says):
+def test_an_impossible_neck_is_a_rig_error(tmp_path, text, says):
     path = tmp_path / "neck.yaml"
     path.write_text(text)
     assert says in refusal(read_neck, path)
@@ -158,9 +158,9 @@ def test_json_that_is_no_model_is_refused(tmp_path, name, text):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("time_s,command_deg\n0,1e300\n", "no recording has that"),
+        ("time_s,command_deg\n0,1e300\n", "too large for a recording"),
         ("time_s,command_deg\n0,nan\n", "not a number"),
-        ("time_s,time_s,command_deg\n0,0,1\n", "stands twice"),
+        ("time_s,time_s,command_deg\n0,0,1\n", "appears twice"),
         ("time_s,command_deg\n0," + "x" * 100_000 + "\n", "not a number"),
         ("time_s,command_deg\n0," + "x" * 200_000 + "\n", "field larger"),
         ("time_s,command_deg\n0,\x00\n", "not a number"),

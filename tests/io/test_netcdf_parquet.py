@@ -1,4 +1,4 @@
-"""Angle series for other programs: what they open is what the CSV says."""
+"""Angle series as netCDF and Parquet: other programs read the same numbers, and anglecam reads every bit."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from support.tracked import nod, write_sleap
 
 @pytest.fixture
 def series() -> AngleSeries:
-    """Fifty frames at uneven times, two of them without an angle, and a bound of its own."""
+    """Return fifty frames at uneven times, two of them without an angle, and a bound for a further radius."""
     rng, n = np.random.default_rng(0), 50
     status = ["ok"] * n
     status[7], status[8] = "no_mouth", "occluded"
@@ -127,7 +127,7 @@ def test_a_netcdf_file_of_another_program_is_refused_in_one_line(series, tmp_pat
 
 
 def test_netcdf_has_the_dimensions_variables_and_attributes_of_movement(series, tmp_path):
-    """As `movement.validators.datasets.ValidPosesInputs` asks for (movement 0.15)."""
+    """As `movement.validators.datasets.ValidPosesInputs` requires (movement 0.15)."""
     write_netcdf(series, tmp_path / "nod.angles.nc")
     with xr.open_dataset(tmp_path / "nod.angles.nc", engine="h5netcdf") as data:
         assert data.position.dims == ("time", "space", "keypoints", "individuals")
@@ -186,7 +186,7 @@ def test_the_same_series_gives_the_same_bytes_and_nothing_is_left_behind(series,
     assert once.read_bytes() == again.read_bytes()
 
 
-def test_measure_writes_them_beside_the_csv(tmp_path, monkeypatch, capsys):
+def test_measure_writes_both_formats_next_to_the_csv(tmp_path, monkeypatch, capsys):
     write_sleap(tmp_path / "nod.h5", nod(np.linspace(0.0, 20.0, 60), np.random.default_rng(0)))
     (tmp_path / "rig.yaml").write_text("marks: {mouth: nose, pivot: neck, rate_hz: 30}\n")
     call = ["anglecam", "measure", str(tmp_path / "nod.h5"), "--out", str(tmp_path / "out"), "--also"]

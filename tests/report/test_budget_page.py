@@ -1,4 +1,4 @@
-"""The budget's page and file say the same, and Fig. 8 is drawn at the worst places of the user's own frame."""
+"""The budget's page and file agree, and Fig. 8 shows the worst positions in a frame of the user's clip."""
 
 from __future__ import annotations
 
@@ -59,8 +59,8 @@ def test_the_page_holds_the_numbers_and_the_figures(written):
     assert "src=" not in page
     assert f"{math.degrees(budget.bounds[-1].worst):.3f}" in page
     assert "0.408°" in page
-    for course in budget.terms_over_time:
-        assert course.name in page
+    for term in budget.terms_over_time:
+        assert term.name in page
     assert "None" not in page
     assert "nan" not in page.replace("provenance", "")
 
@@ -76,7 +76,7 @@ def test_the_table_shows_terms_bounds_and_expanded_uncertainty(written):
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_worst_place_lies_on_the_circle_and_turns_the_line_by_the_bound(side):
+def test_a_worst_position_lies_on_the_circle_and_turns_the_line_by_the_bound(side):
     pivot, mouth = np.array([240.0, 300.0]), np.array([420.0, 260.0])
     end = touching_point(pivot, mouth, 10.0, side)
     assert np.hypot(*(end - mouth)) == pytest.approx(10.0)

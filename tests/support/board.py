@@ -1,7 +1,8 @@
-"""Clips of a chessboard before a camera whose lens is known: an independent film-maker.
+"""Drawn clips of a chessboard in front of a camera with a known lens, independent of the code under test.
 
-Every pixel's grey is the mean over its area: where an edge of the board passes, over 8 × 8 points of it. The lens is
-undone by fixed-point iteration of its own equation, not by OpenCV, so that nothing here is checked against itself.
+The grey level of a pixel is the mean over its area; where an edge of the board passes, it is the mean of 8 × 8 points.
+The distortion is inverted by fixed-point iteration of its equation and not by OpenCV, so the test does not compare
+OpenCV with itself.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 _FINE = 8
-"""Points a side within a pixel that an edge passes."""
+"""Points along each side of a pixel that an edge crosses."""
 _BLACK, _WHITE, _WALL = 30.0, 220.0, 120.0
 
 
@@ -39,7 +40,7 @@ class BoardCamera:
         return np.array([[self.focal_px, 0, self.centre_px[0]], [0, self.focal_px, self.centre_px[1]], [0, 0, 1.0]])
 
     def bend(self, rays: np.ndarray) -> np.ndarray:
-        """Distort rays (…, 2), in units of the focal length."""
+        """Return rays (…, 2) distorted, in units of the focal length."""
         x, y = rays[..., 0], rays[..., 1]
         r2 = x * x + y * y
         stretch = 1 + self.k1 * r2 + self.k2 * r2 * r2
@@ -48,11 +49,11 @@ class BoardCamera:
         return np.stack([x * stretch + dx, y * stretch + dy], axis=-1)
 
     def project(self, rays: np.ndarray) -> np.ndarray:
-        """Pixels (…, 2) of rays (…, 2)."""
+        """Return the pixels (…, 2) of rays (…, 2)."""
         return self.bend(rays) * self.focal_px + self.centre_px
 
     def rays(self, pixels: np.ndarray) -> np.ndarray:
-        """Rays (…, 2) of pixels (…, 2)."""
+        """Return the rays (…, 2) of pixels (…, 2)."""
         seen = (np.asarray(pixels, float) - self.centre_px) / self.focal_px
         rays = seen.copy()
         for _ in range(60):
@@ -64,7 +65,7 @@ class BoardCamera:
 
 
 def poses(count: int, seed: int = 0, lean_deg: float = 35.0, board=(9, 6), square_m: float = 0.025, camera=None):
-    """Poses (rotation, place of the board's middle in m) that keep the board in the picture, and send it to corners."""
+    """Return poses (rotation, position of the board's middle in m) that keep the whole board in the picture."""
     camera = camera or BoardCamera()
     rng = np.random.default_rng(seed)
     half = (np.array(board) + 1) * square_m / 2
@@ -88,10 +89,10 @@ def poses(count: int, seed: int = 0, lean_deg: float = 35.0, board=(9, 6), squar
 
 
 def board_picture(camera: BoardCamera, pose, board=(9, 6), square_m: float = 0.025) -> np.ndarray:
-    """Mean grey (height, width) of each pixel's area, of a board with one square of white around its squares."""
+    """Return (height, width) the mean grey of each pixel, for a board with a white rim of 0.7 squares."""
     turn, place = pose
     rays, across, down = _pixel_rays(camera)
-    # a ray meets the board's plane where M⁻¹·(x, y, 1) says, M = [r1 r2 t]
+    # a ray intersects the board's plane at M⁻¹·(x, y, 1) with M = [r1 r2 t]
     to_board = np.linalg.inv(np.column_stack([turn.as_matrix()[:, :2], place]))
 
     def on_board(rays: np.ndarray) -> np.ndarray:
@@ -107,7 +108,7 @@ def board_picture(camera: BoardCamera, pose, board=(9, 6), square_m: float = 0.0
 
     at = on_board(rays)
     picture = grey(at)
-    # an edge can pass only where the squares' number, or what lies beyond the paper, changes within a pixel
+    # an edge can cross a pixel only where the grey level changes to the next pixel
     near = np.zeros(picture.shape, np.uint8)
     near[1:] |= picture[1:] != picture[:-1]
     near[:, 1:] |= picture[:, 1:] != picture[:, :-1]
@@ -121,7 +122,7 @@ def board_picture(camera: BoardCamera, pose, board=(9, 6), square_m: float = 0.0
 
 @functools.cache
 def _pixel_rays(camera: BoardCamera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rays (height, width, 2) of all pixels, and how they change from column to column and from row to row."""
+    """Return the rays (height, width, 2) of all pixels, and their change from column to column and from row to row."""
     width, height = camera.size
     rays = camera.rays(np.stack(np.meshgrid(np.arange(width), np.arange(height)), axis=-1).astype(float))
     return rays, np.gradient(rays, axis=1), np.gradient(rays, axis=0)
@@ -138,7 +139,7 @@ def film_board(
     hold: int = 3,
     seed: int = 1,
 ) -> None:
-    """Write a lossless clip: each pose stands for `hold` frames; the first is smeared, as if the board still moved."""
+    """Write a lossless clip: each pose lasts `hold` frames, the first of them blurred as if the board still moved."""
     pictures: list[np.ndarray] = []
     for pose in views:
         sharp = board_picture(camera, pose, board, square_m)
@@ -147,7 +148,7 @@ def film_board(
 
 
 def write_pictures(path: Path, pictures: Sequence[np.ndarray], noise_grey: float = 2.0, seed: int = 1) -> None:
-    """Write grey pictures (height, width) as an FFV1 clip at 30 Hz, with noise of their own in each."""
+    """Write grey pictures (height, width) as an FFV1 clip at 30 Hz, each with independent noise."""
     rng = np.random.default_rng(seed)
     with av.open(str(path), "w") as container:
         stream = container.add_stream("ffv1", rate=30)

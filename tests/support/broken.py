@@ -1,4 +1,4 @@
-"""Bad inputs, one a function: each writes into a folder what people really bring, and returns its path."""
+"""Faulty inputs as they occur in practice: each function writes one file into a folder and returns its path."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .head import SKIN
 
 
 def empty_clip(folder: Path, name: str = "empty") -> Path:
-    """Make a file of no bytes."""
+    """Write an empty file."""
     path = folder / f"{name}.avi"
     path.write_bytes(b"")
     return path
@@ -27,7 +27,7 @@ def text_clip(folder: Path, name: str = "text") -> Path:
 
 
 def truncated_clip(folder: Path, good: Path, name: str = "truncated", share: float = 0.6) -> Path:
-    """Keep the first part of a good clip's bytes: frames are there, the index at the end is not."""
+    """Write the first part of a good clip's bytes: it has frames but no index, which would be at the end."""
     path = folder / f"{name}.avi"
     whole = good.read_bytes()
     path.write_bytes(whole[: int(share * len(whole))])
@@ -35,7 +35,7 @@ def truncated_clip(folder: Path, good: Path, name: str = "truncated", share: flo
 
 
 def zero_frame_clip(folder: Path, name: str = "zero_frames") -> Path:
-    """Write a sound AVI header with no picture after it."""
+    """Write a valid AVI header without any picture."""
     path = folder / f"{name}.avi"
     with av.open(str(path), "w", format="avi") as container:
         stream = container.add_stream("mjpeg", rate=30)
@@ -45,7 +45,7 @@ def zero_frame_clip(folder: Path, name: str = "zero_frames") -> Path:
 
 
 def clip_without_mouth(folder: Path, name: str = "no_mouth", frames: int = 30) -> Path:
-    """Film a head that nods, without lipstick and with nothing red in the picture."""
+    """Write a clip of a nodding head without lipstick and with nothing red in the picture."""
     path = folder / f"{name}.avi"
     skin = tuple(int(0.93 * v) for v in SKIN["pale"][0])
     look = Look(lips_rgb=skin, red_object=None)
@@ -54,7 +54,7 @@ def clip_without_mouth(folder: Path, name: str = "no_mouth", frames: int = 30) -
 
 
 def clip_of_an_empty_room(folder: Path, name: str = "empty_room", frames: int = 30) -> Path:
-    """Film a wall with nobody before it."""
+    """Write a clip of a wall."""
     path = folder / f"{name}.avi"
     rng = np.random.default_rng(2)
     wall = cv2.GaussianBlur(rng.uniform(60, 190, (480, 640, 3)).astype(np.float32), (0, 0), 6)
@@ -71,28 +71,28 @@ def command_with_unreadable_rows(folder: Path, name: str) -> Path:
 
 
 def command_backwards(folder: Path, name: str) -> Path:
-    """Write a command file whose clock jumps back."""
+    """Write a command file whose times decrease once."""
     path = folder / f"{name}.command.csv"
     path.write_text("time_s,command_deg\n0.0,0.0\n1.0,10.0\n3.0,0.0\n2.0,-10.0\n4.0,0.0\n")
     return path
 
 
 def rig_with_unknown_key(folder: Path) -> Path:
-    """Write a rig file with a slip of the pen in a key."""
+    """Write a rig file with a misspelt key."""
     path = folder / "rig.yaml"
     path.write_text("mouth: auto\nfacing: right\npivott: {near: [218, 298]}\n")
     return path
 
 
 def rig_that_is_not_yaml(folder: Path) -> Path:
-    """Write a rig file with brackets that never close."""
+    """Write a rig file with unclosed brackets."""
     path = folder / "rig.yaml"
     path.write_text("mouth: {rgb: [190, 35\npivot: near: ][ 218\n\t- facing\n")
     return path
 
 
 def angles_with_text(folder: Path, name: str = "words") -> Path:
-    """Write an angle series with a word where a number belongs."""
+    """Write an angle series with a word in place of a number."""
     path = folder / f"{name}.angles.csv"
     rows = [f"{k / 30:.6f},{'lost' if k == 20 else round(5 * np.sin(k / 5), 4)}\n" for k in range(60)]
     path.write_text("time_s,angle_deg\n" + "".join(rows))

@@ -1,6 +1,6 @@
-"""Files of tracked points in the layouts of DeepLabCut and SLEAP, made from points that are known.
+"""Files of tracked points in the layouts of DeepLabCut and SLEAP, made from known points.
 
-The layouts were taken from those programs' own writers: pandas' ``to_csv`` and ``to_hdf`` (DeepLabCut), and
+The layouts are those of the programs' writers: pandas' ``to_csv`` and ``to_hdf`` (DeepLabCut), and
 ``sleap/info/write_tracking_h5.py`` (SLEAP), whose arrays are transposed.
 """
 
@@ -18,7 +18,7 @@ LEVER = 180.0
 
 
 def nod(angle_deg: np.ndarray, rng: np.random.Generator, *, sigma_px: float = 0.3) -> np.ndarray:
-    """Nose and neck of a head that looks to the right and up by ``angle_deg``: (frames, 2, 2) px."""
+    """Return (frames, 2, 2) px, nose and neck of a head that faces right and is turned up by ``angle_deg``."""
     angle = np.radians(angle_deg)
     mouth = PIVOT + LEVER * np.column_stack([np.cos(angle), -np.sin(angle)])
     points = np.stack([mouth, np.broadcast_to(PIVOT, mouth.shape)], axis=1)
@@ -26,7 +26,7 @@ def nod(angle_deg: np.ndarray, rng: np.random.Generator, *, sigma_px: float = 0.
 
 
 def frame(points: np.ndarray, likelihood: np.ndarray, names=("nose", "neck"), individuals=None) -> pd.DataFrame:
-    """DeepLabCut's table of points (frames, individuals, points, 2); without ``individuals`` the form with one."""
+    """Return DeepLabCut's table of points (frames, individuals, points, 2); without ``individuals``, for one animal."""
     levels = [[SCORER], list(names), ["x", "y", "likelihood"]]
     labels = ["scorer", "bodyparts", "coords"]
     if individuals is not None:

@@ -1,4 +1,4 @@
-"""Tracks of DeepLabCut and SLEAP: read in every layout they have, refused in one line where they are not that."""
+"""Tracks of DeepLabCut and SLEAP are read in every layout; other files are refused in one line."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ NAMES = ("nose", "neck", "ear")
 
 
 def refusal(path) -> str:
-    with pytest.raises(InputError) as told:
+    with pytest.raises(InputError) as caught:
         read_tracks(path)
-    line = str(told.value)
+    line = str(caught.value)
     assert line.startswith(f"{path}: ")
     assert "\n" not in line
     return line
@@ -56,7 +56,7 @@ def test_deeplabcut_of_one_animal_has_three_header_rows_and_a_missing_row_is_a_f
     np.testing.assert_allclose(np.delete(tracks.position_px, [4, 5], 0), np.delete(POINTS[:, :1], [4, 5], 0))
 
 
-def test_columns_of_two_kinds_of_number_lie_in_two_blocks_and_find_each_other(tmp_path):
+def test_columns_of_two_number_types_are_joined_from_two_blocks(tmp_path):
     table = frame(POINTS[:, :1], SCORES[:, :1], NAMES)
     table = table.astype({column: "float32" for column in table.columns if column[-1] == "likelihood"})
     for layout in ("table", "fixed"):
@@ -78,7 +78,7 @@ def test_sleap_is_transposed_back(tmp_path):
 
 
 @pytest.mark.parametrize("dims", ["frame track node xy", "xy node frame track"])
-def test_sleap_in_another_order_is_read_by_its_own_word_for_it(tmp_path, dims):
+def test_the_order_of_sleap_axes_is_read_from_dims(tmp_path, dims):
     order = ["frame", "track", "node", "xy"]
     with h5py.File(tmp_path / "film.h5", "w") as file:
         file["node_names"], file["track_names"] = [b"nose", b"neck", b"ear"], [b"mia", b"max"]
@@ -90,7 +90,7 @@ def test_sleap_in_another_order_is_read_by_its_own_word_for_it(tmp_path, dims):
     np.testing.assert_array_equal(tracks.likelihood, SCORES)
 
 
-def test_sleap_left_untransposed_is_told_by_its_shape(tmp_path):
+def test_untransposed_sleap_arrays_are_recognised_by_their_shape(tmp_path):
     with h5py.File(tmp_path / "film.h5", "w") as file:
         file["node_names"], file["track_names"] = [b"nose", b"neck", b"ear"], [b"mia", b"max"]
         file["tracks"] = POINTS.transpose(0, 2, 3, 1)
@@ -106,7 +106,7 @@ def test_sleap_without_track_names_or_scores_has_one_individual(tmp_path):
     assert np.isnan(tracks.likelihood).all()
 
 
-def test_the_individual_that_is_there_most_often_is_followed_and_said(tmp_path):
+def test_the_individual_with_the_most_frames_is_followed_and_reported(tmp_path):
     points = POINTS.copy()
     points[:5, 0, 0] = np.nan
     tracks = read_tracks(write_sleap(tmp_path / "film.h5", points, SCORES, NAMES, ("mia", "max")))
@@ -115,7 +115,7 @@ def test_the_individual_that_is_there_most_often_is_followed_and_said(tmp_path):
     assert pair.followed == "max is followed: it shows nose and neck most often (mia 7, max 12 frames)"
 
 
-def test_a_mark_that_belongs_to_no_animal_is_every_animals(tmp_path):
+def test_a_point_of_no_animal_is_shared_by_all_animals(tmp_path):
     table = frame(POINTS, SCORES, NAMES, ("mia", "single"))
     rig, mia = [("single", "ear")], [("mia", "nose"), ("mia", "neck")]
     table = table.loc[:, [column[1:3] in rig + mia for column in table.columns]]
@@ -135,13 +135,13 @@ def test_an_unlikely_point_is_missing_and_one_without_a_likelihood_is_not(tmp_pa
     assert not np.isnan(pair.pivot_px).any()
 
 
-def test_a_point_that_is_not_there_is_one_line_with_those_that_are(tmp_path):
+def test_an_unknown_point_is_refused_with_a_list_of_the_known_ones(tmp_path):
     tracks = read_tracks(write_sleap(tmp_path / "film.h5", POINTS, SCORES, NAMES, ("mia", "max")))
     with pytest.raises(InputError, match=r"film\.h5: no point mouth in it; it has nose, neck, ear$"):
         choose_pair(tracks, "mouth", "neck", 0.2)
 
 
-def test_a_table_is_read_where_pandas_and_pytables_are_not(tmp_path):
+def test_a_table_is_read_without_pandas_and_pytables(tmp_path):
     path = write_deeplabcut(tmp_path / "film.h5", POINTS[:, :1], SCORES[:, :1], names=NAMES)
     program = (
         "import sys, pathlib, pickle; sys.modules.update(pandas=None, tables=None)\n"
@@ -175,7 +175,7 @@ def test_a_damaged_pickle_is_a_value_error(damaged):
         read_names(damaged)
 
 
-def test_a_table_whose_names_are_a_program_is_refused(tmp_path):
+def test_a_table_whose_names_are_a_harmful_pickle_is_refused(tmp_path):
     path = write_deeplabcut(tmp_path / "film.h5", POINTS[:, :1], SCORES[:, :1], names=NAMES)
     with h5py.File(path, "a") as file:
         file["df_with_missing/table"].attrs["values_block_0_kind"] = np.bytes_(pickle.dumps([_Bomb()], 0))
@@ -194,8 +194,8 @@ def test_every_cut_of_an_hdf5_file_is_one_line(tmp_path):
 def _is_refused(path) -> bool:
     try:
         read_tracks(path)
-    except InputError as told:
-        return "\n" not in str(told)
+    except InputError as error:
+        return "\n" not in str(error)
     return False
 
 
@@ -214,7 +214,7 @@ def test_flipped_bits_give_tracks_or_one_line(tmp_path):
     assert refused > 20
 
 
-def test_a_foreign_hdf5_file_is_one_line_that_says_what_it_holds(tmp_path):
+def test_an_unknown_hdf5_file_is_refused_with_its_content(tmp_path):
     with h5py.File(tmp_path / "film.h5", "w") as file:
         file["images"], file["labels"] = np.zeros(3), np.zeros(3)
     refused = refusal(tmp_path / "film.h5")
@@ -233,8 +233,8 @@ def test_an_array_that_claims_an_absurd_size_or_lies_elsewhere_is_refused(tmp_pa
         with h5py.File(tmp_path / f"{name}.h5", "w") as file:
             file["node_names"] = [b"nose", b"neck", b"ear"]
             file.create_dataset("tracks", dtype="f8", **options)
-        told = refusal(tmp_path / f"{name}.h5")
-        assert ("too many" if name == "absurd" else "not a dataset of this file") in told
+        line = refusal(tmp_path / f"{name}.h5")
+        assert ("too many" if name == "absurd" else "not a dataset of this file") in line
     with h5py.File(tmp_path / "linked.h5", "w") as file:
         file["node_names"] = [b"nose", b"neck", b"ear"]
         file["tracks"] = h5py.ExternalLink(str(write_sleap(tmp_path / "film.h5", POINTS[:, 0], names=NAMES)), "/tracks")
@@ -255,23 +255,23 @@ def test_a_csv_that_is_no_table_of_tracks_is_one_line(tmp_path):
         "pictures": ([*good[:3], "labeled-data/img001.png" + good[3][1:]], "'labeled-data/img001.png' is not a number"),
         "space": ([line.replace("likelihood", "z") for line in good], "coordinate 'z' in it"),
     }
-    for lines, told in cases.values():
+    for lines, cause in cases.values():
         (tmp_path / "bad.csv").write_text("\n".join(lines) + "\n")
-        assert told in refusal(tmp_path / "bad.csv")
+        assert cause in refusal(tmp_path / "bad.csv")
     (tmp_path / "bad.csv").write_bytes(b"\xff\xfe\x00scorer")
     assert "cannot be read as CSV" in refusal(tmp_path / "bad.csv")
     assert "No such file" in refusal(tmp_path / "not_there.csv")
     assert "no such file" in refusal(tmp_path / "not_there.h5")
 
 
-def test_rows_of_pictures_that_a_person_has_labelled_are_no_film(tmp_path):
+def test_a_table_of_labelled_pictures_is_refused(tmp_path):
     table = frame(POINTS[:, :1], SCORES[:, :1], NAMES)
     table.index = pd.Index([f"labeled-data/film/img{i}.png" for i in range(12)])
     table.to_hdf(tmp_path / "CollectedData.h5", key="df_with_missing", format="table", mode="w")
     assert "not numbered frames" in refusal(tmp_path / "CollectedData.h5")
 
 
-def test_a_folders_tracks_are_found_and_nothing_else(tmp_path):
+def test_only_the_tracks_of_a_folder_are_found(tmp_path):
     write_deeplabcut(tmp_path / f"a{SCORER}.csv", POINTS[:, 0], names=NAMES)
     write_sleap(tmp_path / "b.analysis.h5", POINTS[:, 0], names=NAMES)
     shutil.copy(tmp_path / "b.analysis.h5", tmp_path / "c_skeleton.h5")
@@ -283,7 +283,7 @@ def test_a_folders_tracks_are_found_and_nothing_else(tmp_path):
     assert [p.name for p in find_tracks(tmp_path)] == [f"a{SCORER}.csv", "b.analysis.h5", "broken.h5"]
 
 
-def test_the_clips_name_stands_before_what_the_programs_add():
+def test_the_clips_name_is_what_remains_without_the_programs_additions():
     assert name_by_tool(f"steps-1{SCORER}_filtered") == "steps-1"
     assert name_by_tool("steps-1DLC_Resnet50_nodJan1shuffle1_snapshot_200_el") == "steps-1"
     assert name_by_tool("labels.v002.000_steps-1.analysis") == "steps-1"
