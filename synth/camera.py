@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from synth.effects.camera_tilt import CameraTilt
+from synth.effects.lens_distortion import LensDistortion
 from synth.spec import Spec
 
 Floats = NDArray[np.float64]
@@ -91,12 +93,13 @@ def aim(spec: Spec, lever: float) -> Pinhole:
     Pinhole
         The camera at rest.
     """
-    camera, rig, effects = spec.camera, spec.rig, spec.effects
+    camera, rig = spec.camera, spec.rig
     view = Rotation.from_euler("YX", [-camera.azimuth_deg, camera.elevation_deg], degrees=True)
-    if tilt := effects.camera_tilt:
+    if tilt := spec.effects.get(CameraTilt):
         about = math.radians(tilt.axis_deg)
         axis = np.array([math.cos(about), math.sin(about), 0.0])
         view = Rotation.from_rotvec(math.radians(tilt.tilt_deg) * axis) * view
+    lens = spec.effects.get(LensDistortion)
     mirrored = rig.facing == "left"
     x, y = rig.pivot_px
     return Pinhole(
@@ -105,6 +108,6 @@ def aim(spec: Spec, lever: float) -> Pinhole:
         principal_px=(camera.size[0] - 1 - x if mirrored else x, y),
         distance_m=camera.distance_m,
         rotation=view.as_matrix(),
-        k1=effects.lens_distortion.k1 if effects.lens_distortion else 0.0,
+        k1=lens.k1 if lens else 0.0,
         mirrored=mirrored,
     )

@@ -13,6 +13,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from synth.effects.clock_scale import ClockScale
 from synth.spec import Camera, Effects
 
 Floats = NDArray[np.float64]
@@ -73,7 +74,8 @@ def timetable(camera: Camera, effects: Effects, duration: float, seed: np.random
 
     unit, interval = _grid(camera)
     stamps = np.rint(since_start * float(interval / unit)).astype(np.int64)[kept]
-    scale = effects.clock_scale.scale if effects.clock_scale else 1.0
+    clock = effects.get(ClockScale)
+    scale = clock.scale if clock else 1.0
     taken = since_start[kept] / (float(as_fraction(camera.fps)) * scale)
     own = np.maximum.accumulate(np.where(repeats, 0, np.arange(len(repeats))))
     return Timetable(unit, stamps, taken[own], repeats)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from synth.effects.angle_drift import AngleDrift
 from synth.spec import Camera, Effects
 
 Floats = NDArray[np.float64]
@@ -57,10 +58,11 @@ def unrest(camera: Camera, effects: Effects, seed: np.random.SeedSequence) -> Un
         Of zero amplitude where the camera stands still.
     """
     rng = np.random.default_rng(seed)
+    drift = effects.get(AngleDrift)
     highest = camera.shake.frequency_hz if camera.shake else 1.0
     return Unrest(
         rates=2 * math.pi * rng.uniform(0.1, 1.0, WAVES) * highest,
         phases=rng.uniform(0.0, 2 * math.pi, (2, WAVES)),
         rms_px=camera.shake.rms_px if camera.shake else 0.0,
-        sag=math.radians(effects.angle_drift.rate_deg_per_s) if effects.angle_drift else 0.0,
+        sag=math.radians(drift.rate_deg_per_s) if drift else 0.0,
     )

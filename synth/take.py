@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from anglecam.neck import reach
 from synth.camera import Pinhole, aim
 from synth.clock import Timetable, timetable
+from synth.effects.pivot_offset import PivotOffset
+from synth.effects.rolling_shutter import RollingShutter
 from synth.errors import SpecError
 from synth.exposure import Shutter, instants
 from synth.mechanism import build, mouth_centre, neutral_rocker
@@ -102,7 +104,7 @@ def view(spec: Spec) -> View:
     mouth = mouth_centre(build(spec), spec.camera.distance_m)
     pinhole = aim(spec, float(np.hypot(*mouth)))
     offset = (0.0, 0.0)
-    if moved := spec.effects.pivot_offset:
+    if moved := spec.effects.get(PivotOffset):
         metres = (pinhole.distance_m - FACE_Z) / pinhole.focal_px
         offset = ((-1 if pinhole.mirrored else 1) * moved.dx_px * metres, -moved.dy_px * metres)
     return View(pinhole, mouth, offset)
@@ -184,7 +186,7 @@ def plan(spec: Spec, seen: View, take: Take, frame: int) -> Exposure:
     Exposure
         With a single instant where the mark hardly moves.
     """
-    rolling = spec.effects.rolling_shutter
+    rolling = spec.effects.get(RollingShutter)
     shutter = Shutter(spec.camera.exposure_s, rolling.row_time_s if rolling else 0.0, spec.camera.size[1])
     taken = float(take.table.taken[frame])
     probes = taken + shutter.span_s * np.linspace(-0.5, 0.5, PROBES)

@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from synth.effects.flexible_appendage import FlexibleAppendage
+from synth.effects.pivot_offset import PivotOffset
 from synth.mechanism.antenna import antenna, antenna_pose
 from synth.mechanism.backdrop import backdrop
 from synth.mechanism.head import head, mouth_centre
@@ -49,9 +51,9 @@ def build(spec: Spec, offset: tuple[float, float] = (0.0, 0.0)) -> list[Part]:
     if rig.neck == "human":
         return [*parts, *person(rig, rng)]
     hung = suspension(spec)
-    parts += shaft(rig, offset if spec.effects.pivot_offset else None)
+    parts += shaft(rig, offset if spec.effects.get(PivotOffset) else None)
     parts += [*links(rig.linkage, hung.arm), *springs(rig.linkage, hung), *stand(rig.linkage, hung.anchor)]
-    if spec.effects.flexible_appendage:
+    if spec.effects.get(FlexibleAppendage):
         parts += antenna()
     return parts
 

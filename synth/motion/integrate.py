@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853, DenseOutput, OdeSolution
 from scipy.optimize import brentq
 
-from synth.motion.drive import Drive
+from synth.effects import PiecewiseLinear
 from synth.motion.system import Mode, Signal, State, System
 
 Floats = NDArray[np.float64]
@@ -31,7 +31,7 @@ AT_THE_EDGE = 1e-3
 
 
 def integrate(
-    system: System, drive: Drive, lag: float, start_angle: float, begin: float, end: float
+    system: System, drive: PiecewiseLinear, lag: float, start_angle: float, begin: float, end: float
 ) -> Callable[[Floats], Floats]:
     """Follow the motion from rest.
 
@@ -39,7 +39,7 @@ def integrate(
     ----------
     system : System
         What moves.
-    drive : Drive
+    drive : PiecewiseLinear
         What the load is asked for, rad.
     lag : float
         τ between that and the torque, s; 0 for none.
@@ -59,11 +59,11 @@ def integrate(
         If the head leaves the range in which the linkage closes, or runs away.
     """
     ends, interpolants = [begin], []
-    state: State = [start_angle, 0.0, 0.0, 0.0, 0.0]
+    state: State = [start_angle] + [0.0] * (system.count - 1)
     v, sense, step = 0.0, 1, LONGEST_STEP_S / 10
     inside = drive.knots[(drive.knots > begin) & (drive.knots < end)]
     for start, until in itertools.pairwise([begin, *inside.tolist(), end]):
-        arriving = drive.after(lag, start, v)
+        arriving = drive.lagged(lag, start, v)
         mode, now = system.mode(start, state, arriving, sense), start
         while now < until:
             rates = system.rates(mode, arriving)

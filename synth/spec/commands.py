@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from synth.spec.base import Finite, NotNegative, Positive, Section
+from synth.section import Finite, NotNegative, Positive, Section
 
 Rest = Annotated[float, Field(ge=0.5, allow_inf_nan=False)]
 """Rest before the first change, s: long enough to see the neutral and the noise."""

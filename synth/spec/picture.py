@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from anglecam.neck import FourBar, head_angle, reach
-from synth.spec.base import NotNegative, Pixel, Positive, Rgb, Section, Share
+from synth.section import NotNegative, Pixel, Positive, Rgb, Section, Share
 
 NEUTRAL_SERVO = math.radians(135.0)
 """Crank angle with the head upright, Table 3, rad."""

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from synth.spec.base import Finite, NotNegative, Positive, Section
+from synth.section import Finite, NotNegative, Positive, Section
 
 
 class LinearPlant(Section):

@@ -14,7 +14,7 @@ import yaml
 from pydantic import Field, ValidationError, model_validator
 
 from synth.errors import SpecError
-from synth.spec.base import Section
+from synth.section import Section
 from synth.spec.commands import Command, Nod
 from synth.spec.effects import Effects
 from synth.spec.picture import Camera, Render, Rig, Scene
@@ -46,9 +46,9 @@ class Spec(Section):
     @model_validator(mode="after")
     def _fits_together(self) -> Spec:
         if isinstance(self.plant, NeckPlant):
-            for name in ("gravity_geometry", "linkage_geometry", "dead_zone"):
-                if getattr(self.effects, name) is not None:
-                    raise ValueError(f"effects.{name}: belongs to a linear plant, a neck has its own")
+            for effect in self.effects.present():
+                if effect.linear_plant_only:
+                    raise ValueError(f"effects.{effect.id}: only for a linear plant; a neck models it already")
         if self.rig.neck == "human":
             for number, recording in enumerate(self.recordings):
                 if not isinstance(recording.command, Nod):
