@@ -63,7 +63,7 @@ class Pinhole:
         return ideal + off * stretch, depth
 
     def place(self, pixel: tuple[float, float], z: float) -> Floats:
-        """Return the point (3,) at height z over the plane of motion that an undistorted square view shows at a pixel."""
+        """Return the point (3,) at height z over the plane of motion that an undistorted square view shows there."""
         x = self.size[0] - 1 - pixel[0] if self.mirrored else pixel[0]
         scale = (self.distance_m - z) / self.focal_px
         return np.array([(x - self.principal_px[0]) * scale, (self.principal_px[1] - pixel[1]) * scale, z])

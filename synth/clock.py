@@ -1,8 +1,8 @@
 """The true time of each frame of a clip, and the time stamp that the file gives it.
 
 A good camera takes frame k at k/fps and stamps it k/fps. A camera with a fast clock stamps k/fps too but takes the
-frame sooner; a wrong declared rate changes the stamps; a variable rate takes frames at uneven intervals; a dropped frame
-leaves a gap; a duplicate repeats the previous picture under a new time stamp.
+frame sooner; a wrong declared rate changes the stamps; a variable rate takes frames at uneven intervals; a dropped
+frame leaves a gap; a duplicate repeats the previous picture under a new time stamp.
 """
 
 from __future__ import annotations
