@@ -6,4 +6,4 @@ class SpecError(Exception):
 
 
 class RenderError(Exception):
-    """This machine cannot draw."""
+    """Drawing is not possible on this machine."""

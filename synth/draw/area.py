@@ -32,7 +32,7 @@ _PIECES, _CORNERS = 256, 24
 
 @njit(cache=True, error_model="numpy")
 def number(marked: NDArray[np.bool_]) -> tuple[Ints, Ints]:
-    """Number the marked pixels row by row.
+    """Count the marked pixels row by row.
 
     Parameters
     ----------

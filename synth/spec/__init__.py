@@ -1,4 +1,4 @@
-"""The spec of a session to be rendered, section by section."""
+"""The spec of a session to render, section by section."""
 
 from synth.section import Pixel, Rgb
 from synth.spec.commands import (
