@@ -139,11 +139,14 @@ def annulus(inner: float, outer: float, z: float, sections: int = 288) -> trimes
 
 def woven(grid: Floats, normals: Floats) -> trimesh.Trimesh:
     """Join a grid of points (n, m, 3) by triangles that face along the cross product of its first and second axis."""
-    rows, columns = grid.shape[:2] here = np.arange(rows * columns).reshape(rows, columns)[:-1, :-1].ravel() right, up =
-    here + columns, here + 1 faces = np.vstack([np.column_stack([here, right, right + 1]), np.column_stack([here, right
-    + 1, up])]) points = grid.reshape(-1, 3) corners = points[faces] area = np.linalg.norm(np.cross(corners[:, 1] -
-    corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) return _mesh(points, normals.reshape(-1, 3), faces[area >
-    1e-15])  # where a circle degenerates to a point, half the triangles have no area
+    rows, columns = grid.shape[:2]
+    here = np.arange(rows * columns).reshape(rows, columns)[:-1, :-1].ravel()
+    right, up = here + columns, here + 1
+    faces = np.vstack([np.column_stack([here, right, right + 1]), np.column_stack([here, right + 1, up])])
+    points = grid.reshape(-1, 3)
+    corners = points[faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return _mesh(points, normals.reshape(-1, 3), faces[area > 1e-15])  # no slivers where a circle is a point
 
 
 def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:

@@ -16,10 +16,9 @@ UPDATE_S = 0.02
 """Sample time of smooth commands, s: a servo takes a new position 50 times a second."""
 
 PAPER_SERIES_DEG = (22.0, 0.0, 12.0, -8.0, 18.0, 5.0, -15.0, 10.0, 0.0)
-"""Levels of the paper's verification. Figs. 11 and 15 show steps of several heights from several angles; the only printed
-number is the 22° of the text. These levels begin with 22° and go in both directions within the linkage's −23.9° to
-31.1°,
-so that no step leaves the reach with the 14 % overshoot that the paper measured."""
+"""Levels of the paper's verification. Figs. 11 and 15 show steps of several heights from several angles; the only
+printed number is the 22° of the text. These levels begin with 22° and go in both directions within the linkage's
+−23.9° to 31.1°, so that no step leaves the reach with the 14 % overshoot that the paper measured."""
 
 
 def command_rows(recording: Recording, seed: np.random.SeedSequence) -> Floats | None:

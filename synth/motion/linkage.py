@@ -97,7 +97,7 @@ class Transmission:
 
     @cached_property
     def _series(self) -> list[float]:
-        """Return the Chebyshev series of Γ in ξ with θ = mid − half·cos ξ: in ξ the square roots at both ends are smooth."""
+        """Return the Chebyshev series of Γ in ξ, θ = mid − half·cos ξ: the square roots at the ends are smooth in ξ."""
         low, high = self.reach
         mid, half = (low + high) / 2, (high - low) / 2
 

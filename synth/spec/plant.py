@@ -62,8 +62,7 @@ class NeckPlant(Section):
     @model_validator(mode="after")
     def _spring_at_a_right_angle(self) -> NeckPlant:
         if self.spring_arm <= self.spring_base:
-            raise ValueError("spring_arm: must be longer than spring_base, because it is the hypotenuse of a right
-            triangle")
+            raise ValueError("spring_arm: must be longer than spring_base, it is a right triangle's hypotenuse")
         return self
 
 

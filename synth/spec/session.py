@@ -125,7 +125,7 @@ _TAGS = {
 
 
 def _first_finding(error: ValidationError) -> str:
-    """Format the most specific finding as one line: an unknown key first, because it causes others, else the deepest."""
+    """Format the most specific finding as one line: an unknown key, as it causes other findings, else the deepest."""
     findings = error.errors()
     unknown = [finding for finding in findings if finding["type"] in _UNKNOWN]
     finding = unknown[0] if unknown else max(findings, key=lambda finding: len(finding["loc"]))
