@@ -1,12 +1,13 @@
-"""How near the estimators of a, b, c come to the Cramér–Rao bound, and whether what they state of themselves is true.
+"""Compares the estimators of a, b, c with the Cramér–Rao bound, and their stated uncertainty with their actual error.
 
     PYTHONPATH=tests .venv/bin/python benchmarks/estimators.py [seeds]
 
-The plant is (26, 524, 508) in series of 8 s at 30 frames a second with white noise of 0.2°; the commands stay, noise
-and start are drawn anew for every seed, each of a, b, c up to 80 % off. Truth is the tests' own: the matrix exponential
-from switch to switch. "Efficiency" is the bound's variance over the mean squared error. The mean of 300 squares is
-itself uncertain by 8 %; "on the same noise" is therefore the mean squared error of the estimator that is linear about
-the truth, which meets the bound exactly, over that of the row: what it is short of 1 is the estimator's own doing.
+The plant is (26, 524, 508) in series of 8 s at 30 frames a second with white noise of 0.2°. The commands are the same
+for all seeds; noise and start are drawn for every seed, each of a, b, c up to 80 % off. The truth is computed by the
+tests' oracle: the matrix exponential from switch to switch. "Efficiency" is the bound's variance over the mean squared
+error. The mean of 300 squares is uncertain by 8 %. "On the same noise" removes this uncertainty: it is the mean squared
+error, on the same seeds, of the estimator that is linear about the truth and meets the bound exactly, over that of the
+row. Its deficit from 1 is due to the estimator.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ TRUE = np.array([26.0, 524.0, 508.0])
 SIGMA = float(np.radians(0.2))
 OFF = 0.8
 LOST = 10.0
-"""Deviations of the bound: a run that ends farther off has lost its way."""
+"""A run that ends farther from the truth than this counts as lost, in standard deviations of the bound."""
 SERIES = {"steps": ("steps",), "steps, stairs, triangle, chirp": ("steps", "stairs", "triangle", "chirp")}
 
 
@@ -67,14 +68,14 @@ def iterated_filter(records: list[Record], start: Floats) -> Estimate:
 
 
 def modest(records: list[Record], start: Floats) -> EkfSettings:
-    """Tune a filter that is not iterated: with the wide variances of one that is it loses its way more often."""
+    """Return settings for a filter without iteration; the iterated filter's wide variances lose more runs."""
     settings = settings_for(records, start, SIGMA)
     _, rate, *shared = settings.initial_variance
     return replace(settings, initial_variance=((2.0 * SIGMA) ** 2, rate, *(0.25 * v for v in shared)))
 
 
 def filter_passed_again(records: list[Record], start: Floats) -> Estimate:
-    """Pass until settled about the running estimate, the initial variance anew each time."""
+    """Repeat the filter about its running estimate until it converges, resetting the initial variance each time."""
     settings = modest(records, start)
     parameters = start
     for _ in range(settings.passes):
@@ -98,7 +99,7 @@ def _one_pass(records: list[Record], start: Floats, settings: EkfSettings) -> Es
 
 
 class EulerFilter(ExtendedKalmanFilter):
-    """filterpy as its manual has it: x ← x + f·Δt, F = I + ∂f/∂x·Δt, the command of the frame before."""
+    """filterpy as in its manual: x ← x + f·Δt, F = I + ∂f/∂x·Δt, with the previous frame's command."""
 
     step, command = 0.0, 0.0
 
@@ -139,7 +140,7 @@ ESTIMATORS: dict[str, Callable[[list[Record], Floats], Estimate]] = {
 
 @cache
 def exact(kinds: tuple[str, ...]) -> list[Record]:
-    """Return the recordings without noise, the zero declared."""
+    """Return the recordings without noise and with a declared zero."""
     rng = np.random.default_rng(0)
     return [replace(record(TruePlant(), Recording(k, k), rng, sigma_deg=0.0), zero_known=True) for k in kinds]
 
@@ -154,7 +155,7 @@ def at_the_truth(kinds: tuple[str, ...]) -> tuple[Floats, Floats]:
 
 
 def drawn(kinds: tuple[str, ...], seed: int) -> tuple[list[Record], Floats, Floats]:
-    """Draw noisy recordings and a start; return also what the linear estimator makes of the noise."""
+    """Draw noisy recordings and a start; return them and the linear estimator's error on the same noise."""
     rng = np.random.default_rng(seed)
     start = TRUE * (1.0 + rng.uniform(-OFF, OFF, 3))
     noise = [rng.normal(0.0, SIGMA, len(r.time)) for r in exact(kinds)]
@@ -181,7 +182,7 @@ class Row:
 
 
 def run(name: str, kinds: tuple[str, ...], seeds: int, pool: ProcessPoolExecutor | None = None) -> Row:
-    """Try an estimator on ``seeds`` draws."""
+    """Run an estimator on ``seeds`` draws."""
     each = (pool.map if pool else map)(one_trial, [name] * seeds, [kinds] * seeds, range(seeds))
     errors, covariances, linear, seconds = (np.array(part) for part in zip(*each, strict=True))
     bound = np.diag(at_the_truth(kinds)[0])
@@ -216,8 +217,8 @@ def print_efficiency(seeds: int, pool: ProcessPoolExecutor) -> None:
             print(f"| {name} | {cells[0]} | {cells[1]} | {nees} | {row.lost} | {1e3 * row.seconds:.0f} |", flush=True)
 
 
-# The paper's own test. A unit step of this plant ends at c/b = 22.2, the 22° of Fig. 10: the angle is in degrees, the
-# step of height 1; it begins with the first frame, and 4 s at the paper's 15 frames a second hold all of the motion.
+# The paper's self-test. A unit step of this plant ends at c/b = 22.2, the 22° of Fig. 10: the angle is in degrees and
+# the step has height 1. It begins with the first frame, and 4 s at the paper's 15 frames a second contain all motion.
 SELF_TRUE, SELF_START, SELF_SIGMA = np.array([4.0, 45.0, 1000.0]), np.array([3.0, 40.0, 900.0]), 0.5
 SELF_TIME, SELF_STEP = np.arange(0.0, 4.0, 1.0 / 15.0), Command(np.zeros(1), np.ones(1))
 PAPER_SELF = replace(PAPER, measurement_variance=0.5)
@@ -231,7 +232,7 @@ SELF_WAYS: dict[str, EkfSettings | None] = {
 
 
 def self_test(seed: int | None) -> list[Record]:
-    """Draw the unit step's response in degrees, without noise for no seed."""
+    """Return the unit step's response in degrees, with noise if a seed is given."""
     angle = respond(SELF_TRUE[2:], np.array([1.0, *SELF_TRUE[:2]]), SELF_TIME, np.zeros(1), np.ones(1))
     if seed is not None:
         angle = angle + np.random.default_rng(seed).normal(0.0, SELF_SIGMA, len(angle))
@@ -294,7 +295,7 @@ SYS2_LEVELS = {"fitted": (1.0, 0.0, 0.5, -0.5, -1.0, 0.0, 0.8, 0.2), "held out":
 
 
 def sys2_steps(series: str, rate: float, sigma: float, seed: int) -> Record:
-    """Draw a series of steps, one in 1.5 s, of the paper's SYS2; a command of 1° turns the head by 23.6°."""
+    """Return a series of steps, one per 1.5 s, of the paper's SYS2; a command of 1° turns the head by 23.6°."""
     levels = SYS2_LEVELS[series]
     command = Command(np.array([0.0, *(0.51 + 1.5 * np.arange(len(levels)))]), np.radians([0.0, *levels]))
     times = np.arange(0.0, 0.5 + 1.5 * len(levels), 1.0 / rate)
@@ -322,7 +323,7 @@ def sys2_trial(rate: float, sigma: float, seed: int) -> tuple[Floats, Floats, Fl
 
 
 def print_sys2(seeds: int, pool: ProcessPoolExecutor) -> None:
-    print(f"\nSYS2 from a series of steps, and its prediction of another, {seeds} seeds\n")
+    print(f"\nSYS2 from a series of steps, and its prediction of another series, {seeds} seeds\n")
     sigmas = "bound's sigma of the real pole; of the pair, re and im; of the zeros, re and im, 1/s"
     print(f"| frames/s | noise, ° | {sigmas} | errors within 1.96 sigma | NEES per degree (95 % band)", end=" ")
     print("| held out, ° RMS: SYS1 | SYS2 |")
@@ -334,13 +335,13 @@ def print_sys2(seeds: int, pool: ProcessPoolExecutor) -> None:
         exact = sys2_steps("fitted", rate, 0.0, 0)
         bound = cramer_rao_bound(ThirdOrder(), SYS2, [exact], [np.zeros(3)], sigma)
         poles, zeros = (roots.sigma for roots in poles_and_zeros(SYS2, bound))
-        told = "; ".join(listed(v) for v in (poles[0, :1], poles[-1], zeros[-1]))
+        bounds = "; ".join(listed(v) for v in (poles[0, :1], poles[-1], zeros[-1]))
         real = off[np.isfinite(off)]
         tested = consistency(6.0 * float(nees.sum()), 6 * seeds)
         held_out = " | ".join(f"{np.degrees(np.sqrt(v)):.3f}" for v in np.mean(rms**2, axis=0))
         band = f"{tested.mean:.3f} ({tested.lower:.2f} to {tested.upper:.2f})"
         print(
-            f"| {rate:g} | {sigma_deg} | {told} | {100 * np.mean(np.abs(real) < 1.96):.0f} % | {band} | {held_out} |",
+            f"| {rate:g} | {sigma_deg} | {bounds} | {100 * np.mean(np.abs(real) < 1.96):.0f} % | {band} | {held_out} |",
             flush=True,
         )
 

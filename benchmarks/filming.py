@@ -1,9 +1,9 @@
-"""How fast whole films are made, sensor and codec included, and where the time goes.
+"""Measures how fast whole films are made, including sensor and codec, and how the time is divided.
 
     .venv/bin/python benchmarks/filming.py
 
-Films the demo's motion at 640 × 480 and 1280 × 720, without and with motion blur, on as many workers as there are
-cores, and says beside it what one instant's drawing, the sensor and the codec take of it on one core.
+Films the demo's motion at 640 × 480 and 1280 × 720, without and with motion blur, with one worker per core. Also prints
+the time of one drawing, of the sensor and of the codec on one core.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from synth.take import perform, plan, view
 
 DEMO = Path(__file__).parents[1] / "configs" / "demo.yaml"
 WARM_UP = 48
-"""Frames that are not counted: workers start and load."""
+"""Frames that are not timed, while the workers start and load."""
 
 
 def variant(size: tuple[int, int], exposure_s: float) -> Spec:

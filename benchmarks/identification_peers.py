@@ -1,4 +1,4 @@
-"""Identification by others: how well and how fast, from the same series with a known truth.
+"""Compares identification packages in accuracy and speed, on the same series with known truth.
 
     python3 -m venv build/identification-peers
     build/identification-peers/bin/pip install -e . -r benchmarks/identification-requirements.txt
@@ -6,14 +6,15 @@
     PYTHONPATH=tests build/identification-peers/bin/python benchmarks/identification_peers.py [seeds]
 
 The truth is the paper's SYS1, a = 26, b = 524, c = 508, and its SYS2, Eq. (36), each in one series of steps, 12 s at 30
-frames a second, with white noise of 0.2° for SYS1 and 0.02° for SYS2. First as the others want it ("even"): frames at
-even times, and the command changes on a frame. Then "as filmed": the command changes between frames, and one frame in
-ten is missing; the others are given the angle interpolated to even times. Every method is told the order.
+frames a second, with white noise of 0.2° for SYS1 and 0.02° for SYS2. The first kind of series is "even", as the other
+packages require: frames at even times, and the command changes on a frame. The second is "as filmed": the command
+changes between frames, and one frame in ten is missing; the other packages get the angle interpolated to even times.
+Every method gets the true order.
 
-The others' discrete models are turned into continuous ones by the matrix logarithm, exact for a command held from frame
-to frame. a and b come from the poles, c from b and the gain at rest. "Response" is the model's free run from rest less
-the true one, without noise. Errors are medians over the seeds. anglecam's output error is given no start, its filter
-the paper's: 5, 531, 520. A method that is not installed is left out, and the output says so.
+The other packages' discrete models are converted to continuous ones by the matrix logarithm, which is exact for a
+command held from frame to frame. a and b come from the poles, c from b and the static gain. "Response" is the model's
+free run from rest minus the true response, without noise. Errors are medians over the seeds. anglecam's output error
+gets no start, its filter the paper's: 5, 531, 520. A method that is not installed is left out with a message.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ INTERVAL, DURATION = 1.0 / 30.0, 12.0
 LEVELS_DEG = (12.0, 0.0, 6.0, -6.0, -12.0, 0.0, 10.0, 2.0)
 MISSING = 0.1
 BLOCKS = 12
-"""Block rows of the subspace methods: 0.4 s, some two periods."""
+"""Block rows of the subspace methods: 0.4 s, approximately two periods."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class Truth:
     numerator: Floats
     denominator: Floats
     gain: float
-    """Scales the command, so that both systems move by some 12°."""
+    """Factor on the command, so that both systems move by approximately 12°."""
     sigma_deg: float
 
     @property
@@ -80,14 +81,14 @@ TRUTHS = (
 
 @dataclass(frozen=True)
 class Found:
-    """A model that a method found."""
+    """A model identified by a method."""
 
     poles: NDArray[np.complex128]
     """1/s."""
     gain: float
-    """At rest."""
+    """Static gain."""
     response: Floats
-    """Free run at the even times."""
+    """Free run at even times."""
     seconds: float
 
 
@@ -98,7 +99,7 @@ def in_order(poles: NDArray) -> NDArray[np.complex128]:
 
 @dataclass(frozen=True)
 class Data:
-    """One truth in one kind of series, with noise for every seed."""
+    """One true system in one kind of series, with noise for every seed."""
 
     truth: Truth
     even: Floats
@@ -107,14 +108,14 @@ class Data:
     exact: Floats
     """(n,) true response at them, rad."""
     records: Sequence[Record]
-    """For anglecam: the frames that there are."""
+    """The existing frames, for anglecam."""
 
     @property
     def u(self) -> Floats:
         return self.command.at(self.even)
 
     def y(self, record: Record) -> Floats:
-        """Angle at even times."""
+        """Return the angle at even times."""
         return np.interp(self.even, record.time, record.angle)
 
 
@@ -142,7 +143,7 @@ def draw(truth: Truth, seeds: int, *, filmed: bool) -> Data:
 
 
 def found_from(data: Data, seconds: float, A: Floats, B: Floats, C: Floats, D: Floats) -> Found:
-    """Turn a discrete model into what is compared."""
+    """Convert a discrete model to poles, gain and response."""
     n = len(A)
     if not np.all(np.isfinite(A)):
         return Found(np.full(n, np.nan), np.nan, np.full(len(data.even), np.nan), seconds)
@@ -187,7 +188,7 @@ def with_filter(data: Data) -> list[Found]:
 
 
 def by_frame(identify: Callable[[Floats, Floats, int], Sequence[Floats]]) -> Callable[[Data], list[Found]]:
-    """Apply a method of (y, u, order) to (A, B, C, D) to every seed."""
+    """Return a function that applies a method (y, u, order) → (A, B, C, D) to every seed."""
 
     def method(data: Data) -> list[Found]:
         found = []
@@ -202,7 +203,7 @@ def by_frame(identify: Callable[[Floats, Floats, int], Sequence[Floats]]) -> Cal
 
 
 def realised(y: Floats, u: Floats, order: int) -> Sequence[Floats]:
-    """python-control: Markov parameters by least squares, then the eigensystem realisation."""
+    """Identify with python-control: Markov parameters by least squares, then the eigensystem realisation."""
     response = control.TimeResponseData(np.arange(len(y)) * INTERVAL, y, np.zeros((0, len(y))), u)
     markov = np.asarray(control.markov(response, 6 * BLOCKS, dt=INTERVAL)).ravel()
     system, _ = control.eigensys_realization(markov[None, None, :], order, m=2 * BLOCKS, n=2 * BLOCKS, dt=INTERVAL)
@@ -256,7 +257,7 @@ def with_octave(method: str) -> Callable[[Data], list[Found]]:
 
 
 def octave_says(command: str) -> str | None:
-    """Ask Octave; ``None`` without it or where it fails."""
+    """Return Octave's output; ``None`` if it is not installed or fails."""
     if shutil.which("octave-cli") is None:
         return None
     done = subprocess.run(["octave-cli", "--norc", "--eval", command], check=False, capture_output=True, text=True)
@@ -264,7 +265,7 @@ def octave_says(command: str) -> str | None:
 
 
 def methods() -> Iterator[tuple[str, Callable[[Data], list[Found]]]]:
-    """Give what is installed; say what is not."""
+    """Yield the installed methods; print which are missing."""
     yield "anglecam, output error", with_output_error
     yield "anglecam, iterated EKF", with_filter
     yield "python-control, Markov + ERA", by_frame(realised)
@@ -298,7 +299,7 @@ def versions() -> str:
 
 
 def relative(found: Sequence[Found], truth: Truth) -> str:
-    """RMS error of each real parameter, in per cent: a, b, c, or the poles' distances from the true ones."""
+    """Return the RMS error of each real parameter, in per cent: a, b, c, or the distances from the true poles."""
     poles = np.array([f.poles for f in found])
     if truth.order == 2:
         b = np.prod(poles, axis=1).real
@@ -323,7 +324,7 @@ def main(seeds: int) -> None:
         for name, method in there:
             cells, failed, seconds = [], 0, []
             try:
-                if not method(warm):  # what is compiled or loaded on first use
+                if not method(warm):  # compiles and loads on first use
                     continue
                 for data in series:
                     found = method(data)
@@ -332,7 +333,7 @@ def main(seeds: int) -> None:
                     failed += int(np.sum(~good))
                     cells += [relative(found, truth), f"{np.degrees(np.median(missed[good])):.2g}"]
                     seconds += [f.seconds for f in found]
-            except Exception as error:  # noqa: BLE001  # a peer may fail in any way; the table says that it did
+            except Exception as error:  # noqa: BLE001  # a peer may fail in any way; the table reports it
                 print(f"| {name} | fails: {type(error).__name__}: {str(error)[:60]} | | | | | |")
                 continue
             print(f"| {name} | {' | '.join(cells)} | {failed} | {1e3 * np.nanmedian(seconds):.2g} |", flush=True)

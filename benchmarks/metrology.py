@@ -1,11 +1,11 @@
-"""How right and how sure the angle is, film by film, against the truth that they were rendered from.
+"""Measures the angle's error and its stated uncertainty, film by film, against the films' truth.
 
     .venv/bin/python benchmarks/metrology.py [name ...]
 
 Two recordings of each rig and camera: stairs up to 21° with the oscillation of every step, and a triangle of ±22°, both
-640 × 480 at 30 Hz, lever arm 200 px, noise 2 grey levels, rendered at quality `metrology`. anglecam is told what the
-table says it is told and nothing else. The bound is Cramér and Rao's for the turn of the mouth patch about a known
-pivot: no way of reading the mouth alone can be better; the whole head may be.
+640 × 480 at 30 Hz, lever arm 200 px, noise 2 grey levels, rendered at quality `metrology`. anglecam gets only the
+declarations that the table names. The bound is the Cramér–Rao bound for the rotation of the mouth patch about a known
+pivot: no method that reads the mouth alone can be better, but a method that reads the whole head can.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ COMMANDS = {
 }
 SECONDS = {"stairs": 5.0, "triangle": 4.0}
 PATCH_PX = 30
-"""Half the side of the square about the mouth's centre that the bound is computed from."""
+"""Half the side of the square around the mouth's centre for which the bound is computed, px."""
 WRONG_DEG = 0.1
-"""An error that no row may have that is called ok."""
+"""Error beyond which a row with status ok counts as wrong."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """A film and what is declared about it."""
+    """A film and its declarations."""
 
     camera: dict[str, Any] = field(default_factory=dict)
     rig: dict[str, Any] = field(default_factory=dict)
@@ -110,7 +110,7 @@ def film(case: Case, folder: Path) -> Path:
 
 
 def judge(spec_file: Path, name: str) -> tuple[np.ndarray, np.ndarray, int, int]:
-    """Measure one clip; return errors and sigmas (degrees) of its ok rows, rows that are not, and bounds broken."""
+    """Measure one clip; return errors and sigmas (°) of its ok rows, and the counts of other rows and broken bounds."""
     spec = read_spec(spec_file)
     session = spec_file.parent / "session"
     recording = next(r for r in spec.recordings if r.name == name)
@@ -143,7 +143,7 @@ def bound_deg() -> float:
         x, y = round(float(truth["mouth_x_px"][k])), round(float(truth["mouth_y_px"][k]))
         part = np.s_[y - PATCH_PX : y + PATCH_PX, x - PATCH_PX : x + PATCH_PX]
         slope = (frames[k + 1][part].astype(float) - frames[k][part]) / (angle[k + 1] - angle[k])
-        # what rounding to whole grey levels adds to the difference is not the picture's
+        # the difference contains rounding to whole grey levels, which is not part of the picture
         noise = 2.0 * slope.size / 12.0 / (angle[k + 1] - angle[k]) ** 2
         bounds.append(2.0 / np.sqrt((slope**2).sum() - noise))
     return float(np.degrees(np.median(bounds)))

@@ -1,4 +1,4 @@
-"""The angle by others: how well and how fast, on the same films with a known truth.
+"""Compares methods of measuring the angle in accuracy and speed, on the same films with known truth.
 
     python3 -m venv build/peers
     build/peers/bin/pip install -e .
@@ -6,11 +6,11 @@
     apt-get install --no-install-recommends octave octave-image
     build/peers/bin/python benchmarks/peers.py [seconds]
 
-anglecam is told nothing. Every other method is given all that a careful user could have: the mouth's true colour, the
-true centre of rotation, and the part of the picture in which the mouth moves, or its true place in the first frame.
-From every error its median is taken: what a method holds to be the mouth's place does not count against it, only how
-steadily. All that runs in Python reads through anglecam's decoder, and its rates include that; Octave's include reading
-PNG files of the same frames. A method that is not installed is left out, and the output says so.
+anglecam gets no information but the clip. Every other method gets what a careful user could know: the mouth's true
+colour, the true centre of rotation, and the region in which the mouth moves, or its true place in the first frame. The
+median is subtracted from every method's error, so that a method's definition of the mouth's place does not count, only
+its consistency. All Python methods read through anglecam's decoder and their rates include it; Octave's rate includes
+reading PNG files of the same frames. A method that is not installed is left out with a message.
 """
 
 from __future__ import annotations
@@ -39,21 +39,21 @@ from synth.spec.picture import Rig as TrueRig
 
 CAMERAS = {"FFV1": {"codec": "ffv1"}, "MJPEG": {"codec": "mjpeg"}, "H.264 crf 18": {"codec": "h264", "crf": 18}}
 ROOM_PX = 35
-"""About the mouth's centre wherever it goes: all of the mouth, and some cheek."""
+"""Margin around all positions of the mouth's centre: contains the whole mouth and some cheek."""
 MOUTH_PX = 45
-"""Across the mouth."""
+"""Width of the mouth."""
 BLOBS_PX = {"mouth": 55, "shaft": 35}
-"""Diameters for trackpy, odd; of 35, 45 and 55 and of noise sizes 1 and 3 the ones that on FFV1 lose no frame."""
+"""Diameters for trackpy, odd. Of 35, 45 and 55, with noise sizes 1 and 3, these lose no frame on FFV1."""
 BLOB_ROOM_PX = 60
-"""trackpy takes nothing that is nearer to the border than a blob's radius."""
+"""Margin for trackpy, which ignores blobs nearer to the border than their radius."""
 SCRIPT = Path(__file__).with_name("octave_method.m")
 Found = tuple[dict[str, np.ndarray], float]
-"""For each way of reading the angle (frames,) rad, NaN where nothing was found; and the seconds all of it took."""
+"""For each definition of the point the angle (frames,), rad, NaN where nothing was found; and the total time, s."""
 
 
 @dataclass(frozen=True)
 class Film:
-    """A clip, and what its truth lends to the methods."""
+    """A clip, and the truth that the methods use."""
 
     clip: Path
     angle: np.ndarray
@@ -64,23 +64,23 @@ class Film:
     """(2,) px."""
 
     def box(self, room_px: int = ROOM_PX) -> tuple[int, int, int, int]:
-        """Give left, top, right, bottom of where the mouth moves, px; the last two are just outside."""
+        """Return left, top, right, bottom of the region in which the mouth moves, px; the last two are exclusive."""
         low, high = self.mouth.min(0) - room_px, self.mouth.max(0) + room_px
         return tuple(np.concatenate([low, high]).astype(int).tolist())
 
     def pictures(self) -> Iterator[np.ndarray]:
-        """Give every frame, blue, green, red."""
+        """Yield every frame, blue, green, red."""
         return (frame.image for frame in open_film(self.clip).frames())
 
     def redness(self, room_px: int = ROOM_PX) -> Iterator[np.ndarray]:
-        """Give the box of every frame, red over the mean of green and blue."""
+        """Yield the box of every frame as red over the mean of green and blue."""
         left, top, right, bottom = self.box(room_px)
         for picture in self.pictures():
             blue, green, red = np.moveaxis(picture[top:bottom, left:right].astype(float), 2, 0)
             yield red - (green + blue) / 2
 
     def direction(self, points: Sequence[np.ndarray]) -> np.ndarray:
-        """Give the angles at which (x, y) points are seen from the true pivot, rad."""
+        """Return the directions of (x, y) points from the true pivot, rad."""
         arms = np.array(points) - self.pivot
         return np.arctan2(-arms[:, 1], arms[:, 0])
 
@@ -96,7 +96,7 @@ def shoot(folder: Path, camera: dict, seconds: float) -> Film:
 
 
 def threshold() -> float:
-    """Redness halfway between the true colours of lips and skin."""
+    """Return the redness halfway between the true colours of lips and skin."""
     return float(np.mean([rgb[0] - (rgb[1] + rgb[2]) / 2 for rgb in (TrueRig().lips_rgb, TrueRig().skin_rgb)]))
 
 
@@ -143,7 +143,7 @@ def with_octave(film: Film) -> Found:
 
 
 def with_trackpy(film: Film) -> Found:
-    """Mouth and shaft are found anew in every frame: with one blob in each box there is nothing to link."""
+    """Locate mouth and shaft separately in every frame; with one blob in each box there is nothing to link."""
     import trackpy
 
     began = time.perf_counter()
@@ -176,7 +176,7 @@ def with_csrt(film: Film) -> Found:
 
 
 def octave_says(command: str) -> str | None:
-    """Ask Octave; ``None`` without it or where it fails."""
+    """Return Octave's output; ``None`` if it is not installed or fails."""
     if shutil.which("octave-cli") is None:
         return None
     done = subprocess.run(["octave-cli", "--norc", "--eval", command], check=False, capture_output=True, text=True)
@@ -184,7 +184,7 @@ def octave_says(command: str) -> str | None:
 
 
 def methods() -> Iterator[tuple[str, Callable[[Film], Found]]]:
-    """Give the methods that are installed, named with their versions; say which are not."""
+    """Yield the installed methods, named with their versions; print which are missing."""
     octave = octave_says('pkg load image; printf("%s, image %s", version, pkg("list", "image"){1}.version)')
     needs = [
         (with_anglecam, f"anglecam {anglecam.__version__}", ""),
@@ -209,7 +209,7 @@ def methods() -> Iterator[tuple[str, Callable[[Film], Found]]]:
 
 
 def rms_deg(found: np.ndarray, true: np.ndarray) -> float:
-    """Error less its median, over the frames in which something was found."""
+    """Return the RMS of the error minus its median, over the frames with a result."""
     error = np.degrees(found - true)
     return float(np.sqrt(np.nanmean((error - np.nanmedian(error)) ** 2)))
 
@@ -224,7 +224,7 @@ def main(seconds: float) -> None:
         print("| |", " ".join(f"{codec}, ° RMS | frames/s |" for codec in CAMERAS), "frames lost |")
         print("| --- " * (2 * len(films) + 2) + "|")
         for _, method in there:
-            method(warm)  # what is compiled or loaded on first use
+            method(warm)  # compiles and loads on first use
             found = [method(film) for film in films]
             for way in found[0][0]:
                 cells, lost = [], 0

@@ -1,32 +1,32 @@
-"""The missing term by PySINDy: what θ̈ = c·u − a·θ̇ − b·θ lacks, from the same angle series as anglecam's loop.
+"""Finds the term that θ̈ = c·u − a·θ̇ − b·θ lacks with PySINDy, from the same angle series as anglecam's loop.
 
     python3 -m venv build/pysindy
     build/pysindy/bin/pip install -e . -r benchmarks/pysindy-requirements.txt
     build/pysindy/bin/python -m benchmarks.pysindy_peer [--seeds 5] [--only pysindy|anglecam] [case ...]
 
 A session is five recordings of 7 to 8 s at 30 frames a second (`benchmarks.blind.sessions`): random steps, which are
-held out, and stairs, a triangle, a chirp and a release, which are fitted. Each has one effect or none. "Faint" effects
-leave about 0.05° that the base model cannot follow, "plain" ones several times that.
+held out, and stairs, a triangle, a chirp and a release, which are fitted. Each session has one effect or none. With
+"faint" effects the base model's residual is approximately 0.05°, with "plain" effects several times that.
 
 PySINDy sees θ, ω and the command, in three ways:
 
     differences   `FiniteDifference` of fourth order, twice, at the frames; STLSQ
     weak          `WeakPDELibrary`, θ and ω of the interpolating spline on a grid eight times finer; STLSQ
-    ensemble      the same rows drawn with replacement, STLSQ on each draw, the median of all
+    ensemble      the same rows drawn with replacement, STLSQ on each draw, median of all draws
 
-The command enters as its exact mean about each point of the grid, so that no way loses the instant of a change. The
+The command enters as its exact mean around each point of the grid, so that no method loses the time of a change. The
 library has a term for every effect: 1, θ², θ³, ω², ω|ω|, tanh(ω/ε) for dry friction, and copies of the command with
-delays and behind play, among them the true ones of the plain cases. sin θ is not in it: over ±20° it differs from a
-sum of θ and θ³ by less than 10⁻⁴. All copies at once are nearly collinear and spoil the regression, so each has a
-library of its own, with all the other terms. Every library is thresholded at several `SHARES`; of the models that this
-gives the one is taken whose free run of the fitted recordings has the least BIC. On other seeds that named as many
-effects as the least error on the held-out recording, with fewer terms beside them.
+delays and with play, including the true values of the plain cases. sin θ is left out: over ±20° it differs from a sum
+of θ and θ³ by less than 10⁻⁴. All copies together are nearly collinear and spoil the regression, so there is one
+library per copy, with all the other terms. Every library is thresholded at several `SHARES`. Of the resulting models
+the one is chosen whose free run of the fitted recordings has the lowest BIC. On other seeds this criterion named as
+many effects as the lowest error on the held-out recording, with fewer additional terms.
 
-A method's answer is the extra term without which its regression errs most; "alone" are the sessions in which no wrong
-term stands beside it. For a tilted camera no term of a differential equation is right; θ² and ω², its traces in the
-measured angle, are let count. For a disturbance that swings by itself nobody has a term, and none is right. "Held out"
-is the RMS error of free runs of the random steps, by the same method's linear model → by the model taken. anglecam's
-answer is the loop's verdict.
+A method's answer is the extra term whose removal increases the regression error most; "alone" counts the sessions
+without a wrong additional term. For a tilted camera no term of a differential equation is right; θ² and ω², its traces
+in the measured angle, are accepted. For a periodic disturbance no library has a term, and naming none is right. "Held
+out" is the RMS error of free runs of the random steps, of the same method's linear model → of the chosen model.
+anglecam's answer is the loop's verdict.
 """
 
 from __future__ import annotations
@@ -83,14 +83,15 @@ RIGHT = {
     "nothing": {"nothing"},
 }
 NAMES = {"periodic_disturbance": {"unexplained"}}
-"""What anglecam should say where it is not the case's own name."""
+"""anglecam's right answer where it is not the name of the case."""
 FINER = 8
 STILL = 0.01
-"""rad/s: ε of the smoothed sign; a head that should stick creeps more slowly than this."""
+"""ε of the smoothed sign, rad/s; a head that should stick creeps more slowly than this."""
 HALF_WIDTH_S, DOMAINS = 0.2, 60
-"""Of the weak form's test functions, and how many in each recording; from 0.1 s to 0.4 s all widths do equally."""
+"""Half width of the weak form's test functions, s, and their number per recording; all widths from 0.1 s to 0.4 s give
+equal results."""
 SHARES = np.geomspace(0.003, 0.2, 7)
-"""Of the acceleration's RMS: a term that gives less than this is thresholded away."""
+"""Thresholds as shares of the acceleration's RMS: a term that contributes less is dropped."""
 
 
 @dataclass(frozen=True)
@@ -102,17 +103,17 @@ class Gridded:
     state: Floats
     """(n, 2) θ and ω as measured, rad and rad/s."""
     about: Floats
-    """(n, inputs) mean of command and copies over the interval about each point."""
+    """(n, inputs) mean of command and copies over the interval around each point."""
     after: Floats
-    """(n − 1, inputs) mean until the next."""
+    """(n − 1, inputs) mean until the next point."""
     start: Floats
-    """θ and ω at the first."""
+    """θ and ω at the first point."""
     every: int
-    """Points from frame to frame."""
+    """Grid points per frame."""
 
 
 def mean(command: Command, start: Floats, stop: Floats) -> Floats:
-    """Average a staircase exactly."""
+    """Return the exact mean of a staircase."""
     knots = np.array([command.time[0] - 10.0, *command.time, command.time[-1] + 100.0])
     levels = np.array([command.angle[0], *command.angle])
     area = np.array([0.0, *np.cumsum(levels * np.diff(knots))])
@@ -148,7 +149,7 @@ def on_grid(record: Record, *, finer: int) -> Gridded:
 
 
 def of_state(theta: Floats, omega: Floats) -> list[Floats]:
-    """Terms of the library that are functions of the state, beyond the linear ones."""
+    """Return the library's terms that are functions of the state, beyond the linear ones."""
     return [np.ones_like(theta), theta**2, theta**3, omega**2, omega * np.abs(omega), np.tanh(omega / STILL)]
 
 
@@ -157,7 +158,7 @@ def columns(state: Floats, inputs: Floats) -> Floats:
 
 
 def by_differences(records: Sequence[Record]) -> tuple[Floats, Floats]:
-    """Terms and acceleration at the frames."""
+    """Return terms and acceleration at the frames."""
     import pysindy
 
     differ = pysindy.FiniteDifference(order=4)
@@ -170,7 +171,7 @@ def by_differences(records: Sequence[Record]) -> tuple[Floats, Floats]:
 
 
 def by_weak_form(records: Sequence[Record]) -> tuple[Floats, Floats]:
-    """Terms and acceleration, each integrated against the test functions."""
+    """Return terms and acceleration, each integrated against the test functions."""
     import pysindy
 
     terms, accelerations = [], []
@@ -182,9 +183,9 @@ def by_weak_form(records: Sequence[Record]) -> tuple[Floats, Floats]:
             H_xt=HALF_WIDTH_S,
             is_uniform=True,
         )
-        told = pysindy.AxesArray(columns(grid.state, grid.about), {"ax_time": 0, "ax_coord": 1})
-        terms.append(np.asarray(library.fit_transform([told])[0]))
-        accelerations.append(np.asarray(library.convert_u_dot_integral(told[:, 1:2]))[:, 0])
+        data = pysindy.AxesArray(columns(grid.state, grid.about), {"ax_time": 0, "ax_coord": 1})
+        terms.append(np.asarray(library.fit_transform([data])[0]))
+        accelerations.append(np.asarray(library.convert_u_dot_integral(data[:, 1:2]))[:, 0])
     return np.vstack(terms), np.hstack(accelerations)
 
 
@@ -208,7 +209,7 @@ WAYS = {
 
 
 def models(terms: Floats, acceleration: Floats, optimiser: Callable) -> Floats:
-    """Every library at every threshold, (models, terms); first the linear one."""
+    """Return the models of every library at every threshold, (models, terms); the first is the linear model."""
     found = []
     size = float(np.linalg.norm(acceleration))
     libraries = [LINEAR, LINEAR + EXTRA, *([*LINEAR, *EXTRA, copy] for copy in range(9, len(TERMS)))]
@@ -222,7 +223,7 @@ def models(terms: Floats, acceleration: Floats, optimiser: Callable) -> Floats:
 
 
 def free_runs(models: Floats, grids: Sequence[Gridded]) -> Iterator[Floats]:
-    """Run every model through every recording from its own start, by Runge and Kutta: errors (models, frames), rad."""
+    """Run every model through every recording by Runge–Kutta; yield errors (models, frames), rad."""
     gains, inputs = models[:, :9], models[:, [2, *range(9, len(TERMS))]]
     for grid in grids:
         step = grid.time[1]
@@ -245,7 +246,7 @@ def free_runs(models: Floats, grids: Sequence[Gridded]) -> Iterator[Floats]:
 
 
 def ranked(model: Floats, terms: Floats, acceleration: Floats) -> list[int]:
-    """Order a model's extra terms by what the regression misses without each."""
+    """Order a model's extra terms by the regression's error without each."""
     there = np.flatnonzero(model)
 
     def missed(extra: int) -> float:
@@ -258,9 +259,9 @@ def ranked(model: Floats, terms: Floats, acceleration: Floats) -> list[int]:
 @dataclass(frozen=True)
 class Answer:
     named: tuple[str, ...]
-    """Terms or effects, the weightiest first."""
+    """Terms or effects, the most important first."""
     before: float
-    """RMS of what was held out, °."""
+    """RMS error on the held-out recording, °."""
     after: float
     seconds: float
 
@@ -270,7 +271,7 @@ def with_pysindy(way: str, records: Sequence[Record]) -> Answer:
     began = time.perf_counter()
     fitted = [r for r in records if r.name not in HELD_OUT]
     held_out = [r for r in records if r.name in HELD_OUT]
-    np.random.seed(0)  # noqa: NPY002  # where WeakPDELibrary and EnsembleOptimizer draw from
+    np.random.seed(0)  # noqa: NPY002  # the generator of WeakPDELibrary and EnsembleOptimizer
     terms, acceleration = rows(fitted)
     found = models(terms, acceleration, optimiser)
     errors = np.hstack(list(free_runs(found, [on_grid(r, finer=FINER) for r in fitted])))
@@ -304,7 +305,7 @@ def line(answers: Sequence[Answer], right: set[str]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    # argparse holds an empty list against the choices too
+    # argparse checks an empty list against the choices too
     parser.add_argument("cases", nargs="*", choices=[*CASES, []], default=[], metavar="case")
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--only", choices=("pysindy", "anglecam"))
@@ -326,8 +327,8 @@ def main() -> None:
                 sessions = [session(effects, seed=seed, sigma_deg=noise) for seed in range(chosen.seeds)]
                 for name, method in methods.items():
                     right = RIGHT[case] if name != "anglecam" else NAMES.get(case, {case})
-                    told = case if keys is None else f"{case}, {size}"
-                    print(f"| {told} | {noise} | {name} | {line([method(s) for s in sessions], right)} |", flush=True)
+                    label = case if keys is None else f"{case}, {size}"
+                    print(f"| {label} | {noise} | {name} | {line([method(s) for s in sessions], right)} |", flush=True)
 
 
 if __name__ == "__main__":

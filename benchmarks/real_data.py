@@ -1,12 +1,12 @@
-"""What anglecam finds in three recordings that others made, beside what they published.
+"""Compares anglecam's results on three published recordings with the publications.
 
 EMPS: a motor drive that pushes a carriage, its position in m taken as an angle in rad and its force in N as the
 command, so that c = 1/M; the record with added pulses is held out. A single pendulum released from 93°. A film of a red
-ball on a thread. The data stay where they are; sessions are written to a temporary folder.
+ball on a thread. The data are not modified; sessions are written to a temporary folder.
 
     .venv/bin/python benchmarks/real_data.py FOLDER
 
-FOLDER holds ``emps``, ``single-pendulum`` and ``pendulum-red-ball``.
+FOLDER contains ``emps``, ``single-pendulum`` and ``pendulum-red-ball``.
 Janot, Gautier, Brunot, Data set and reference models of EMPS, Workshop on Nonlinear System Identification Benchmarks,
 2019. Kaheman et al., The experimental multi-arm pendulum on a cart, arXiv 2205.06231. FiloSottile/Pendolo-OpenCV, 2010.
 """
@@ -40,19 +40,20 @@ from anglecam.workflow.session import measure_session
 Floats = NDArray[np.float64]
 
 TICK_S = 1e-3
-"""Of both encoders."""
+"""Sample time of both encoders."""
 EVERY = 10
-"""Ticks from one kept angle to the next: 100 Hz, as published; at 50 Hz the fits end in rougher valleys."""
+"""Ticks between the angles that are used: 100 Hz, as published; at 50 Hz the likelihood has worse local optima."""
 HELD = 5
-"""Ticks that a row of the force is the mean of."""
+"""Ticks that are averaged for one row of the force."""
 FROM_HANGING = (0.3, np.pi)
-"""G (rad/s²) and θ0 (rad) to start gravity's sine from: small, so that it grows out of the linear one."""
+"""Starting values of gravity's sine, G (rad/s²) and θ0 (rad); with a small G the fit starts near the linear model."""
 PENDULUM_S = 15.0
-"""Over the first 15 s drag can be told from the bearing's dry friction, which rules the rest of the 55 s."""
+"""Part of the record that is used: in the first 15 s drag is distinguishable from the bearing's dry friction, which
+dominates the rest of the 55 s."""
 
 
 def write_emps(folder: Path, session: Path) -> None:
-    """Write both EMPS records as a session; a force that is sampled counts for half a tick before and after."""
+    """Write both EMPS records as a session; a force sample applies to half a tick before and after it."""
     for name in ("DATA_EMPS", "DATA_EMPS_PULSES"):
         _, position, force = read_emps(folder, name)
         kept = np.arange(0, len(position), EVERY)
@@ -85,25 +86,25 @@ def read_emps(folder: Path, name: str) -> tuple[Floats, Floats, Floats]:
 
 
 def records_of(write, folder: Path) -> list[Record]:  # type: ignore[no-untyped-def]
-    """Write a session to a temporary folder and read it as any other."""
+    """Write a session to a temporary folder and read it like any session."""
     with tempfile.TemporaryDirectory() as place:
         write(folder, Path(place))
         return list(measure_session(read_session(Path(place))).records)
 
 
 def grow(base: Fit, records: Sequence[Record], added: Effect, size: float) -> Fit:
-    """Add an effect, its parameters one after another: released at once, those that shape it may stand in for its size.
+    """Add an effect and fit its parameters one after another, because shape parameters can compensate for the size.
 
     Parameters
     ----------
     base : Fit
-        Of the plant without it.
+        Fit of the plant without the effect.
     records : sequence of Record
-        Those that were fitted.
+        The fitted recordings.
     added : Effect
-        With zero as every parameter's null.
+        Effect whose parameters all have the null value zero.
     size : float
-        Of its first parameter, to start from.
+        Starting value of its first parameter.
 
     Returns
     -------
@@ -119,7 +120,7 @@ def grow(base: Fit, records: Sequence[Record], added: Effect, size: float) -> Fi
 
 
 def carriage(fit: Fit) -> dict[str, float]:
-    """Return mass (kg) and friction (N, N·s/m) of a fitted drive, those of either direction, and its stiffness."""
+    """Return mass (kg), friction in each direction (N, N·s/m) and stiffness of a fitted drive."""
     p = dict(zip(fit.model.names, fit.parameters.tolist(), strict=True))
     mass, uneven = 1.0 / p["c_per_s2"], p.get("difference_per_s", 0.0)
     dry, offset = p.get("friction_deg_per_s2", 0.0), p.get("asymmetry_deg_per_s2", 0.0)
@@ -137,30 +138,30 @@ def carriage(fit: Fit) -> dict[str, float]:
 
 
 def force_error(found: dict[str, float], folder: Path, name: str = "DATA_EMPS") -> float:
-    """Return ‖τ − τ̂‖/‖τ‖ as published: filtered without phase at 100 Hz, then every tenth sample."""
+    """Return ‖τ − τ̂‖/‖τ‖ as published: with a zero-phase filter at 100 Hz, then every tenth sample."""
     _, position, force = read_emps(folder, name)
     numerator, denominator = butter(4, 100.0, fs=1.0 / TICK_S)
     position = filtfilt(numerator, denominator, position)
     rate = np.gradient(position, TICK_S)
     up, down = rate > 0.0, rate < 0.0
-    told = found["M, kg"] * np.gradient(rate, TICK_S) + found.get("b·M, N/m", 0.0) * position
-    told += up * (found["Fv+, N·s/m"] * rate + found["Fc+, N"]) + down * (found["Fv-, N·s/m"] * rate - found["Fc-, N"])
-    ends = slice(50, -50)  # where the filter has only one side
+    model = found["M, kg"] * np.gradient(rate, TICK_S) + found.get("b·M, N/m", 0.0) * position
+    model += up * (found["Fv+, N·s/m"] * rate + found["Fc+, N"]) + down * (found["Fv-, N·s/m"] * rate - found["Fc-, N"])
+    ends = slice(50, -50)  # without the margins, where the filter is one-sided
     thinned = [
-        decimate(x[ends], 10, ftype="fir", zero_phase=True) for x in (filtfilt(numerator, denominator, force), told)
+        decimate(x[ends], 10, ftype="fir", zero_phase=True) for x in (filtfilt(numerator, denominator, force), model)
     ]
     return float(np.linalg.norm(thinned[0] - thinned[1]) / np.linalg.norm(thinned[0]))
 
 
 def fit_emps(records: Sequence[Record]) -> list[tuple[str, Fit, Fit]]:
-    """Fit viscous friction, then Coulomb friction with an offset beside it, then viscous friction that is uneven too.
+    """Fit viscous friction, then add Coulomb friction with an offset, then asymmetric viscous friction.
 
-    The models are those that were published: with Stribeck's curve, dry friction can stand in for the uneven viscous.
+    These are the published models. Stribeck's curve is left out because it can replace the asymmetric viscous friction.
 
     Returns
     -------
     list of (str, Fit, Fit)
-        What the model holds, its fit in windows and its prediction of the held-out windows.
+        Name of the model, its fit in windows and its prediction of the held-out windows.
     """
     fitted, held_out = split_records(records, ["DATA_EMPS_PULSES"])
     base = fit_output_error(Plant(), fitted, start_parameters(fitted))
@@ -174,12 +175,12 @@ def fit_emps(records: Sequence[Record]) -> list[tuple[str, Fit, Fit]]:
 
 
 def fit_swing(records: Sequence[Record], *more: tuple[str, float]) -> list[tuple[str, Fit, Prediction]]:
-    """Fit the linear plant to a free swing, then gravity's sine beside it, then more effects, each from its size.
+    """Fit the linear plant to a free swing, then add gravity's sine, then more effects, each with its starting size.
 
     Returns
     -------
     list of (str, Fit, Prediction)
-        What the model holds, its fit and its prediction of every fifth second by a fit to the rest.
+        Name of the model, its fit and its prediction of every fifth second by a fit to the rest.
     """
     fitted = list(records)
     plant = Plant(driven=False)
@@ -194,7 +195,7 @@ def fit_swing(records: Sequence[Record], *more: tuple[str, float]) -> list[tuple
 
 
 def main() -> None:
-    """Print one table for the fits of known models and one for what the loop names by itself."""
+    """Print a table of the fits of known models and a table of the loop's verdicts."""
     folder = Path(sys.argv[1])
     emps, swing = records_of(write_emps, folder / "emps"), records_of(write_pendulum, folder / "single-pendulum")
     film = records_of(link_film, folder / "pendulum-red-ball")
@@ -204,7 +205,7 @@ def main() -> None:
         "+ coulomb_friction": {"M, kg": 95.109, "Fv, N·s/m": 203.50, "Fc, N": 20.394, "offset, N": -3.165},
         "+ damping_asymmetry": {"Fv+, N·s/m": 166.7, "Fc+, N": 20.14, "Fv-, N·s/m": 240.4, "Fc-, N": 20.63},
     }
-    told = {"+ coulomb_friction": 0.04083, "+ damping_asymmetry": 0.03112}
+    published_error = {"+ coulomb_friction": 0.04083, "+ damping_asymmetry": 0.03112}
     for name, fit, prediction in fit_emps(emps):
         found = carriage(fit)
         for quantity, value in published[name].items():
@@ -212,8 +213,10 @@ def main() -> None:
                 f"| EMPS | {name} | {quantity} | {value} | {found[quantity]:.2f} | {found[quantity] / value - 1:+.1%} |"
             )
         for record in ("DATA_EMPS", "DATA_EMPS_PULSES"):
-            said = f"{told[name]:.2%}" if name in told and record == "DATA_EMPS" else ""
-            print(f"| {record} | {name} | force error | {said} | {force_error(found, folder / 'emps', record):.2%} | |")
+            printed = f"{published_error[name]:.2%}" if name in published_error and record == "DATA_EMPS" else ""
+            print(
+                f"| {record} | {name} | force error | {printed} | {force_error(found, folder / 'emps', record):.2%} | |"
+            )
         print(f"| PULSES | {name} | position in windows, µm RMS | | {1e6 * prediction.rmse:.0f} | |")
     for data, fits in (
         ("single pendulum", fit_swing(swing, ("quadratic_drag", 0.001))),
@@ -222,7 +225,7 @@ def main() -> None:
         for name, fit, prediction in fits:
             print(f"| {data} | {name} | b, 1/s² | {64.2 if data != 'red ball' else ''} | {fit.parameters[1]:.2f} | |")
             print(f"| {data} | {name} | fit / held out, ° RMS | | {_deg(fit)} / {_deg(prediction)} | |")
-    print("\n| data | the loop names | held out before → after |\n| --- | --- | --- |")
+    print("\n| data | verdict of the loop | held out before → after |\n| --- | --- | --- |")
     for data, records, held_out in (("EMPS", emps, ["DATA_EMPS_PULSES"]), ("pendulum", swing, []), ("ball", film, [])):
         verdict = close_records(records, held_out=held_out)
         names = ", ".join(a.effect.id for a in verdict.accepted) or verdict.verdict

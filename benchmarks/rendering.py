@@ -1,13 +1,13 @@
-"""How fast a frame of the rig is drawn, and how good its edges are: our two engines, two peers, and the disk.
+"""Measures the speed and the edge errors of `synth`'s two engines, of two peers, and the speed of writing frames.
 
-Every renderer draws the same rig at the same poses on one core, in a process of its own, and hands the picture over as
-an array. A frame's time is the median of many. The peers shade as they are used to: trimesh with embree gives each ray
-the light of the triangle it meets, and builds its tree anew for every frame, as the rig moves; vtk lights by itself and
-takes four samples a pixel.
+Every renderer draws the same rig at the same poses on one core, in a separate process, and returns the picture as an
+array. A frame's time is the median of many. The peers use their default shading: trimesh with embree gives each ray the
+light of the triangle it hits, and rebuilds its tree for every frame because the rig moves; vtk computes the lighting
+and takes four samples per pixel.
 
     .venv/bin/python benchmarks/rendering.py [frames]
 
-The peers are no dependencies of the project: pip install --no-deps embreex vtk.
+The peers are not dependencies of the project: pip install --no-deps embreex vtk.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from statistics import median
 
-os.environ["LP_NUM_THREADS"] = "1"  # Mesa's, for all who draw through it
+os.environ["LP_NUM_THREADS"] = "1"  # for every renderer that uses Mesa
 os.environ["OMP_NUM_THREADS"] = "1"
 
 import av
@@ -42,7 +42,7 @@ Draw = Callable[[dict[str, np.ndarray]], np.ndarray]
 
 
 def scene(size: tuple[int, int]) -> tuple[list[Part], Pinhole, list[dict[str, np.ndarray]]]:
-    """Set up the rig of the default spec, as large in every picture as its height allows, at poses of a slow nod."""
+    """Set up the rig of the default spec, scaled to the picture's height, at poses of a slow nod."""
     rig = {"lever_px": size[1] / 2.4, "pivot_px": (size[0] * 0.375, size[1] * 0.625)}
     recording = {"name": "r", "duration_s": 1.0, "command": {"kind": "step"}}
     spec = Spec(camera={"size": size}, rig=rig, recordings=[recording])
@@ -156,11 +156,11 @@ def seconds_a_frame(name: str, size: tuple[int, int], frames: int) -> float:
 
 
 def seconds_to_write(size: tuple[int, int], frames: int) -> tuple[float, float]:
-    """Median time a frame takes into a raw .npy file, and mean time into FFV1."""
+    """Return the median time to write a frame to a raw .npy file, and the mean time to write it as FFV1."""
     parts, camera, placed = scene(size)
     draw = with_raster("standard", parts, camera)
     rng = np.random.default_rng(0)
-    noise = rng.normal(0, 2.0, (*size[::-1], 3))  # without it FFV1 would have nothing to do
+    noise = rng.normal(0, 2.0, (*size[::-1], 3))  # without noise FFV1 would be unrealistically fast
     films = [np.clip(np.rint(255 * draw(pose) + noise), 0, 255).astype(np.uint8) for pose in placed]
     with tempfile.TemporaryDirectory() as folder:
         raw = median(_timed(lambda k: np.save(Path(folder) / f"{k}.npy", films[k % len(films)]), frames))
@@ -177,7 +177,7 @@ def seconds_to_write(size: tuple[int, int], frames: int) -> tuple[float, float]:
 
 
 def edge(name: str) -> float:
-    """RMS displacement of straight edges, px."""
+    """Return the RMS displacement of straight edges, px."""
     from synth.draw.gl import Gl
     from synth.draw.raster import Raster
 
@@ -186,7 +186,7 @@ def edge(name: str) -> float:
 
 
 def alone(function: Callable, *arguments: object) -> object:
-    """Call in a fresh process: a graphics library of one renderer must not meet that of another."""
+    """Call a function in a fresh process, so that two renderers' graphics libraries are never in the same process."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         return pool.submit(function, *arguments).result()
 
@@ -207,7 +207,7 @@ def main(frames: int) -> None:
     print("| --- | --- |" + " --- | --- | --- |" * len(SIZES))
     for name, (make, _, package) in RENDERERS.items():
         if package is not None and find_spec(package) is None:
-            print(f"{name}: left out, it needs pip install --no-deps {package}", file=sys.stderr)
+            print(f"{name}: left out, needs pip install --no-deps {package}", file=sys.stderr)
             continue
         cells = [f"{alone(edge, name):.2g}" if make in (with_raster, with_gl) else "–"]
         for size in SIZES:

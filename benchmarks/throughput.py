@@ -1,14 +1,15 @@
-"""How long a clip takes to measure against only decoding it, and how much memory a long one needs.
+"""Measures the time of `measure` relative to decoding the clip, and its memory for long clips.
 
     .venv/bin/python benchmarks/throughput.py [rounds]
 
-Time: `measure_clip` without overlay or plot, over PyAV's bare decoding of the same file with the threads that
-`anglecam.video.frames` uses, no colour conversion. The two take turns, so that both meet the same machine; figures are
-medians over the rounds. What `measure` tells of its progress parts it into sample (until the mouth is looked for in the
-first frame), coarse (the mouth in every frame), learn (the head) and fine (the head's turn in every frame).
+Time: `measure_clip` without overlay or plot, relative to decoding the same file by PyAV with the threads that
+`anglecam.video.frames` uses and without colour conversion. The two alternate, so that the machine's load affects both;
+figures are medians over the rounds. `measure`'s progress reports divide its time into sample (until the mouth is
+searched in the first frame), coarse (the mouth in every frame), learn (the head) and fine (the head's rotation in every
+frame).
 
 Memory: the highest resident size of a fresh process that measures one clip. The long clips repeat the packets of a
-short one: MJPEG's stand alone, and a swing played forwards and backwards meets its own beginning.
+short one: MJPEG's packets are independent, and a motion played forwards and backwards is continuous.
 """
 
 from __future__ import annotations
@@ -40,11 +41,11 @@ FILMS: dict[str, dict[str, Any]] = {
 }
 SECONDS = 10.0
 LENGTHS = (100, 1_000, 10_000)
-"""Frames."""
+"""Lengths of the clips, frames."""
 
 
 def film(folder: Path, camera: dict[str, Any], seconds: float, quality: str = "standard") -> tuple[Path, Path]:
-    """Film random steps of the default rig, as large in every picture as its height allows; give clip and truth."""
+    """Film random steps of the default rig, scaled to the picture's height; return clip and truth."""
     width, height = camera["size"]
     spec = {
         "camera": camera,
@@ -60,7 +61,7 @@ def film(folder: Path, camera: dict[str, Any], seconds: float, quality: str = "s
 
 
 def repeat(clip: Path, frames: int, path: Path) -> Path:
-    """Write so many frames of an MJPEG clip, forwards and backwards in turn, without coding them anew."""
+    """Write this number of frames of an MJPEG clip, alternately forwards and backwards, without re-encoding."""
     with av.open(str(clip)) as source, av.open(str(path), "w") as target:
         forwards = [bytes(packet) for packet in source.demux(video=0) if packet.size]
         stream = target.add_stream_from_template(source.streams.video[0])
@@ -86,9 +87,9 @@ def read(clip: Path) -> None:
 
 
 def measure(clip: Path) -> list[float]:
-    """Measure a clip; give the seconds until coarse reading begins, its own, those until fine reading begins, its own.
+    """Measure a clip; return the seconds of sample, coarse, learn and fine.
 
-    A clip that is not read finely has only the first two.
+    A clip without a fine pass has only the first two.
     """
     ends = [time.perf_counter()]
 
@@ -107,8 +108,8 @@ def seconds(work: Callable[[Path], object], clip: Path) -> tuple[float, object]:
 
 
 def times(clip: Path, rounds: int) -> list[str]:
-    """One row of the table: frames/s decoded, and everything else in units of decoding."""
-    measure(clip)  # what is compiled or loaded on first use
+    """Return one row of the table: frames/s of decoding, and everything else in units of decoding."""
+    measure(clip)  # compiles and loads on first use
     decoded, reads, measured, stages = [], [], [], []
     for _ in range(rounds):
         base, _ = seconds(decode, clip)
@@ -125,9 +126,9 @@ def times(clip: Path, rounds: int) -> list[str]:
 
 
 def cost(work: Callable[[Path], object], clip: Path) -> tuple[float, float]:
-    """Work on a clip; give the seconds it took and the highest resident size of this process so far, MB.
+    """Process a clip; return the time, s, and the highest resident size of this process so far, MB.
 
-    `resource.getrusage` would also count the process that this one was started from.
+    `resource.getrusage` would also count the parent process.
     """
     took, _ = seconds(work, clip)
     status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())

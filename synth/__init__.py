@@ -1,1 +1,4 @@
-"""A virtual laboratory: moves a mechanism by physics of its own, films it, and keeps the truth apart."""
+"""Test films with known truth: simulates a mechanism, renders a film of it, and writes the true motion elsewhere.
+
+The simulation shares no approximation with `anglecam`: it imports only the paper's equations (`anglecam.neck`).
+"""

@@ -1,9 +1,9 @@
 """The camera's geometry: where a point of the rig appears in the picture.
 
-A pinhole looks at the shaft from `distance_m`; the shaft's place in the picture is its principal point. Seen square
-on, whatever turns about the shaft therefore turns about that one pixel, at every depth, by the same angle. The lens
-distorts about a point of its own, the middle of the picture, as if the camera had a shift lens. Axes of the world:
-x to the right, y up, z towards the camera. Pixel (0, 0) is the centre of the top left pixel, x to the right, y down.
+A pinhole camera looks at the shaft from `distance_m`. Its principal point is where the shaft appears in the picture, so
+in a square view everything on the shaft turns about that pixel by the same angle, at every depth. The lens distorts
+about the middle of the picture instead, as with a shift lens. World axes: x to the right, y up, z towards the
+camera. Pixel (0, 0) is the centre of the top left pixel, x to the right, y down.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from synth.effects.camera_tilt import CameraTilt
+from synth.effects.lens_distortion import LensDistortion
 from synth.spec import Spec
 
 Floats = NDArray[np.float64]
@@ -37,22 +39,22 @@ class Pinhole:
     k1: float = 0.0
     """r becomes r·(1 + k1·r²), r from `lens_px` in units of the focal length."""
     mirrored: bool = False
-    """Whether the picture is turned about its vertical middle line at the end."""
+    """Whether the picture is mirrored left to right at the end."""
 
     @property
     def lens_px(self) -> tuple[float, float]:
-        """Centre of the distortion: the middle of the picture."""
+        """Return the centre of the distortion: the middle of the picture."""
         return ((self.size[0] - 1) / 2, (self.size[1] - 1) / 2)
 
     def project(self, points: ArrayLike) -> Floats:
-        """Pixels (…, 2), in the picture as it is written, of points (…, 3) given in m."""
+        """Return the pixels (…, 2) of points (…, 3), m, in the picture as it is written."""
         pixels = self.draw(points)[0]
         if self.mirrored:
             pixels[..., 0] = self.size[0] - 1 - pixels[..., 0]
         return pixels
 
     def draw(self, points: ArrayLike) -> tuple[Floats, Floats]:
-        """Pixels (…, 2) before mirroring, and depth (…) along the line of sight, m, of points (…, 3)."""
+        """Return the pixels (…, 2) before mirroring and the depth (…) along the line of sight, m, of points (…, 3)."""
         seen = np.asarray(points, dtype=float) @ self.rotation.T
         depth = self.distance_m - seen[..., 2]
         ideal = np.asarray(self.principal_px) + self.focal_px * seen[..., :2] * [1.0, -1.0] / depth[..., None]
@@ -61,13 +63,13 @@ class Pinhole:
         return ideal + off * stretch, depth
 
     def place(self, pixel: tuple[float, float], z: float) -> Floats:
-        """Point (3,) at height z above the plane of motion that a square view without distortion shows at a pixel."""
+        """Return the point (3,) at height z over the plane of motion that an undistorted square view shows there."""
         x = self.size[0] - 1 - pixel[0] if self.mirrored else pixel[0]
         scale = (self.distance_m - z) / self.focal_px
         return np.array([(x - self.principal_px[0]) * scale, (self.principal_px[1] - pixel[1]) * scale, z])
 
     def shaken(self, dx: float, dy: float, roll: float) -> Pinhole:
-        """Camera moved so that the picture shifts by (dx, dy) px and turns by `roll` rad about the shaft."""
+        """Return the camera moved so that the picture shifts by (dx, dy) px and turns by `roll` rad about the shaft."""
         sign = -1.0 if self.mirrored else 1.0
         return dataclasses.replace(
             self,
@@ -77,12 +79,12 @@ class Pinhole:
 
 
 def aim(spec: Spec, lever: float) -> Pinhole:
-    """Point the camera at the rig so that a lever in the plane of motion measures what the spec asks for.
+    """Point the camera at the rig so that a lever in the plane of motion appears with the spec's length, `lever_px`.
 
     Parameters
     ----------
     spec : Spec
-        Of which camera, rig and the optical effects count.
+        Its camera, its rig and its optical effects are used.
     lever : float
         Length of the lever, m.
 
@@ -91,12 +93,13 @@ def aim(spec: Spec, lever: float) -> Pinhole:
     Pinhole
         The camera at rest.
     """
-    camera, rig, effects = spec.camera, spec.rig, spec.effects
+    camera, rig = spec.camera, spec.rig
     view = Rotation.from_euler("YX", [-camera.azimuth_deg, camera.elevation_deg], degrees=True)
-    if tilt := effects.camera_tilt:
+    if tilt := spec.effects.get(CameraTilt):
         about = math.radians(tilt.axis_deg)
         axis = np.array([math.cos(about), math.sin(about), 0.0])
         view = Rotation.from_rotvec(math.radians(tilt.tilt_deg) * axis) * view
+    lens = spec.effects.get(LensDistortion)
     mirrored = rig.facing == "left"
     x, y = rig.pivot_px
     return Pinhole(
@@ -105,6 +108,6 @@ def aim(spec: Spec, lever: float) -> Pinhole:
         principal_px=(camera.size[0] - 1 - x if mirrored else x, y),
         distance_m=camera.distance_m,
         rotation=view.as_matrix(),
-        k1=effects.lens_distortion.k1 if effects.lens_distortion else 0.0,
+        k1=lens.k1 if lens else 0.0,
         mirrored=mirrored,
     )

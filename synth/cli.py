@@ -1,6 +1,6 @@
-"""The command ``synth``: render a session, score what was found in it, show what there is.
+"""The command ``synth``: render a session, score anglecam's results against the truth, show the shipped specs.
 
-Each command imports what it needs when it is called: help and mistakes in the call are answered at once.
+Each command imports its modules when it is called, so that help and usage errors appear at once.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ app = typer.Typer(add_completion=False, no_args_is_help=True, rich_markup_mode=N
 
 @app.command("render")
 def render_command(
-    spec: Annotated[Path, typer.Argument(help="what is to be filmed, YAML")],
+    spec: Annotated[Path, typer.Argument(help="spec of the session, YAML")],
     out: Annotated[Path, typer.Option(help="folder for the session")],
     truth: Annotated[Path, typer.Option(help="folder for the truth, apart from --out")],
 ) -> None:
-    """Render a session of clips whose truth is known and kept apart."""
+    """Render a session of clips and write the true motion to a separate folder."""
     from synth.session import render
 
     render(spec, out, truth)
@@ -32,10 +32,10 @@ def render_command(
 
 @app.command("score")
 def score_command(
-    result: Annotated[Path, typer.Argument(help="folder that anglecam wrote")],
+    result: Annotated[Path, typer.Argument(help="folder written by anglecam")],
     truth: Annotated[Path, typer.Option(help="folder of the truth")],
 ) -> None:
-    """Hold what anglecam found against the truth."""
+    """Compare anglecam's results with the truth."""
     from synth.score import score
 
     score(result, truth, Console())
@@ -44,7 +44,7 @@ def score_command(
 @app.command("gallery")
 def gallery_command(
     out: Annotated[Path, typer.Option(help="folder for gallery.png")],
-    specs: Annotated[list[Path] | None, typer.Argument(help="specs, YAML; all of configs/ where none is named")] = None,
+    specs: Annotated[list[Path] | None, typer.Argument(help="specs, YAML; all of configs/ by default")] = None,
 ) -> None:
     """Render one frame of every spec to a contact sheet."""
     from synth.gallery import gallery
@@ -54,7 +54,7 @@ def gallery_command(
 
 def main() -> None:
     """Run the command; one line on stderr and exit status 2 for a wrong spec, 1 for a machine that cannot draw."""
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that clips in the making and workers are cleared away
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that unfinished clips and workers are cleaned up
     try:
         app()
     except SpecError as error:

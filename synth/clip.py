@@ -1,7 +1,7 @@
-"""Pictures into a file, each under its own time stamp. ffv1 keeps every grey level, the other codecs do not.
+"""Writes pictures to a video file, each with its time stamp. ffv1 is lossless, the other codecs are not.
 
-AVI has no time stamps, only a grid: a gap in it is written as empty chunks, and H.264 must do without B-frames, or its
-times come out wrong. MP4 keeps every stamp. MKV counts milliseconds.
+AVI has no time stamps, only a fixed rate: a gap is written as empty chunks, and H.264 must not use B-frames, or the
+times come out wrong. MP4 keeps every time stamp. MKV rounds to milliseconds.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ from synth.spec import Camera
 Frame = NDArray[np.uint8]
 
 UNFINISHED = ".unfinished-"
-"""How the name of a clip begins while it is being written."""
+"""Prefix of a clip's name while it is being written."""
 _ENCODERS: dict[str, Literal["mjpeg", "ffv1", "libx264"]] = {"mjpeg": "mjpeg", "ffv1": "ffv1", "h264": "libx264"}
 
 
 def file_name(name: str, camera: Camera) -> str:
-    """Name of a recording's clip."""
+    """Return the name of a recording's clip."""
     return f"{name}.{camera.suffix}"
 
 
 @contextlib.contextmanager
 def clip_writer(path: Path, camera: Camera, table: Timetable) -> Iterator[Callable[[Frame], None]]:
-    """Open a clip; it stands under its name only when it is whole.
+    """Open a clip for writing; the file gets its final name only when it is complete.
 
     Parameters
     ----------
     path : Path
-        The file to be.
+        The file to write.
     camera : Camera
         Size and codec.
     table : Timetable
-        Time stamps of the frames to come.
+        Time stamps of the frames.
 
     Yields
     ------
@@ -61,7 +61,7 @@ def clip_writer(path: Path, camera: Camera, table: Timetable) -> Iterator[Callab
             if camera.codec == "mjpeg":
                 stream.codec_context.qmin = stream.codec_context.qmax = camera.quality
             elif camera.codec == "h264":
-                # its macroblock tree reads memory that nobody wrote: other bytes for the same frames
+                # x264's macroblock tree reads uninitialised memory, so the same frames would give different bytes
                 stream.options = {"crf": str(camera.crf), "x264-params": "mbtree=0"}
                 if camera.suffix == "avi":
                     stream.options["bf"] = "0"

@@ -1,8 +1,8 @@
-"""When each frame of a clip was taken, and when its file says so.
+"""The true time of each frame of a clip, and the time stamp that the file gives it.
 
-A good camera takes frame k at k/fps and says so. One whose clock runs fast says the same but takes it sooner, one that
-declares a wrong rate says something else; a variable rate takes frames unevenly, a dropped frame leaves a gap, and a
-duplicate repeats the picture before under a time of its own.
+A good camera takes frame k at k/fps and stamps it k/fps. A camera with a fast clock stamps k/fps too but takes the
+frame sooner; a wrong declared rate changes the stamps; a variable rate takes frames at uneven intervals; a dropped
+frame leaves a gap; a duplicate repeats the previous picture under a new time stamp.
 """
 
 from __future__ import annotations
@@ -13,33 +13,34 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
+from synth.effects.clock_scale import ClockScale
 from synth.spec import Camera, Effects
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 FINE = Fraction(1, 90_000)
-"""Unit of time of an MP4 with a variable rate, s."""
+"""Time unit of an MP4 with a variable rate, s."""
 MATROSKA = Fraction(1, 1000)
-"""Unit of time of every MKV, s."""
+"""Time unit of every MKV, s."""
 
 
 @dataclass(frozen=True)
 class Timetable:
-    """The frames of one clip, in the order in which they stand in the file."""
+    """The frames of one clip, in file order."""
 
     unit: Fraction
-    """Of the file's time stamps, s."""
+    """Unit of the file's time stamps, s."""
     stamps: Ints
-    """What the file says, in units."""
+    """Time stamps in the file, in units of `unit`."""
     taken: Floats
     """True time of the middle of the exposure of the middle row, s; a duplicate has that of the picture it repeats."""
     repeats: NDArray[np.bool_]
-    """Whether the picture is the one before."""
+    """Whether the frame repeats the previous picture."""
 
     @property
     def times(self) -> Floats:
-        """What the file says, s."""
+        """Return the time stamps in the file, s."""
         return np.asarray(self.stamps * float(self.unit))
 
 
@@ -49,45 +50,46 @@ def timetable(camera: Camera, effects: Effects, duration: float, seed: np.random
     Parameters
     ----------
     camera : Camera
-        Rate, container, and what goes wrong with frames.
+        Rate, container, dropped and duplicated frames, jitter.
     effects : Effects
-        Of which ``clock_scale`` acts here.
+        Only ``clock_scale`` acts here.
     duration : float
-        Of the recording by the camera's own clock, s.
+        Duration of the recording by the camera's clock, s.
     seed : numpy.random.SeedSequence
-        Where chance comes from.
+        Source of the random numbers.
 
     Returns
     -------
     Timetable
-        Beginning with a frame at time 0 that is neither dropped nor a duplicate.
+        It begins with a frame at time 0 that is neither dropped nor a duplicate.
     """
     rng = np.random.default_rng(seed)
     count = max(1, round(duration * as_fraction(camera.fps)))
     uneven = 1 + camera.interval_jitter * rng.uniform(-1.0, 1.0, count - 1)
     since_start = np.concatenate([[0.0], np.cumsum(uneven)]) if camera.interval_jitter else np.arange(float(count))
     fate = rng.uniform(size=(2, count))
-    fate[:, 0] = 1.0  # the first frame is always there and its own
+    fate[:, 0] = 1.0  # the first frame is never dropped and never a duplicate
     kept = fate[0] >= camera.dropped
     repeats = (fate[1] < camera.duplicated)[kept]
 
     unit, interval = _grid(camera)
     stamps = np.rint(since_start * float(interval / unit)).astype(np.int64)[kept]
-    scale = effects.clock_scale.scale if effects.clock_scale else 1.0
+    clock = effects.get(ClockScale)
+    scale = clock.scale if clock else 1.0
     taken = since_start[kept] / (float(as_fraction(camera.fps)) * scale)
-    own = np.maximum.accumulate(np.where(repeats, 0, np.arange(len(repeats))))
-    return Timetable(unit, stamps, taken[own], repeats)
+    shown = np.maximum.accumulate(np.where(repeats, 0, np.arange(len(repeats))))
+    return Timetable(unit, stamps, taken[shown], repeats)
 
 
 def as_fraction(fps: float) -> Fraction:
-    """Frames per second as files state them: 29.97 is 30000/1001."""
+    """Return frames per second as files state them: 29.97 is 30000/1001."""
     whole = Fraction(fps).limit_denominator(1001)
     ntsc = Fraction(round(fps * 1.001) * 1000, 1001)
     return ntsc if abs(float(ntsc) - fps) < 0.005 and whole.denominator != 1 else whole
 
 
 def _grid(camera: Camera) -> tuple[Fraction, Fraction]:
-    """Give the unit of the file's time stamps, and the time from frame to frame by its own account, s."""
+    """Return the unit of the file's time stamps and the frame interval that the file states, s."""
     interval = 1 / as_fraction(camera.declared_fps or camera.fps)
     if camera.suffix == "mkv":
         return MATROSKA, interval

@@ -1,4 +1,4 @@
-"""What can go wrong, in the one line that the user reads."""
+"""Errors whose one line of text is shown to the user."""
 
 
 class SpecError(Exception):
@@ -6,4 +6,4 @@ class SpecError(Exception):
 
 
 class RenderError(Exception):
-    """The machine cannot draw."""
+    """Drawing is not possible on this machine."""

@@ -1,8 +1,8 @@
-"""What a frame sees while its rows are open: the light is an integral over time, here a sum over a few instants.
+"""Exposure of a frame: the light is an integral over time, here a weighted sum over a few instants.
 
-Row y of a frame taken at t is open for the exposure E about t + row_time·(y − middle row). Between instants the
-picture is taken to change linearly, so that an instant's weight in a row is the integral of a hat function over the
-time the row is open. Hat functions keep means: the mean time of every row is exact, however few instants there are.
+Row y of a frame taken at t is open for the exposure E around t + row_time·(y − middle row). The picture is assumed to
+change linearly between instants, so an instant's weight in a row is the integral of a hat function over the time for
+which the row is open. Hat functions preserve means: the mean time of every row is exact for any number of instants.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 STILL_PX = 0.1
-"""Where the mark moves less than this while the frame is open, one instant does."""
+"""If the mark moves less than this during the exposure, a single instant is drawn, px."""
 
 
 @dataclass(frozen=True)
@@ -29,11 +29,11 @@ class Shutter:
 
     @property
     def span_s(self) -> float:
-        """From the first row's opening to the last row's closing."""
+        """Return the time from the first row's opening to the last row's closing, s."""
         return self.exposure_s + self.row_time_s * (self.rows - 1)
 
     def row_times(self, taken: float) -> Floats:
-        """Middle of each row's exposure, s: shape (rows,), or (1,) where all rows are one."""
+        """Return the middle of each row's exposure, s: shape (rows,), or (1,) for a global shutter."""
         if self.row_time_s == 0.0:
             return np.array([taken])
         return np.asarray(taken + self.row_time_s * (np.arange(self.rows) - (self.rows - 1) / 2))
@@ -41,7 +41,7 @@ class Shutter:
 
 @dataclass(frozen=True)
 class Instants:
-    """At which times a frame is drawn, and how much each drawing counts in each row."""
+    """The times at which a frame is drawn, and the weight of each drawing in each row."""
 
     times: Floats
     """(n,), s."""
@@ -59,9 +59,9 @@ def instants(shutter: Shutter, taken: float, path_px: float, step_px: float) -> 
     taken : float
         Time of the frame, s.
     path_px : float
-        Way of the mark in the picture while the frame is open, px.
+        Distance the mark moves in the picture during the exposure, px.
     step_px : float
-        Longest way between two instants, px.
+        Largest distance between two instants, px.
 
     Returns
     -------
@@ -82,6 +82,6 @@ def instants(shutter: Shutter, taken: float, path_px: float, step_px: float) -> 
 
 
 def _below_hat(x: Floats) -> Floats:
-    """Integral of the hat function max(0, 1 − |x|) from −∞ to x."""
+    """Return the integral of the hat function max(0, 1 − |x|) from −∞ to x."""
     inside = np.clip(x, -1.0, 1.0)
     return np.where(inside < 0, (1 + inside) ** 2 / 2, 1 - (1 - inside) ** 2 / 2)

@@ -1,4 +1,4 @@
-"""One frame from its plan: the drawings of its instants, added up as light, and what the sensor makes of it."""
+"""Makes one frame from its plan: draws its instants, sums them as light, and applies the sensor."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Stage:
         self._engine = make_engine(spec.render, parts, seen.pinhole, spec.camera.gamma)
 
     def light(self, exposure: Exposure) -> NDArray[np.float32]:
-        """Light of a frame before the sensor: (height, width, 3), 0 to 1, as the picture is written."""
+        """Return the light of a frame before the sensor: (height, width, 3), 0 to 1, as the picture is written."""
         width, height = self._camera.size
         total = np.zeros((height, width, 3), dtype=np.float32)
         for k, weights in enumerate(exposure.weights):
@@ -40,10 +40,10 @@ class Stage:
         return total[:, ::-1] if self._camera.mirrored else total
 
     def picture(self, recording: int, exposure: Exposure) -> NDArray[np.uint8]:
-        """Give a finished frame of a recording: (height, width, 3), RGB, 0-255."""
+        """Return a finished frame of a recording: (height, width, 3), RGB, 0-255."""
         rng = np.random.default_rng(seed_of(self._spec, recording, NOISE, exposure.frame))
         return develop(self.light(exposure), self._spec.camera, exposure.gain, rng)
 
     def close(self) -> None:
-        """Give back what the engine holds."""
+        """Release the engine's resources."""
         self._engine.close()

@@ -1,4 +1,4 @@
-"""A contact sheet: one frame of every spec, so that a person sees at a glance what there is."""
+"""A contact sheet with one frame of every spec."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from synth.spec import Spec, read_spec
 from synth.take import perform, view
 
 SHIPPED = Path(__file__).resolve().parents[1] / "configs"
-"""The specs that stand beside the package in a checkout."""
+"""The specs that a checkout contains."""
 
 _TILE = (320, 240)
 _LABEL = 24
-"""Height of the line under a picture, px."""
+"""Height of the caption under a picture, px."""
 
 
 def gallery(specs: Sequence[Path], out: Path) -> Path:
@@ -31,19 +31,19 @@ def gallery(specs: Sequence[Path], out: Path) -> Path:
     Parameters
     ----------
     specs : sequence of Path
-        The specs; none for all that are shipped.
+        The specs; empty for all shipped specs.
     out : Path
-        Folder, made where it is not there.
+        Folder, created if it does not exist.
 
     Returns
     -------
     Path
-        Of the picture.
+        Path of the picture.
 
     Raises
     ------
     SpecError
-        If a spec is wrong or there is none.
+        If a spec is wrong or there is no spec.
     RenderError
         If this machine cannot draw off-screen.
     """
@@ -64,7 +64,7 @@ def gallery(specs: Sequence[Path], out: Path) -> Path:
 
 
 def _one_frame(path: Path) -> NDArray[np.uint8]:
-    """Draw the frame in which most is to be seen: the one with the head farthest from neutral."""
+    """Draw the frame with the head farthest from neutral."""
     spec: Spec = read_spec(path)
     seen = view(spec)
     try:

@@ -1,7 +1,7 @@
-"""Frames by the thousand: spawned workers, one a core, each with a stage of its own; a few frames without any.
+"""Draws the frames of a session, in one spawned worker process per core, or in this process if there are few.
 
-A forked renderer hangs, so the workers are spawned. They are given plans of a few frames at a time and answer with
-finished pictures, noise included, so that nothing depends on which worker drew a frame.
+Workers are spawned because a forked renderer hangs. Each sets up the scene once, takes plans of a few frames at a time
+and returns finished pictures including noise, so that the result does not depend on which worker drew a frame.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ if TYPE_CHECKING:
 Frames = NDArray[np.uint8]
 
 CHUNK = 8
-"""Frames a worker draws at a time."""
+"""Frames that a worker draws at a time."""
 WORTH_A_WORKER = 60
-"""Frames that take about as long as it takes another worker to start."""
+"""Number of frames that take about as long to draw as another worker takes to start."""
 REPLACEMENTS = 2
-"""How often dead workers are replaced before we give up."""
+"""Number of times that dead workers are replaced before giving up."""
 
 
 _PR_SET_PDEATHSIG = 1
-_EGL = "Mesa's EGL is needed: apt-get install libegl1 libgl1 libgl1-mesa-dri; or say render: {engine: raster}"
+_EGL = "Mesa's EGL is needed: apt-get install libegl1 libgl1 libgl1-mesa-dri; or set render: {engine: raster}"
 
 
 def workers() -> int:
@@ -53,16 +53,16 @@ def workers() -> int:
 
 
 def studio(spec: Spec, seen: View, frames: int) -> Studio | Solo:
-    """Choose who draws a session of so many frames: workers, or this process itself where one worker would do.
+    """Return workers to draw a session of so many frames, or this process if a single worker would suffice.
 
-    A renderer that needs a graphics library always works in a process of its own.
+    A renderer that needs a graphics library always runs in a separate process.
     """
     count = min(workers(), 1 + frames // WORTH_A_WORKER)
     return Solo(spec, seen) if count == 1 and spec.render.engine == "raster" else Studio(spec, seen, count)
 
 
 class Solo:
-    """A single process at work, this one, with the methods of `Studio`; use it in a ``with`` block."""
+    """Draws in this process, with the methods of `Studio`; use it in a ``with`` block."""
 
     def __init__(self, spec: Spec, seen: View) -> None:
         self._spec, self._seen = spec, seen
@@ -75,7 +75,7 @@ class Solo:
         self._painter.strike()
 
     def edge_error(self) -> EdgeError:
-        """Measure how far the engine's edges are from exact areas, at the quality that is rendered."""
+        """Measure the engine's edge errors at the rendered quality."""
         return self._painter.measure_edges()
 
     def film(self, take: Take, frames: Sequence[int]) -> Iterator[NDArray[np.uint8]]:
@@ -85,7 +85,7 @@ class Solo:
 
 
 class Studio:
-    """Workers at the ready; use it in a ``with`` block."""
+    """A pool of worker processes; use it in a ``with`` block."""
 
     def __init__(self, spec: Spec, seen: View, count: int) -> None:
         self._spec = spec
@@ -101,7 +101,7 @@ class Studio:
         self._pool.shutdown(cancel_futures=True)
 
     def edge_error(self) -> EdgeError:
-        """Measure how far the engine's edges are from exact areas, at the quality that is rendered.
+        """Measure the engine's edge errors at the rendered quality.
 
         Returns
         -------
@@ -123,7 +123,7 @@ class Studio:
         take : Take
             The recording.
         frames : sequence of int
-            Numbers of the wanted frames.
+            Numbers of the frames.
 
         Yields
         ------
@@ -142,7 +142,7 @@ class Studio:
                     done += len(drawn)
                     yield from drawn
             except BrokenProcessPool as error:
-                # Short of memory or killed from outside. A frame depends on no other, so new workers just go on.
+                # Out of memory, or killed from outside. Frames are independent, so new workers simply continue.
                 if self._replacements == 0:
                     raise RenderError(
                         f"the drawing processes died {REPLACEMENTS + 1} times; is memory short?"
@@ -163,7 +163,7 @@ class Studio:
         starts = iter(range(0, len(frames), CHUNK))
         waiting: collections.deque[Future[Frames]] = collections.deque()
         while True:
-            # enough ahead that no worker idles, not so much that pictures pile up
+            # enough jobs that no worker idles, few enough that finished pictures do not pile up
             while len(waiting) < 3 * self._count and (start := next(starts, None)) is not None:
                 plans = [plan(self._spec, self._seen, take, frame) for frame in frames[start : start + CHUNK]]
                 waiting.append(self._pool.submit(_draw, take.number, plans))
@@ -173,7 +173,7 @@ class Studio:
 
 
 class _Painter:
-    """A spec, the view of it, and what it is drawn with, once it has been drawn."""
+    """Draws one session; the scene is set up with the first drawing."""
 
     def __init__(self, spec: Spec, seen: View) -> None:
         self._spec, self._seen = spec, seen
@@ -187,13 +187,13 @@ class _Painter:
             def make(parts: Sequence[Part], camera: Pinhole, quality: str, gamma: float) -> Engine:
                 return make_engine(self._spec.render, parts, camera, gamma)
 
-            self.strike()  # OpenGL has one live renderer a process
+            self.strike()  # OpenGL allows one live renderer per process
             return edge_error(make, self._spec.render.quality)
 
     def draw(self, recording: int, plans: Sequence[Exposure]) -> Frames:
         with _one_line(self._spec):
             if self._stage is None:
-                from synth.film import Stage  # renderers load only where they draw
+                from synth.film import Stage  # so that renderers load only in processes that draw
 
                 self._stage = Stage(self._spec, self._seen)
             return np.stack([self._stage.picture(recording, exposure) for exposure in plans])
@@ -206,15 +206,15 @@ class _Painter:
 
 
 _painter: _Painter
-"""This worker's own."""
+"""The painter of this worker process."""
 
 
 def _set_up(spec: Spec, seen: View) -> None:
-    """Prepare a worker; the renderer is given back when the process ends, whatever ends it."""
+    """Prepare a worker; the renderer is released when the process ends for any reason."""
     global _painter
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C
     if sys.platform == "linux":
-        # nobody draws for a parent that was killed, be it before this worker was ready
+        # die with the parent, even if it was killed before this worker was ready
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         parent = multiprocessing.parent_process()
         if parent is not None and os.getppid() != parent.pid:
@@ -233,7 +233,7 @@ def _draw(recording: int, plans: Sequence[Exposure]) -> Frames:
 
 @contextlib.contextmanager
 def _one_line(spec: Spec) -> Iterator[None]:
-    """Say whatever goes wrong in drawing in one line; graphics libraries raise what cannot even be pickled."""
+    """Raise any drawing error as a one-line `RenderError`; some graphics libraries' exceptions cannot be pickled."""
     try:
         yield
     except Exception as error:  # noqa: BLE001

@@ -1,4 +1,4 @@
-"""What was found, held against the truth: angles clip by clip, the model, the effects, the held-out error."""
+"""Compares anglecam's results with the truth: angles clip by clip, the model, the effects, the held-out error."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ClipScore:
-    """How well the angles of one clip were measured."""
+    """Error of the measured angles of one clip."""
 
     name: str
     rms_deg: float
-    """Against the truth, over the frames whose status is ok; nan without any."""
+    """RMS error over the frames with status ok; nan if there are none."""
     offset_deg: float | None
-    """Median difference that was taken out first: a clip without a command has its own median as zero."""
+    """Median difference, subtracted first: the zero of a clip without a command is the clip's median angle."""
     ok: int
     frames: int
-    """Rows that there should be."""
+    """Number of frames in the truth."""
 
 
 def score_clip(found: Path, truth: Path, has_command: bool) -> ClipScore:
@@ -41,7 +41,7 @@ def score_clip(found: Path, truth: Path, has_command: bool) -> ClipScore:
     found, truth : Path
         The two files.
     has_command : bool
-        Without one the zero of the angle is a convention, not a measurement.
+        Whether the clip has a command; without a command the zero of the angle is a convention, not a measurement.
 
     Returns
     -------
@@ -74,16 +74,16 @@ def score(result: Path, truth: Path, console: Console) -> None:
     Parameters
     ----------
     result : Path
-        What ``anglecam close`` or ``measure`` wrote.
+        Folder written by ``anglecam close`` or ``measure``.
     truth : Path
-        What ``synth render --truth`` wrote.
+        Folder written by ``synth render --truth``.
     console : rich.console.Console
-        Where the tables go.
+        Prints the tables.
 
     Raises
     ------
     SpecError
-        If a folder does not hold what it should.
+        If a folder does not contain the expected files.
     """
     facts = _json(truth / "truth.json")
     if facts is None:
@@ -121,7 +121,7 @@ def _clip_table(clips: list[ClipScore]) -> Table:
 
 
 def _model_table(plant: dict[str, float], models: dict[str, Any], loop: dict[str, Any] | None) -> Table:
-    """List a, b, c by every estimator; the loop's are those fitted together with the effects it found."""
+    """List a, b, c of every estimator; the loop's are those fitted together with the effects it found."""
     sources = {
         "EKF": (models["ekf"] or {}).get("parameters"),
         "output error": (models["model"] or {}).get("parameters"),
@@ -169,7 +169,7 @@ def _against(entry: dict[str, Any] | None, true: float) -> str:
 
 
 def _in_si(key: str, entry: dict[str, Any]) -> str:
-    """Say a found parameter in SI, so that it stands beside the spec's own unit."""
+    """Format a fitted parameter in SI, so that it is comparable with the spec's value."""
     factor = math.radians(1.0) if "_deg" in key else 1.0
     name = key.split("_deg")[0] if "_deg" in key else key
     value, sigma = entry.get("value"), entry.get("sigma")

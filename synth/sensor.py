@@ -1,4 +1,4 @@
-"""From light to grey levels: lens blur, vignetting, flicker, shot and reading noise, gamma."""
+"""From light to grey levels: lens blur, vignetting, flicker, shot noise and read noise, gamma."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WHITE = 255.0
 
 
 def develop(light: Light, camera: Camera, gain: Floats, rng: np.random.Generator) -> NDArray[np.uint8]:
-    """Turn the light of a frame into the picture that the camera gives out.
+    """Turn the light of a frame into the camera's picture.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def develop(light: Light, camera: Camera, gain: Floats, rng: np.random.Generator
     gain : ndarray
         Strength of the light in each row, (height,) or (1,).
     rng : numpy.random.Generator
-        Of this frame's noise.
+        Source of this frame's noise.
 
     Returns
     -------
@@ -59,14 +59,14 @@ def develop(light: Light, camera: Camera, gain: Floats, rng: np.random.Generator
 
 
 def flicker(camera: Camera, shutter: Shutter, taken: float) -> Floats:
-    """Strength of the light in each row of a frame: a sine, averaged over the row's exposure.
+    """Return the strength of the light in each row of a frame: a sine, averaged over the row's exposure.
 
     Parameters
     ----------
     camera : Camera
         Its flicker, if any.
     shutter : Shutter
-        When the rows are open.
+        Exposure of the rows.
     taken : float
         Time of the frame, s.
 
@@ -84,6 +84,6 @@ def flicker(camera: Camera, shutter: Shutter, taken: float) -> Floats:
 
 
 def _vignette(shape: tuple[int, int], lost: float) -> Light:
-    """Fall of the light with the square of the distance from the middle, `lost` in the corners."""
+    """Return a factor that falls with the square of the distance from the middle, to 1 − `lost` in the corners."""
     y, x = (np.linspace(-1.0, 1.0, side, dtype=np.float32) for side in shape)
     return np.asarray(1 - lost * (y[:, None] ** 2 + x[None, :] ** 2) / 2, dtype=np.float32)

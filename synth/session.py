@@ -1,4 +1,4 @@
-"""A spec into a session that anyone may see, and a truth that stays apart from it."""
+"""Renders a spec to a session folder, and writes the truth to a separate folder."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ def render(path: Path, out: Path, truth: Path) -> None:
     path : Path
         The spec.
     out : Path
-        Folder for clips, commands and ``rig.yaml``; gets nothing of the truth.
+        Folder for clips, commands and ``rig.yaml``; contains nothing of the truth.
     truth : Path
-        Folder for the truth, neither the same nor inside one another.
+        Folder for the truth. Neither folder may be the other or lie inside it.
 
     Raises
     ------
     SpecError
-        If the spec is wrong, the folders are not apart or not free, or a motion is beyond the mechanism.
+        If the spec is wrong, the folders overlap or hold other files, or a motion exceeds the mechanism's range.
     RenderError
         If this machine cannot draw off-screen.
     """
@@ -73,7 +73,7 @@ def render(path: Path, out: Path, truth: Path) -> None:
 
 
 def _with_duplicates(take: Take, drawing: Studio | Solo) -> Iterator[NDArray[np.uint8]]:
-    """Give every frame of the file; a duplicate is the very picture before it, noise and all."""
+    """Yield every frame of the file; a duplicate repeats the previous picture, including its noise."""
     drawn = drawing.film(take, np.flatnonzero(~take.table.repeats).tolist())
     frame = next(drawn)
     yield frame
@@ -91,22 +91,22 @@ def _write_command(path: Path, take: Take) -> None:
 def _apart(out: Path, truth: Path) -> None:
     here, there = out.resolve(), truth.resolve()
     if here == there or here in there.parents or there in here.parents:
-        raise SpecError(f"--truth {truth}: must be neither --out nor inside it nor around it, or the truth leaks")
+        raise SpecError(f"--truth {truth}: must not be --out, inside it or around it, or the truth leaks")
 
 
 def _free(folder: Path, ours: set[str]) -> None:
-    """Make a folder; refuse one in which older files would mix with ours."""
+    """Create a folder; raise `SpecError` if it holds files that are not of this session."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         there = {path.name for path in folder.iterdir() if not path.name.startswith(UNFINISHED)}
     except OSError as error:
         raise SpecError(f"{folder}: cannot be used ({error.strerror})") from error
     if foreign := sorted(there - ours):
-        raise SpecError(f"{folder}: holds {foreign[0]}, which is not of this session; give an empty folder")
+        raise SpecError(f"{folder}: contains {foreign[0]}, which is not part of this session; give an empty folder")
 
 
 def progress_bar() -> Progress:
-    """Show on standard error how far the work is."""
+    """Return a progress bar on standard error."""
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),

@@ -1,7 +1,7 @@
-"""One recording, played before the camera opens: what moves, when frames are taken, what each of them will see.
+"""Plans one recording before anything is drawn: the motion, the frame times, and the exposure of each frame.
 
-Everything that is random comes from the seed, the number of the recording and a number of the purpose, so that no
-recording depends on another.
+Every random number comes from the seed, the number of the recording and the number of its purpose, so that recordings
+do not depend on each other.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from anglecam.neck import reach
 from synth.camera import Pinhole, aim
 from synth.clock import Timetable, timetable
+from synth.effects.pivot_offset import PivotOffset
+from synth.effects.rolling_shutter import RollingShutter
 from synth.errors import SpecError
 from synth.exposure import Shutter, instants
 from synth.mechanism import build, mouth_centre, neutral_rocker
@@ -27,46 +29,46 @@ from synth.spec import Recording, Rig, Spec
 Floats = NDArray[np.float64]
 
 COMMAND, NOISE, CLOCK, SHAKE = range(4)
-"""Purposes of the random numbers of a recording."""
+"""Purposes of a recording's random numbers, part of their seeds."""
 STEP_PX = {"draft": 1.0, "standard": 0.75, "metrology": 0.25}
-"""Longest way of the mark between two instants of a frame."""
+"""Largest distance that the mark moves between two instants of a frame, px, by quality."""
 AFTERWARDS_S = 0.5
-"""Motion beyond the last frame's time: its exposure and its lower rows are later."""
+"""Motion is computed this much beyond the last frame's time, s: its exposure ends and its lower rows are later."""
 PROBES = 9
-"""Times within a frame at which its mark's way is looked up."""
+"""Times within a frame between which the mark's displacement is summed."""
 
 
 @dataclass(frozen=True)
 class View:
-    """The camera, and the mouth that it looks at."""
+    """The camera, and the position of the mouth and of the pivot's mark."""
 
     pinhole: Pinhole
     mouth: Floats
     """Centre of the lips at neutral, (x, y) in the plane of motion, m."""
     mark_offset: tuple[float, float]
-    """Of the mark on the shaft from the axis of rotation, m."""
+    """Offset of the mark on the shaft from the axis of rotation, m."""
 
 
 @dataclass(frozen=True)
 class Exposure:
-    """All that a worker needs to draw one frame."""
+    """Everything a worker needs to draw one frame."""
 
     frame: int
-    """Its number in the file; part of the noise's seed."""
+    """Number of the frame in the file; part of the noise's seed."""
     times: Floats
-    """(n,), of the instants, s."""
+    """(n,), times of the instants, s."""
     weights: Floats
-    """(n, rows) or (n, 1)."""
+    """(n, rows) or (n, 1), weights of the instants."""
     angles: Floats
-    """(n,), of the head, rad."""
+    """(n,), angle of the head, rad."""
     appendage: Floats
-    """(n,), against the head, rad."""
+    """(n,), angle of the appendage from the head, rad."""
     shifts: Floats
-    """(n, 2), of the picture, px."""
+    """(n, 2), shift of the picture, px."""
     rolls: Floats
-    """(n,), of the picture, rad."""
+    """(n,), rotation of the picture, rad."""
     lamp: NDArray[np.bool_]
-    """(n,), whether the lamp is on."""
+    """(n,), whether the sync lamp is on."""
     gain: Floats
     """Strength of the light, (rows,) or (1,)."""
 
@@ -85,7 +87,7 @@ class Take:
 
     @property
     def first_change(self) -> float:
-        """When the command first changes, s; never where nothing is commanded."""
+        """Return the time at which the command first changes, s; infinite if it never changes."""
         if self.command is None:
             return math.inf
         changes = np.flatnonzero(np.diff(self.command[:, 1])) + 1
@@ -93,16 +95,16 @@ class Take:
 
 
 def seed_of(spec: Spec, recording: int, purpose: int, *more: int) -> np.random.SeedSequence:
-    """Give the seed for one purpose in one recording: the same as spawning it child by child from the spec's."""
+    """Return the seed for one purpose in one recording, the same as if spawned child by child from the spec's seed."""
     return np.random.SeedSequence(spec.seed, spawn_key=(recording, purpose, *more))
 
 
 def view(spec: Spec) -> View:
-    """Aim the camera so that the lever measures what the spec asks for."""
+    """Aim the camera so that the lever appears with the spec's length."""
     mouth = mouth_centre(build(spec), spec.camera.distance_m)
     pinhole = aim(spec, float(np.hypot(*mouth)))
     offset = (0.0, 0.0)
-    if moved := spec.effects.pivot_offset:
+    if moved := spec.effects.get(PivotOffset):
         metres = (pinhole.distance_m - FACE_Z) / pinhole.focal_px
         offset = ((-1 if pinhole.mirrored else 1) * moved.dx_px * metres, -moved.dy_px * metres)
     return View(pinhole, mouth, offset)
@@ -147,7 +149,7 @@ def perform(spec: Spec, seen: View) -> list[Take]:
 
 
 def marks(seen: View, take: Take) -> Floats:
-    """Project mouth, centre of rotation and mark at the middle of every frame's exposure.
+    """Project mouth, centre of rotation and pivot mark at the middle of every frame's exposure.
 
     Returns
     -------
@@ -166,7 +168,7 @@ def marks(seen: View, take: Take) -> Floats:
 
 
 def plan(spec: Spec, seen: View, take: Take, frame: int) -> Exposure:
-    """Plan what one frame sees.
+    """Plan the exposure of one frame.
 
     Parameters
     ----------
@@ -182,9 +184,9 @@ def plan(spec: Spec, seen: View, take: Take, frame: int) -> Exposure:
     Returns
     -------
     Exposure
-        With a single instant where the mark hardly moves.
+        With a single instant if the mark hardly moves.
     """
-    rolling = spec.effects.rolling_shutter
+    rolling = spec.effects.get(RollingShutter)
     shutter = Shutter(spec.camera.exposure_s, rolling.row_time_s if rolling else 0.0, spec.camera.size[1])
     taken = float(take.table.taken[frame])
     probes = taken + shutter.span_s * np.linspace(-0.5, 0.5, PROBES)

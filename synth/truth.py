@@ -1,4 +1,4 @@
-"""What really happened, written where the session is not."""
+"""Writes the true motion and every parameter to the truth folder."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from synth.spec import Spec
 from synth.take import Take, View, marks
 
 DEPENDENCIES = ("anglecam", "numpy", "scipy", "numba", "opencv-python-headless", "trimesh", "pyrender", "av")
-"""Packages that a film may depend on."""
+"""Packages that can affect a film; ``truth.json`` records their versions."""
 COLUMNS = (
     "frame", "time_s", "true_time_s", "angle_deg", "mouth_x_px", "mouth_y_px", "pivot_x_px", "pivot_y_px",
     "mark_x_px", "mark_y_px", "status", "frame_sha256",
 )  # fmt: skip
-"""The pivot is the centre of rotation; the mark is what is painted on the shaft, or beside it."""
+"""The pivot is the centre of rotation; the mark is painted on the shaft, or beside it with `pivot_offset`."""
 
 
 def fingerprint(frame: NDArray[np.uint8]) -> str:
-    """Hash of a frame's pixels, row by row, red, green, blue, before any codec saw them."""
+    """Return the hash of a frame's pixels before encoding, row by row in the order red, green, blue."""
     return hashlib.sha256(frame.tobytes()).hexdigest()
 
 
@@ -39,13 +39,13 @@ def write_take(folder: Path, seen: View, take: Take, fingerprints: list[str]) ->
     Parameters
     ----------
     folder : Path
-        Existing, and apart from the session.
+        Existing folder, separate from the session.
     seen : View
         The camera.
     take : Take
         The recording.
     fingerprints : list of str
-        Of every frame of the file.
+        `fingerprint` of every frame of the file.
     """
     table = take.table
     angles = np.degrees(take.motion.angle(table.taken))
@@ -67,13 +67,13 @@ def write_facts(folder: Path, spec: Spec, seen: View, edges: dict[str, Any]) -> 
     Parameters
     ----------
     folder : Path
-        Existing, and apart from the session.
+        Existing folder, separate from the session.
     spec : Spec
         The whole session.
     seen : View
         The camera.
     edges : dict
-        How far the renderer is from exact areas at edges.
+        The renderer's edge errors.
     """
     facts = {
         "seed": spec.seed,

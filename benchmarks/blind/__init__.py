@@ -1,1 +1,1 @@
-"""The loop against truths that it has not seen: sessions drawn by seed, as series and as films."""
+"""Tests of the loop on held-out truths: sessions drawn from seeds, as angle series and as films."""

@@ -1,9 +1,9 @@
-"""How often the loop is right on sessions that it has not seen, effect by effect.
+"""Measures how often the loop's verdict is right on randomly drawn sessions, effect by effect.
 
     .venv/bin/python -m benchmarks.blind.attribution --seeds 20 --out build/attribution.jsonl
     .venv/bin/python -m benchmarks.blind.attribution --summary build/attribution.jsonl
 
-A session is one line of the file. Started again with the same file it goes on where it stopped.
+A session is one line of the file. A run with an existing file continues it.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from anglecam.loop.close import close_records
 from benchmarks.blind.drawn import LEDGER, OUTSIDE, Keys, draw
-from benchmarks.blind.judged import Line, judge, read_lines, show, told
+from benchmarks.blind.judged import Line, judge, read_lines, show, true_values
 from benchmarks.blind.sessions import HELD_OUT, residual_deg, scaled, session, spec_of
 
 SIGMA_DEG = 0.05
 COLOURED = 0.6
-"""Correlation of coloured noise from frame to frame, as a codec's block pattern leaves it."""
+"""AR(1) coefficient φ of the correlated noise from frame to frame, typical of a codec's block pattern."""
 PAIRS = (
     ("dead_time", "coulomb_friction"),
     ("actuator_lag", "stiffening_spring"),
@@ -39,19 +39,19 @@ PAIRS = (
     ("clock_scale", "coulomb_friction"),
     ("gravity_geometry", "rolling_shutter"),
 )
-"""From different stations of the signal's path; every kind of port is among them."""
+"""Pairs from different stages of the signal path; every kind of port occurs."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 @dataclass(frozen=True)
 class Case:
-    """What acts in a session, and how much of it shows."""
+    """The effects of a session, and their size."""
 
     name: str
     group: str
     effects: tuple[str, ...] = ()
     ratio: float = 1.0
-    """What the base model leaves without noise, over the noise."""
+    """Residual of the base model without noise, over the noise."""
     phi: float = 0.0
 
 
@@ -69,7 +69,7 @@ CASES = {
 
 
 def run(name: str, seed: int) -> Line:
-    """Draw a session, close the loop on it and hold the verdict against the truth; what fails is said in the line."""
+    """Draw a session, close the loop on it and compare the verdict with the truth; the line records any failure."""
     case = CASES[name]
     line: Line = {"case": name, "seed": seed}
     try:
@@ -78,30 +78,32 @@ def run(name: str, seed: int) -> Line:
             drawn |= draw(effect, seed)
         effects = scaled(drawn, seed, case.ratio, sigma_deg=SIGMA_DEG)
         records = session(effects, seed=seed, sigma_deg=SIGMA_DEG, phi=case.phi)
-        values = told(spec_of(effects, seed=seed), effects)
+        values = true_values(spec_of(effects, seed=seed), effects)
         start = time.perf_counter()
         verdict = close_records(records, held_out=HELD_OUT, seed=seed)
         line["seconds"] = time.perf_counter() - start
         line |= judge(verdict, case.effects, values, SIGMA_DEG)
         line |= {"effects": effects, "base_over_sigma": residual_deg(effects, seed) / SIGMA_DEG}
-    except Exception as error:  # noqa: BLE001  # one session's failure must not cost the others
+    except Exception as error:  # noqa: BLE001  # a failed session must not stop the others
         line["error"] = f"{type(error).__name__}: {error}"
     return line
 
 
 def main(
-    seeds: Annotated[int, typer.Option(help="Sessions a case, from seed 0 on.")] = 20,
-    cases: Annotated[str, typer.Option(help="Names of cases with commas between; all without.")] = "",
+    seeds: Annotated[int, typer.Option(help="Sessions per case, from seed 0 on.")] = 20,
+    cases: Annotated[str, typer.Option(help="Comma-separated names of cases; all by default.")] = "",
     processes: Annotated[int, typer.Option(min=1)] = 2,
-    out: Annotated[Path, typer.Option(help="File of lines; it is added to.")] = Path("build/attribution.jsonl"),
-    summary: Annotated[Path | None, typer.Option(help="Only sum up this file.")] = None,
+    out: Annotated[Path, typer.Option(help="File of lines to which results are appended.")] = Path(
+        "build/attribution.jsonl"
+    ),
+    summary: Annotated[Path | None, typer.Option(help="Only summarise this file.")] = None,
 ) -> None:
-    """Run sessions and sum them up."""
+    """Run sessions and summarise them."""
     console = Console(width=None if Console().is_terminal else 200)
     if summary is None:
         names = cases.split(",") if cases else list(CASES)
         if unknown := [name for name in names if name not in CASES]:
-            raise typer.BadParameter(f"no case {unknown[0]}; there are {', '.join(CASES)}")
+            raise typer.BadParameter(f"unknown case {unknown[0]}; the cases are {', '.join(CASES)}")
         _run_all([(name, seed) for seed in range(seeds) for name in names], processes, out, console)
     order = list(CASES)
     lines = sorted(read_lines(summary or out), key=lambda line: (order.index(line["case"]), line["seed"]))
@@ -114,7 +116,7 @@ def _run_all(jobs: list[tuple[str, int]], processes: int, out: Path, console: Co
     out.write_text("".join(json.dumps(line) + "\n" for line in kept), encoding="utf-8")
     done = {(line["case"], line["seed"]) for line in kept}
     left = [job for job in jobs if job not in done]
-    for name in THREADS:  # read when a worker loads the libraries: each has a core to itself
+    for name in THREADS:  # read when a worker loads the libraries: one core per worker
         os.environ[name] = "1"
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with (

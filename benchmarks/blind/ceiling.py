@@ -1,12 +1,12 @@
-"""How often any method at all could name the right effect: the distance from what acts to what comes nearest to it.
+"""Upper limit of any method's success rate: the distance from the acting effect to the nearest other effect.
 
     .venv/bin/python -m benchmarks.blind.ceiling [--seeds 5] [--cases NAME,NAME…]
 
 A session of `benchmarks.blind.attribution` is made without noise, and every other effect of the ledger is fitted to it.
-What the best of them leaves is the distance d from one to the other, in standard deviations of the noise over all
-frames that are fitted. Told which two it has to choose between, the best decision there is, by the larger likelihood,
-is right with probability Φ(d/2) (Neyman, Pearson, Phil. Trans. R. Soc. A 231, 1933). Whoever must choose among all is
-right less often; a loop that is right about as often as this has lost nothing.
+The residual of the best fit is the distance d between the two effects, in standard deviations of the noise over all
+fitted frames. Given these two effects to choose from, the optimal decision, by the larger likelihood, is right with
+probability Φ(d/2) (Neyman, Pearson, Phil. Trans. R. Soc. A 231, 1933). A choice among all effects is right less often,
+so a loop near this limit is practically optimal.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from benchmarks.blind.sessions import HELD_OUT, scaled, session, spec_of
 
 
 def nearest(name: str, seed: int) -> tuple[str, float]:
-    """Return which other effect comes nearest to the one that acts in a case, and d."""
+    """Return the effect nearest to the acting effect of a case, and d."""
     case = CASES[name]
     (acting,) = case.effects
     effects = scaled(draw(acting, seed), seed, case.ratio, sigma_deg=SIGMA_DEG)
@@ -50,10 +50,10 @@ def nearest(name: str, seed: int) -> tuple[str, float]:
 
 
 def main(
-    seeds: Annotated[int, typer.Option(help="Sessions a case, from seed 0 on.")] = 5,
-    cases: Annotated[str, typer.Option(help="Names of cases of one effect; all without.")] = "",
+    seeds: Annotated[int, typer.Option(help="Sessions per case, from seed 0 on.")] = 5,
+    cases: Annotated[str, typer.Option(help="Comma-separated names of cases with one effect; all by default.")] = "",
 ) -> None:
-    """Measure the distances and print what they allow."""
+    """Measure the distances and print the resulting limits."""
     names = cases.split(",") if cases else [name for name, case in CASES.items() if case.group.startswith("one effect")]
     found: dict[str, list[tuple[str, float]]] = defaultdict(list)
     console = Console(width=None if Console().is_terminal else 120)
@@ -61,7 +61,7 @@ def main(
         for name in names:
             try:
                 one = nearest(name, seed)
-            except ValueError as error:  # no size of the effect does it
+            except ValueError as error:  # no size of the effect gives the residual
                 console.print(f"{name}, seed {seed}: {error}")
             else:
                 found[name].append(one)

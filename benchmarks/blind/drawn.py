@@ -1,6 +1,7 @@
-"""The effects as a benchmark draws them: the eighteen of the ledger, and four that are in no ledger.
+"""How the benchmarks draw effects: the eighteen of the ledger, and four outside it.
 
-For each: which of the truth's keys make it larger, how the others are drawn, and what number the loop should find.
+For each effect: the spec's keys that scale its size, the distribution of its other keys, and the true value of the
+parameter that the loop reports.
 """
 
 from __future__ import annotations
@@ -19,22 +20,22 @@ Rng = np.random.Generator
 
 @dataclass(frozen=True)
 class Drawn:
-    """How one effect is drawn."""
+    """The distribution of one effect."""
 
     size: Keys
-    """Keys that grow together, with what is about a noise of 0.05°."""
+    """Keys that scale the size, with values whose residual is approximately 0.05°."""
     along: tuple[str, ...] = ()
-    """Drawn keys that grow with them."""
+    """Drawn keys that scale with them."""
     null: float = 0.0
-    """Where those keys leave the motion as it was."""
+    """Value of the scaled keys at which the effect vanishes."""
     inverse: bool = False
-    """Whether smaller is more, as of a limit."""
+    """Whether smaller values mean a larger effect, as for a limit."""
     signed: bool = False
-    """Whether it may go either way."""
+    """Whether the sign is random."""
     shape: Callable[[Rng], Keys] = lambda rng: {}
-    """Draw what makes it neither larger nor smaller."""
-    told: Callable[[Keys, Pinhole, float], float] | None = None
-    """Truth, camera and lever (m) → the loop's first parameter, in its file's unit."""
+    """Draws the keys that do not change the size."""
+    reported: Callable[[Keys, Pinhole, float], float] | None = None
+    """Keys, camera and lever (m) → true value of the loop's first parameter, in the unit of the loop's file."""
 
 
 def _same(key: str) -> Callable[[Keys, Pinhole, float], float]:
@@ -51,50 +52,54 @@ def _any_way(rng: Rng) -> Keys:
 
 
 LEDGER: Mapping[str, Drawn] = {
-    "dead_time": Drawn({"tau_s": 0.002}, told=_same("tau_s")),
-    "actuator_lag": Drawn({"tau_s": 0.006}, told=_same("tau_s")),
-    "rate_limit": Drawn({"r_deg_per_s": 2000.0}, inverse=True, told=_same("r_deg_per_s")),
+    "dead_time": Drawn({"tau_s": 0.002}, reported=_same("tau_s")),
+    "actuator_lag": Drawn({"tau_s": 0.006}, reported=_same("tau_s")),
+    "rate_limit": Drawn({"r_deg_per_s": 2000.0}, inverse=True, reported=_same("r_deg_per_s")),
     "torque_saturation": Drawn(
-        {"limit": 120.0}, inverse=True, shape=lambda rng: {"share": rng.uniform(0.4, 1.0)}, told=_degrees("limit")
+        {"limit": 120.0}, inverse=True, shape=lambda rng: {"share": rng.uniform(0.4, 1.0)}, reported=_degrees("limit")
     ),
-    "backlash": Drawn({"half_width_deg": 0.07}, told=_same("half_width_deg")),
-    "dead_zone": Drawn({"half_width_deg": 0.07}, told=_same("half_width_deg")),
+    "backlash": Drawn({"half_width_deg": 0.07}, reported=_same("half_width_deg")),
+    "dead_zone": Drawn({"half_width_deg": 0.07}, reported=_same("half_width_deg")),
     "coulomb_friction": Drawn(
         {"torque": 0.6},
         along=("breakaway",),
         shape=lambda rng: {} if rng.random() < 0.5 else {"breakaway": 0.6 * rng.uniform(1.1, 1.6)},
-        told=_degrees("torque"),
+        reported=_degrees("torque"),
     ),
-    "quadratic_drag": Drawn({"q": 0.3}, told=_same("q")),
-    "stiffening_spring": Drawn({"k3": 60.0}, signed=True, told=_same("k3")),
+    "quadratic_drag": Drawn({"q": 0.3}, reported=_same("q")),
+    "stiffening_spring": Drawn({"k3": 60.0}, signed=True, reported=_same("k3")),
     "gravity_geometry": Drawn(
         {"strength": 40.0},
         shape=lambda rng: {"gravity_deg": rng.uniform(-180, 180)},
-        told=_degrees("strength"),
+        reported=_degrees("strength"),
     ),
-    "linkage_geometry": Drawn({"swing": 0.3}, shape=lambda rng: {"share": 1.0}, told=lambda keys, camera, lever: 1.0),
-    "constant_torque": Drawn({"torque": 0.5}, signed=True, told=_degrees("torque")),
+    "linkage_geometry": Drawn(
+        {"swing": 0.3}, shape=lambda rng: {"share": 1.0}, reported=lambda keys, camera, lever: 1.0
+    ),
+    "constant_torque": Drawn({"torque": 0.5}, signed=True, reported=_degrees("torque")),
     "camera_tilt": Drawn(
         {"tilt_deg": 8.0},
         shape=lambda rng: {"axis_deg": rng.uniform(0, 180)},
-        told=lambda keys, camera, lever: abs(keys["tilt_deg"]),
+        reported=lambda keys, camera, lever: abs(keys["tilt_deg"]),
     ),
     "pivot_offset": Drawn(
         {},
         along=("dx_px", "dy_px"),
         shape=_any_way,
-        told=lambda keys, camera, lever: (
+        reported=lambda keys, camera, lever: (
             (-1 if camera.mirrored else 1) * keys["dx_px"] * camera.distance_m / (camera.focal_px * lever)
         ),
     ),
     "lens_distortion": Drawn(
-        {"k1": 0.1}, signed=True, told=lambda keys, camera, lever: keys["k1"] * (lever / camera.distance_m) ** 2
+        {"k1": 0.1}, signed=True, reported=lambda keys, camera, lever: keys["k1"] * (lever / camera.distance_m) ** 2
     ),
-    "rolling_shutter": Drawn({"row_time_s": 2e-5}, told=_same("row_time_s")),
-    "clock_scale": Drawn({"scale": 1.001}, null=1.0, signed=True, told=lambda keys, camera, lever: keys["scale"] - 1),
-    "angle_drift": Drawn({"rate_deg_per_s": 0.02}, signed=True, told=_same("rate_deg_per_s")),
+    "rolling_shutter": Drawn({"row_time_s": 2e-5}, reported=_same("row_time_s")),
+    "clock_scale": Drawn(
+        {"scale": 1.001}, null=1.0, signed=True, reported=lambda keys, camera, lever: keys["scale"] - 1
+    ),
+    "angle_drift": Drawn({"rate_deg_per_s": 0.02}, signed=True, reported=_same("rate_deg_per_s")),
 }
-"""Under the ids of `anglecam.effects.LEDGER`."""
+"""Effects of the ledger, by the ids of `anglecam.effects.LEDGER`."""
 
 OUTSIDE: Mapping[str, Drawn] = {
     "slack_spring": Drawn({"stiffness": 5.0}, shape=lambda rng: {"slack_deg": rng.uniform(-6, 6)}),
@@ -108,25 +113,25 @@ OUTSIDE: Mapping[str, Drawn] = {
     ),
     "warming_damping": Drawn({"share": 0.1}, shape=lambda rng: {"work": rng.uniform(5, 30)}),
 }
-"""Right is ``unexplained``."""
+"""Effects outside the ledger; the right verdict is ``unexplained``."""
 
 ALL = {**LEDGER, **OUTSIDE}
 
 
 def draw(name: str, seed: int) -> dict[str, Keys]:
-    """Draw one effect's signs and shape; its size is a typical one.
+    """Draw one effect's signs and shape, with a typical size.
 
     Parameters
     ----------
     name : str
         An id of `ALL`.
     seed : int
-        The session's.
+        Seed of the session.
 
     Returns
     -------
     dict
-        ``{name: keys}`` as a film's spec has it, for `benchmarks.blind.sessions.scaled`.
+        ``{name: keys}`` as in a film's spec, for `benchmarks.blind.sessions.scaled`.
     """
     effect = ALL[name]
     rng = np.random.default_rng([seed, sorted(ALL).index(name), 1])
@@ -136,7 +141,7 @@ def draw(name: str, seed: int) -> dict[str, Keys]:
 
 
 def magnified(name: str, keys: Keys, factor: float) -> Keys:
-    """Return an effect ``factor`` times as large: what is absent at nought grows, a limit shrinks."""
+    """Return an effect ``factor`` times as large: limits shrink, other sizes grow."""
     effect = ALL[name]
 
     def grown(value: float) -> float:

@@ -1,4 +1,4 @@
-"""Film sessions that nobody chose: effect, size, plant, commands, rig and camera of each case are drawn from a seed.
+"""Draws sessions to film: effect, size, plant, commands, rig and camera of each case come from a seed.
 
     .venv/bin/python -m benchmarks.blind.drawn_films --first 100 --seeds 3 --out build/drawn
     .venv/bin/python -m benchmarks.blind.films --cases build/drawn --keep build/drawn
@@ -18,48 +18,49 @@ import yaml
 
 from anglecam.effects import effect
 from benchmarks.blind.drawn import ALL, OUTSIDE, draw
-from benchmarks.blind.judged import told
+from benchmarks.blind.judged import true_values
 from benchmarks.blind.sessions import HELD_OUT, Effects, look, scaled, spec_of
 from synth.spec import Spec
 from synth.spec.picture import LIPSTICKS, SKINS, Camera
 from synth.take import FACE_Z
 
 LEAST_DEG, MOST_DEG = 0.04, 0.5
-"""What the base model leaves: from some ten times a film's own noise to what anyone sees."""
+"""Range of the base model's residual: from approximately ten times a film's noise to plainly visible."""
 WITHIN_SIGMA = 3
 READ_OUT = 0.9
-"""Largest share of the time between frames that a rolling shutter takes."""
+"""Largest readout time of a rolling shutter, as a share of the frame interval."""
 MOST_TILT_DEG = 25.0
-"""Who films at more of a slant knows it."""
+"""Largest camera tilt; a user would notice a larger one."""
 HALVINGS = 4
-"""How often a size that the rig cannot show is tried at half."""
+"""Number of times a size that the rig cannot show is halved."""
 
 
 def film_spec(name: str, seed: int) -> Spec:
-    """Draw what is filmed.
+    """Draw the spec of a film.
 
     Parameters
     ----------
     name : str
         An id of `benchmarks.blind.drawn.ALL`.
     seed : int
-        Of everything.
+        Seed of all random choices.
 
     Returns
     -------
     Spec
-        As for ``synth``, with pivot, mouth and what is held out declared, and a neutral where a steady torque acts.
+        A spec for ``synth`` that declares pivot, mouth and held-out recordings, and a neutral if a constant torque
+        acts.
 
     Raises
     ------
     ValueError
-        Where no size of the effect can be shown.
+        If the rig cannot show any size of the effect.
     """
     rng = np.random.default_rng([seed, sorted(ALL).index(name), 2])
     content = spec_of(_sized(name, seed, rng), seed=seed).model_dump(mode="json", exclude_unset=True)
     content["camera"] |= _camera(rng)
     if "rolling_shutter" in content["effects"]:
-        # no sensor reads its last row after the next frame has begun
+        # a sensor reads its last row before the next frame begins
         rows = content["effects"]["rolling_shutter"]
         rows["row_time_s"] = min(rows["row_time_s"], READ_OUT / (content["camera"]["fps"] * Camera().size[1]))
     content["rig"] |= {
@@ -83,7 +84,7 @@ def film_spec(name: str, seed: int) -> Spec:
 
 
 def _sized(name: str, seed: int, rng: np.random.Generator) -> Effects:
-    """Draw how much of the effect shows; what the rig cannot show, less of it can."""
+    """Draw the effect's size; halve it while the rig cannot show it."""
     leaves_deg = math.exp(rng.uniform(math.log(LEAST_DEG), math.log(MOST_DEG)))
     for halving in range(HALVINGS):
         try:
@@ -121,7 +122,7 @@ def write_case(name: str, seed: int, out: Path) -> None:
         As from `film_spec`.
     """
     spec = film_spec(name, seed)
-    values = told(spec, spec.effects.model_dump(exclude_none=True))
+    values = true_values(spec, spec.effects.model_dump(exclude_none=True))
     parameters = [
         {"name": effect(one).parameters[0].name, "value": float(f"{value:.6g}"), "within_sigma": WITHIN_SIGMA}
         for one, value in values.items()
@@ -138,12 +139,12 @@ def write_case(name: str, seed: int, out: Path) -> None:
 
 
 def main(
-    out: Annotated[Path, typer.Option(help="Folder for the cases' folders.")],
+    out: Annotated[Path, typer.Option(help="Folder for the cases.")],
     first: Annotated[int, typer.Option(help="First seed.")] = 100,
     seeds: Annotated[int, typer.Option(help="Sessions of each effect.")] = 3,
-    effects: Annotated[str, typer.Option(help="Ids with commas between; all without.")] = "",
+    effects: Annotated[str, typer.Option(help="Comma-separated ids; all by default.")] = "",
 ) -> None:
-    """Draw the cases of all effects, those in no ledger too."""
+    """Draw the cases of all effects, including those outside the ledger."""
     for name in effects.split(",") if effects else ALL:
         for seed in range(first, first + seeds):
             try:

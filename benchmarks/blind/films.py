@@ -1,11 +1,12 @@
-"""How often the loop is right on films: the cases of ``tests/blind``, rendered, measured, closed and judged.
+"""Measures how often the loop's verdict is right on films: renders, measures, closes and judges ``tests/blind``.
 
     .venv/bin/python -m benchmarks.blind.films --keep build/blind
     .venv/bin/python -m benchmarks.blind.films 0005 0013 --keep build/blind
 
-What was measured is kept; a case that is there already is closed again without being filmed.
-Judged right is a case whose verdict and effects are those of its ``expected.yaml`` and whose parameters lie within so
-many standard uncertainties as that file allows.
+Measured sessions are kept; a case that was measured already is closed again without filming it.
+
+A case is right if verdict and effects are those of its ``expected.yaml`` and the parameters lie within the number of
+standard uncertainties that this file allows.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from anglecam.errors import InputError
 from anglecam.io.session import read_session
 from anglecam.loop.close import close_records
 from anglecam.workflow.session import loop_input, measure_session
-from benchmarks.blind.judged import Line, judge, show, told
+from benchmarks.blind.judged import Line, judge, show, true_values
 from synth.session import render
 from synth.spec import Spec, read_spec
 
@@ -38,7 +39,7 @@ SPEC, EXPECTED, MEASURED = "spec.yaml", "expected.yaml", "measured.pickle"
 
 @dataclass(frozen=True)
 class Case:
-    """What is filmed, and what the loop should say of it."""
+    """A film's spec and the expected verdict."""
 
     name: str
     path: Path
@@ -50,7 +51,7 @@ class Case:
 
     @property
     def true(self) -> dict[str, dict[str, float]]:
-        """What acts, as the spec has it."""
+        """Return the effects that act, as in the spec."""
         return self.spec.effects.model_dump(exclude_none=True)
 
 
@@ -62,19 +63,19 @@ def read_case(path: Path) -> Case:
 
 
 def film(case: Case, kept: Path) -> None:
-    """Render a case and measure it; keep what the loop is shown, and nothing of the truth.
+    """Render a case and measure it; keep the loop's input and nothing of the truth.
 
     Parameters
     ----------
     case : Case
-        What is filmed.
+        The case.
     kept : Path
         Folder for the measured session, in one file.
 
     Raises
     ------
     InputError
-        Where a recording cannot be measured.
+        If a recording cannot be measured.
     """
     with tempfile.TemporaryDirectory() as workplace:
         clips = Path(workplace) / "session"
@@ -93,7 +94,7 @@ def close(case: Case, kept: Path) -> Line:
     Returns
     -------
     dict
-        As from `benchmarks.blind.judged.judge`, with ``right`` and ``wrong``, which says what is not.
+        The result of `benchmarks.blind.judged.judge`, with ``right`` and ``wrong``, the list of deviations.
     """
     session, measured = pickle.loads((kept / MEASURED).read_bytes())
     records = loop_input(measured).records
@@ -101,13 +102,13 @@ def close(case: Case, kept: Path) -> Line:
     verdict = close_records(records, held_out=case.spec.declare["held_out"])
     seconds = time.perf_counter() - start
     sigma_deg = math.degrees(verdict.noise.sigma)
-    line = judge(verdict, case.true, told(case.spec, case.true), sigma_deg)
+    line = judge(verdict, case.true, true_values(case.spec, case.true), sigma_deg)
     wrong = _wrong(case, line)
     return {"case": case.name, "seed": case.spec.seed, "seconds": seconds, "right": not wrong, "wrong": wrong} | line
 
 
 def _wrong(case: Case, line: Line) -> list[str]:
-    """List what an expectation misses."""
+    """List the deviations of a result from its expectation."""
     if line["verdict"] != case.verdict or set(line["found"]) != set(case.effects):
         return [f"{' + '.join(case.effects) or case.verdict} expected"]
     off = {estimate["name"]: estimate for estimate in line["estimates"].values()}
@@ -119,9 +120,9 @@ def _wrong(case: Case, line: Line) -> list[str]:
 
 
 def main(
-    names: Annotated[list[str] | None, typer.Argument(help="Folders of --cases; all without.")] = None,
-    cases: Annotated[Path, typer.Option(help="Where the cases' folders are.")] = CASES,
-    keep: Annotated[Path, typer.Option(help="Where measured sessions are kept, and looked for.")] = Path("build/blind"),
+    names: Annotated[list[str] | None, typer.Argument(help="Folders of --cases; all by default.")] = None,
+    cases: Annotated[Path, typer.Option(help="Folder of the cases.")] = CASES,
+    keep: Annotated[Path, typer.Option(help="Folder for measured sessions.")] = Path("build/blind"),
 ) -> None:
     """Film, measure, close and judge."""
     console = Console(width=None if Console().is_terminal else 200)
@@ -133,7 +134,7 @@ def main(
         try:
             if not (kept / MEASURED).exists():
                 film(case, kept)
-        except InputError as error:  # one film's failure must not cost the others
+        except InputError as error:  # a failed film must not stop the others
             lines.append({"case": case.name, "seed": case.spec.seed, "error": str(error)})
             continue
         lines.append(close(case, kept))

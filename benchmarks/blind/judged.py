@@ -1,6 +1,6 @@
-"""A verdict held against the truth, and many of them summed up.
+"""Compares verdicts with the truth and summarises many of them.
 
-A judgement is one line of JSON, so that a run of hours can be stopped, resumed and summed up from a file.
+A judgement is one line of JSON, so that a long run can be stopped, resumed and summarised from a file.
 """
 
 from __future__ import annotations
@@ -25,36 +25,36 @@ from synth.spec import Spec
 Line = dict[str, Any]
 
 CONFIDENT = 1.959964
-"""Standard deviations to either side that hold 95 %."""
+"""Half-width of a 95 % interval in standard deviations."""
 
 
-def told(spec: Spec, effects: Mapping[str, Keys]) -> dict[str, float]:
-    """Return the true first parameter of each effect that the ledger has, as the loop's files would state it."""
+def true_values(spec: Spec, effects: Mapping[str, Keys]) -> dict[str, float]:
+    """Return the true first parameter of each effect of the ledger, in the unit of the loop's files."""
     seen = look(spec)
     lever = math.hypot(*seen.mouth)
     return {
-        name: LEDGER[name].told(dict(keys), seen.pinhole, lever) for name, keys in effects.items() if name in LEDGER
+        name: LEDGER[name].reported(dict(keys), seen.pinhole, lever) for name, keys in effects.items() if name in LEDGER
     }
 
 
 def judge(verdict: Verdict, true: Collection[str], values: Mapping[str, float], sigma_deg: float) -> Line:
-    """Hold a verdict against the truth.
+    """Compare a verdict with the truth.
 
     Parameters
     ----------
     verdict : Verdict
-        The loop's.
+        The loop's verdict.
     true : collection of str
         Ids of the effects that act.
     values : mapping
-        From `told`.
+        From `true_values`.
     sigma_deg : float
         Standard deviation of the noise.
 
     Returns
     -------
     dict
-        What is counted, ready for JSON.
+        The judgement, ready for JSON.
     """
     found = [accepted.effect.id for accepted in verdict.accepted]
     alias = set(found).union(*(accepted.alias_set for accepted in verdict.accepted))
@@ -67,7 +67,7 @@ def judge(verdict: Verdict, true: Collection[str], values: Mapping[str, float], 
         first = accepted.effect.parameters[0]
         at = list(verdict.after.model.names).index(first.name)
         value, sigma = float(verdict.after.parameters[at]), float(sigmas[at])
-        # in the fit's own unit: the interval of a limit is one of its reciprocal
+        # in the fit's internal unit: the interval of a limit is that of its reciprocal
         truth = first.to_file / values[name] if first.inverse else values[name] / first.to_file
         estimates[name] = {
             "name": first.name,
@@ -87,7 +87,7 @@ def judge(verdict: Verdict, true: Collection[str], values: Mapping[str, float], 
 
 
 def read_lines(path: Path) -> list[Line]:
-    """Read judgements; one that a stop cut short is left out."""
+    """Read judgements; an incomplete last line is skipped."""
     lines = []
     for text in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
         try:
@@ -98,7 +98,7 @@ def read_lines(path: Path) -> list[Line]:
 
 
 def show(lines: Sequence[Line], group: Callable[[Line], str], console: Console) -> None:
-    """Print the confusion matrix and the table of figures, group by group in the order in which they come."""
+    """Print the confusion matrix and the table of figures, by group in order of appearance."""
     failed = [line for line in lines if "error" in line]
     lines = [line for line in lines if "error" not in line]
     groups, cases = _gather(lines, group), _gather(lines, lambda line: line["case"])
@@ -118,7 +118,7 @@ def _gather(lines: Sequence[Line], group: Callable[[Line], str]) -> dict[str, li
 
 
 def _confusion(title: str, lines: Sequence[Line]) -> Table:
-    """Count what was named, by what acts: ids by number, 0 nothing missing, ? unexplained."""
+    """Count the named effects by the acting effect: ids by number, 0 for nothing missing, ? for unexplained."""
     ids = list(LEDGER)
     table = Table(
         "what acts", *map(str, range(1, len(ids) + 1)), "0", "?", title=title, title_justify="left", padding=0
@@ -164,7 +164,7 @@ def _figures_of(lines: Sequence[Line]) -> list[str]:
 
 
 def _exactly(line: Line) -> bool:
-    """Whether the verdict is the one that should be: the right names, or none where none would be right."""
+    """Return whether the verdict is exactly right: the right names, or none if none is right."""
     if not line["true"]:
         return line["verdict"] == "nothing_missing"
     if not set(line["true"]) <= set(LEDGER):

@@ -1,8 +1,7 @@
-"""Sessions as angle series, without pictures: everything in them is drawn from a seed.
+"""Draws sessions as angle series, without pictures, from a seed.
 
-`synth` moves the rig and projects mouth and mark on the shaft through its own camera when their row is taken; the
-angle is that of the line between the two pixels, as a measurement without errors of its own would have it. Noise is
-added to that.
+`synth` moves the rig and projects mouth and pivot mark through its camera at the time their row is exposed. The angle
+is that of the line between the two pixels, as an error-free measurement would return it, plus noise.
 """
 
 from __future__ import annotations
@@ -34,23 +33,23 @@ Effects = Mapping[str, Mapping[str, float]]
 
 RECORDINGS = ("random", "stairs", "triangle", "chirp", "release")
 HELD_OUT = ("random",)
-"""What is predicted only, as in the films' specs."""
+"""Recordings that are only predicted, as in the films' specs."""
 TYPICAL = (26.0, 524.0, 508.0)
 """a, b and c of the paper's neck."""
 SPREAD = 0.2
-"""Share by which a drawn plant may be off them."""
+"""Largest relative deviation of a drawn plant from `TYPICAL`."""
 DECLARED = 0.25
-"""Share of sessions whose neutral is declared although no steady torque asks for it."""
+"""Share of sessions with a declared neutral although no constant torque requires it."""
 NEAR_M, SMALLER, FARTHER = 0.6, 0.5, 2.0
-"""A wide lens stands close, and shows the rig so many times as large and as far from the picture's middle."""
+"""With lens distortion the camera is this close, m, and the rig this many times as large and as far from the middle."""
 SETTLED = 4
-"""Rounds in which the row of the mouth and the time of that row agree to far below a microsecond."""
+"""Iterations for the row of the mouth and the time of that row; they converge to far below a microsecond."""
 CLOSE = 0.02
-"""Share by which a ratio that was asked for may be missed."""
+"""Relative tolerance of a required ratio."""
 MOST_TRIALS = 40
 
 PLANT, MOVES, CAMERA, ZERO = range(4)
-"""Purposes of random numbers beside the noise's."""
+"""Purposes of random numbers other than noise, part of their seeds."""
 
 
 def session(
@@ -68,25 +67,25 @@ def session(
     ----------
     effects : mapping
         As under ``effects`` in a film's spec, and ``swing`` of ``linkage_geometry``: the share of the usual motion.
-        What a linkage does is fixed by its links; how much of it shows, by how far it moves.
+        A linkage's effect is fixed by its links, so its size is varied through the range of motion.
     seed : int
-        Of plant, commands, camera and noise; each of them is the same whatever the effects.
+        Seed of plant, commands, camera and noise, which do not depend on the effects.
     sigma_deg, phi : float
         Standard deviation of the noise, and its correlation from frame to frame.
     fps : float
-        Frames a second.
+        Frames per second.
     plant : (a, b, c), optional
-        1/s, 1/s², 1/s²; drawn otherwise.
+        1/s, 1/s², 1/s²; drawn by default.
 
     Returns
     -------
     list of Record
-        In a drawn order; their zero is known where it is declared, and the mean of the rest before otherwise.
+        In random order. Their zero is declared, or the mean of the rest before the first command change.
 
     Raises
     ------
     SpecError, ValidationError
-        Where an effect is so strong that the rig leaves its reach, or is none.
+        If an effect is so strong that the rig leaves its reach, or an effect is invalid.
     """
     spec = spec_of(effects, seed=seed, fps=fps, plant=plant)
     seen = look(spec)
@@ -111,35 +110,35 @@ def _residual(effects: tuple[tuple[str, tuple[tuple[str, float], ...]], ...], se
 
 
 def residual_deg(effects: Effects, seed: int, fps: float = 30) -> float:
-    """Return the RMS, in degrees, that the base model leaves of a session without noise; infinite for none."""
+    """Return the base model's RMS residual of a session without noise, °; infinite if the session is impossible."""
     return _residual(tuple((name, tuple(keys.items())) for name, keys in effects.items()), seed, fps)
 
 
 def scaled(
     direction: Effects, seed: int, ratio: float, *, sigma_deg: float = 0.05, fps: float = 30
 ) -> dict[str, dict[str, float]]:
-    """Magnify effects until each alone makes the base model leave ``ratio``·σ over all recordings without noise.
+    """Scale effects until for each alone the base model's residual is ``ratio``·σ over all recordings without noise.
 
     Parameters
     ----------
     direction : mapping
-        As from `benchmarks.blind.drawn.draw`.
+        Effects from `benchmarks.blind.drawn.draw`.
     seed : int
-        Of the session.
+        Seed of the session.
     ratio : float
         Base residual over noise, to within `CLOSE`.
     sigma_deg, fps : float
-        Of the session.
+        Noise, °, and frames per second of the session.
 
     Returns
     -------
     dict
-        For `session`.
+        Effects for `session`.
 
     Raises
     ------
     ValueError
-        Where no size of the effect does it.
+        If no size of the effect gives this residual.
     """
     return {
         name: _scaled_alone(name, dict(keys), seed, ratio * sigma_deg, fps)[name] for name, keys in direction.items()
@@ -147,7 +146,7 @@ def scaled(
 
 
 def _scaled_alone(name: str, keys: dict[str, float], seed: int, wanted_deg: float, fps: float) -> dict[str, Any]:
-    """Find the factor by a secant in logarithms, in which the residual is nearly straight, kept within its bracket."""
+    """Find the factor by a bracketed secant in logarithms, in which the residual is nearly linear."""
     low, high, at, slope = -math.inf, math.inf, 0.0, 1.0
     before: tuple[float, float] | None = None
     for _ in range(MOST_TRIALS):
@@ -171,7 +170,7 @@ def _scaled_alone(name: str, keys: dict[str, float], seed: int, wanted_deg: floa
 
 
 def spec_of(effects: Effects, *, seed: int, fps: float = 30, plant: tuple[float, float, float] | None = None) -> Spec:
-    """Draw what `synth` would film of a session."""
+    """Draw the spec that `synth` would film for a session."""
     a, b, c = plant or tuple(np.array(TYPICAL) * (1 + SPREAD * _rng(seed, PLANT).uniform(-1, 1, 3)))
     swing = effects.get("linkage_geometry", {}).get("swing", 1.0)
     bare = {name: {key: value for key, value in keys.items() if key != "swing"} for name, keys in effects.items()}
@@ -191,7 +190,7 @@ def spec_of(effects: Effects, *, seed: int, fps: float = 30, plant: tuple[float,
                 "facing": "left" if left else "right",
             },
             "camera": {"fps": fps, **({"distance_m": NEAR_M} if wide else {})},
-            # levels are drawn as angles of the head, which must stay within the reach of its links
+            # levels are drawn as head angles, which must stay within the reach of the linkage
             "recordings": _recordings(_rng(seed, MOVES), swing * float(b / c)),
         }
     )
@@ -216,7 +215,7 @@ def _recordings(rng: np.random.Generator, gain: float) -> list[dict[str, Any]]:
 
 
 def _record(spec: Spec, seen: Scenery, take: Take, known: bool) -> Record:
-    """Measure one take exactly, in line angles; a declared zero is the line that this camera shows at rest at 0."""
+    """Return the exact line angles of a take; a declared zero is the line's angle in this camera at rest at 0."""
     taken = take.table.taken
     rows = np.full(len(taken), seen.pinhole.lens_px[1])
     row_time = spec.effects.rolling_shutter.row_time_s if spec.effects.rolling_shutter else 0.0
@@ -245,7 +244,7 @@ def _record(spec: Spec, seen: Scenery, take: Take, known: bool) -> Record:
 
 
 def _from_zero(record: Record) -> Record:
-    """Count the angle from its mean before the command first changes, unless its zero is declared."""
+    """Subtract the mean before the first command change from the angle, unless its zero is declared."""
     if record.zero_known or record.command is None:
         return record
     zero = float(record.angle[record.time < record.command.first_change()].mean())
@@ -253,12 +252,12 @@ def _from_zero(record: Record) -> Record:
 
 
 def _line(arm: Floats, mirrored: bool) -> Floats:
-    """Angle of the line from mark to mouth, upward from ahead, rad; arm (…, 2) in px to the right and down."""
+    """Return the angle of the line from mark to mouth, upward positive, rad; arm (…, 2) in px to the right and down."""
     return np.arctan2(-arm[..., 1], -arm[..., 0] if mirrored else arm[..., 0])
 
 
 def _coloured(rng: np.random.Generator, n: int, phi: float) -> Floats:
-    """AR(1) noise of unit variance."""
+    """Return AR(1) noise of unit variance."""
     noise = rng.normal(size=n)
     for i in range(1, n):
         noise[i] = phi * noise[i - 1] + math.sqrt(1 - phi**2) * noise[i]

@@ -1,1 +1,1 @@
-"""Renderers behind one interface, and how far each is from exact areas."""
+"""Renderers behind one interface, and a measurement of their edge errors."""

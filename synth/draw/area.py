@@ -1,11 +1,11 @@
-"""Exact area coverage: the mean light of a pixel through which edges pass.
+"""Exact area coverage: the mean light of a pixel that edges cross.
 
-The pixel is a square that is cut into convex pieces, each of which shows one triangle. It begins as one piece that
-shows nothing. Triangle after triangle, nearest first, every piece is cut along the triangle's three sides, and, where
-the piece shows another one already, along the line in which the two planes meet; what lies within belongs to the new
-triangle. In the end each piece counts with its area and the light at its centre of mass, which is exact for light that
-is affine. No order of the triangles is wrong, only slower, so that bodies may overlap, pass through each other, or
-overlap in a circle.
+The pixel is a square that is cut into convex pieces, each showing one triangle. It begins as one piece that shows
+nothing. For each triangle, nearest first, every piece is cut along the triangle's three sides and, if the piece shows
+a triangle already, along the line in which the two planes meet; the part inside belongs to the new triangle. In the
+end each piece contributes its area times the light at its centre of mass, which is exact for affine light. The
+result does not depend on the order of the triangles, only the time does, so bodies may overlap, pass through each
+other, or overlap cyclically.
 
 Sources: polygon areas in each pixel, E. Catmull, "A hidden-surface algorithm with anti-aliasing", SIGGRAPH 1978; K.
 Weiler and P. Atherton, "Hidden surface removal using polygon area sorting", SIGGRAPH 1977; cutting a convex polygon, I.
@@ -23,16 +23,16 @@ Ints = NDArray[np.int32]
 
 _NOTHING = -1
 _ON_LINE = 1e-9
-"""A corner this close to a line lies on it, px: no piece is thinner, and no area more wrong."""
+"""A corner this close to a line counts as on it, px; bounds the thinness of pieces and the error of areas."""
 _SAME_DEPTH = 1e-9
-"""Relative difference of 1/depth that is rounding: of two triangles in one plane the first one stays."""
+"""Relative difference of 1/depth that counts as rounding: of two coplanar triangles the first one stays."""
 _PIECES, _CORNERS = 256, 24
-"""Room in a pixel. Where it is full, a piece goes undivided to the side on which its middle lies."""
+"""Capacity per pixel. Beyond it a piece is not divided but goes to the side on which its centre lies."""
 
 
 @njit(cache=True, error_model="numpy")
 def number(marked: NDArray[np.bool_]) -> tuple[Ints, Ints]:
-    """Count the marked pixels off, row by row.
+    """Count the marked pixels row by row.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def number(marked: NDArray[np.bool_]) -> tuple[Ints, Ints]:
     Returns
     -------
     tuple of ndarray
-        (s, 2), row and column of each; and (rows, width + 1), how many come before a pixel or the end of a row.
+        (s, 2), row and column of each; and (rows, width + 1), the count before each pixel and each row's end.
     """
     rows, width = marked.shape
     before = np.empty((rows, width + 1), np.int32)
@@ -126,7 +126,7 @@ def _longer(values: Ints) -> Ints:
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _sides(triangle: int, faces: Ints, pixels: Floats, x: float, y: float, lines: Floats) -> None:
-    """Lines (a, b, c) along a triangle's sides: a·(x' − x) + b·(y' − y) + c is positive inside."""
+    """Write the lines (a, b, c) along a triangle's sides: a·(x' − x) + b·(y' − y) + c is positive inside."""
     for e in range(3):
         p, q = faces[triangle, e], faces[triangle, e + 1 if e < 2 else 0]
         a, b = pixels[q, 1] - pixels[p, 1], pixels[p, 0] - pixels[q, 0]
@@ -147,7 +147,7 @@ def cover(
     first: int,
     light: NDArray[np.float32],
 ) -> None:
-    """Work out the mean light of each marked pixel; where nothing is seen it is dark.
+    """Compute the mean light of each marked pixel; where nothing is visible it is dark.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ def _sort(
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _apart(p: int, lines: Floats, xs: Floats, ys: Floats, size: int) -> bool:
-    """Whether one side of a triangle keeps it apart from piece p."""
+    """Return whether one side of a triangle separates it from piece p."""
     for e in range(3):
         a, b, c = lines[e, 0], lines[e, 1], lines[e, 2]
         most = -np.inf
@@ -244,7 +244,7 @@ def _apart(p: int, lines: Floats, xs: Floats, ys: Floats, size: int) -> bool:
 def _bounds(
     p: int, owner: int, k: int, planes: Floats, x: float, y: float, xs: Floats, ys: Floats, size: int, lines: Floats
 ) -> int:
-    """How many lines bound what triangle k takes of a piece: none if it stands behind, 4 where the planes meet."""
+    """Return how many lines bound triangle k's part of a piece: 0 if it is behind, 4 if the planes meet."""
     if owner == _NOTHING:
         return 3
     depth = planes[owner, 0, 0] * x + planes[owner, 0, 1] * y + planes[owner, 0, 2]
@@ -267,7 +267,7 @@ def _take(
     p: int, k: int, depth: float, lines: Floats, bounds: int, xs: Floats, ys: Floats, sizes: NDArray[np.int64],
     owners: NDArray[np.int64], farthest: Floats, pieces: int, spare: Floats,
 ) -> int:  # fmt: skip
-    """Give triangle k its share of piece p; what is cut off stays as it was, as new pieces. Return their number."""
+    """Assign triangle k's part of piece p; the cut-off parts become new pieces. Return the number of pieces."""
     for e in range(bounds):
         a, b, c = lines[e, 0], lines[e, 1], lines[e, 2]
         margin = _ON_LINE * (abs(a) + abs(b))
@@ -311,7 +311,7 @@ def _take(
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _centroid(p: int, xs: Floats, ys: Floats, size: int) -> tuple[float, float, float]:
-    """Area of a convex polygon and its centre of mass; its first corner where it has no area."""
+    """Return the area of a convex polygon and its centre of mass; its first corner if the area is 0."""
     x0, y0 = xs[p, 0], ys[p, 0]
     area = u = v = 0.0
     for i in range(1, size - 1):

@@ -1,10 +1,10 @@
-"""Where the triangles stand in the picture, and which of them is nearest at the centre of each pixel.
+"""Projects the triangles and finds the nearest one at the centre of each pixel.
 
-Seen through a pinhole, 1/depth of a flat triangle is affine in the picture, and so is its light times 1/depth; both are
-kept as planes q(x, y) = gx·x + gy·y + q0. Nothing is carried on from pixel to pixel or from row to row, so that a band
-of rows comes out bit for bit as it does in the whole picture.
+Through a pinhole 1/depth of a flat triangle is affine in the picture, and so is its light times 1/depth; both are
+kept as planes q(x, y) = gx·x + gy·y + q0. No value is carried over from pixel to pixel or from row to row, so that a
+band of rows equals the same rows of the whole picture bit for bit.
 
-Compiled functions here call none of another file, or the compiler's cache on disk would not notice a change there.
+Compiled functions here call no function of another file, because the compiler's disk cache would miss changes there.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 NOTHING = -1
-"""In place of a triangle where none is seen."""
+"""Index of no triangle."""
 
 _SMALLEST = 1e-9
 """Twice the area, px², below which a triangle is seen edge-on and covers nothing."""
@@ -36,7 +36,7 @@ def project(
     pixels: Floats,
     inverse_depth: Floats,
 ) -> None:
-    """Find the vertices' places in the picture, as `Pinhole.draw` does.
+    """Project the vertices, as `Pinhole.draw` does.
 
     Parameters
     ----------
@@ -82,14 +82,14 @@ def face_camera(
     used: Ints,
     touched: NDArray[np.bool_],
 ) -> tuple[int, int]:
-    """List the triangles that look at the camera and reach into a band of rows, and their vertices.
+    """List the triangles that face the camera and reach into a band of rows, and their vertices.
 
     Parameters
     ----------
     faces, pixels, inverse_depth : ndarray
         (m, 3), (n, 2) and (n,).
     width : int
-        Of the picture, px.
+        Width of the picture, px.
     top, bottom : float
         Upper and lower border of the band, px.
     front : ndarray
@@ -97,19 +97,19 @@ def face_camera(
     seen, used : ndarray
         (m,) and (n,), their first entries written: the triangles and the vertices in the list.
     touched : ndarray
-        (n,), room for work.
+        (n,), workspace.
 
     Returns
     -------
     tuple of int
-        How many entries of `seen` and of `used` count.
+        Number of valid entries of `seen` and of `used`.
     """
     touched[:] = False
     faces_seen = vertices_used = 0
     for t in range(len(faces)):
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         xa, ya, xb, yb, xc, yc = pixels[a, 0], pixels[a, 1], pixels[b, 0], pixels[b, 1], pixels[c, 0], pixels[c, 1]
-        # y points down: what is counter-clockwise to the eye has a negative area
+        # y points down, so a triangle that appears counter-clockwise has a negative area
         looks = (xb - xa) * (yc - ya) - (xc - xa) * (yb - ya) < -_SMALLEST
         inside = (
             max(ya, yb, yc) >= top and min(ya, yb, yc) <= bottom and max(xa, xb, xc) >= -0.5
@@ -166,7 +166,7 @@ def find_nearest(
     owner: Ints,
     depths: Floats,
 ) -> None:
-    """Find the nearest triangle at each pixel's centre; of two with a common edge exactly one has a centre on it.
+    """Find the nearest triangle at each pixel's centre; a centre on a common edge belongs to exactly one triangle.
 
     Parameters
     ----------
@@ -190,9 +190,9 @@ def find_nearest(
         ya, yb, yc = pixels[faces[t, 0], 1], pixels[faces[t, 1], 1], pixels[faces[t, 2], 1]
         top, bottom = max(np.ceil(min(ya, yb, yc)), first), min(np.ceil(max(ya, yb, yc)), first + rows)
         if top >= bottom or np.ceil(min(xa, xb, xc)) >= np.ceil(max(xa, xb, xc)):
-            continue  # no pixel's centre lies between its sides
+            continue  # contains no pixel's centre
         for e in range(3):
-            # Both triangles at an edge reckon from its upper end, so that rounding opens no crack between them.
+            # Both triangles at an edge compute from its upper end, so that rounding leaves no gap between them.
             a, b = faces[t, e], faces[t, e + 1 if e < 2 else 0]
             if pixels[a, 1] > pixels[b, 1] or (pixels[a, 1] == pixels[b, 1] and pixels[a, 0] > pixels[b, 0]):
                 a, b = b, a
@@ -213,7 +213,7 @@ def find_nearest(
             ids, parts = nearest[row - first, begin:end], owner[row - first, begin:end]
             near = depths[row - first, begin:end]
             for i in range(end - begin):
-                # all three are written in any case: without a branch the loop runs many pixels at a time
+                # all three are always written: without a branch the loop is vectorised
                 q = gx * (begin + i) + there
                 nearer = q > near[i]
                 near[i] = q if nearer else near[i]
@@ -223,7 +223,7 @@ def find_nearest(
 
 @njit(cache=True, error_model="numpy")
 def light_centres(nearest: Ints, planes: Floats, first: int, light: NDArray[np.float32]) -> None:
-    """Give each pixel the light at its centre.
+    """Write the light at each pixel's centre.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def light_centres(nearest: Ints, planes: Floats, first: int, light: NDArray[np.f
     for row in range(rows):
         y, end = float(row + first), 0
         while end < width:
-            # one run of pixels that show the same triangle at a time
+            # one run of pixels with the same triangle at a time
             begin, k = end, nearest[row, end]
             while end < width and nearest[row, end] == k:
                 end += 1

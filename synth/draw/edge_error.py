@@ -1,12 +1,12 @@
-"""How far an engine's edges are from where they belong: pictures of shapes whose pixel areas are known in closed form.
+"""Edge error of a renderer, measured on shapes whose pixel areas are known in closed form.
 
 A bright half-plane and a bright disc stand before a dark sheet, square to the camera. Each pixel's share of brightness
-is compared with the area of the shape in the pixel's square. An edge that is wrong by d px along its normal changes a
-pixel by d times the length of edge in it, so that the errors e of the pixels and the lengths l turn into a distance:
-sqrt(Σe²/Σl²) is the RMS over the pixels; Σel/Σl² the displacement of the whole edge that fits the picture best, which
-is what an estimator would see.
+is compared with the area of the shape in the pixel's square. An edge that is displaced by d px along its normal changes
+a pixel by d times the length of edge in it. From the errors e of the pixels and the lengths l follow two distances:
+sqrt(Σe²/Σl²), the RMS over the pixels, and Σel/Σl², the best-fitting displacement of the whole edge, which biases an
+estimator.
 
-The areas come from integrals written down here, not from anything that an engine uses.
+The areas come from integrals derived here and share no code with the engines.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ MakeEngine = Callable[[Sequence[Part], Pinhole, str, float], Engine]
 
 _FOCAL, _DISTANCE = 2000.0, 1.5
 _BEHIND = -0.01
-"""Where the dark sheet stands, m."""
+"""z of the dark sheet, m."""
 _GOLDEN = (math.sqrt(5) - 1) / 2
 _SECTIONS = 1024
-"""Of the polygon that stands for the disc: at 24 px its sides are within 1e-4 px of the circle, in and out in turn."""
+"""Sides of the disc's polygon: at 24 px radius they are within 1e-4 px of the circle, both inside and outside."""
 
 
 @dataclass(frozen=True)
 class EdgeError:
-    """Errors of a renderer's edges, px, each the root of a mean square."""
+    """RMS errors of a renderer's edges, px."""
 
     half_plane_px: float
     """Displacement of a straight edge, pixel by pixel."""
@@ -45,7 +45,7 @@ class EdgeError:
     disc_px: float
     """Displacement of a circle's edge, pixel by pixel."""
     disc_centre_px: float
-    """Displacement of a disc's centre of brightness, in x and in y, from that of the exact picture."""
+    """Displacement of a disc's centre of brightness in x and in y from that of the exact picture."""
     worst_px: float
     """Largest error of a pixel's share of brightness anywhere, as a displacement of an edge of 1 px length."""
 
@@ -58,16 +58,16 @@ def edge_error(
     Parameters
     ----------
     make : callable
-        Of parts, camera, quality and gamma, gives the engine, such as `synth.draw.raster.Raster`. It may give out
-        light in steps of 1/255.
+        Takes parts, camera, quality and gamma and returns the engine, for example `synth.draw.raster.Raster`. Its light
+        may be quantised in steps of 1/255.
     quality : str
-        Handed on to the engine.
+        Passed to the engine.
     size : tuple of int
-        Of the pictures; the disc must have room in them.
+        Size of the pictures; the disc must fit in them.
     radius_px : float
-        Of the disc.
+        Radius of the disc.
     trials : int
-        Pictures of each shape, at angles and places within a pixel that are spread evenly.
+        Pictures of each shape, at evenly spread angles and subpixel positions.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def edge_error(
 
 
 def half_plane_area(distance: ArrayLike, normal: ArrayLike) -> Floats:
-    """Find how much of a unit square lies in a half-plane.
+    """Return the area of a unit square within a half-plane.
 
     The square's width along the normal n is the sum of two independent uniform variables of widths |nx| and |ny|;
     the area is the distribution function of that sum.
@@ -137,14 +137,14 @@ def half_plane_area(distance: ArrayLike, normal: ArrayLike) -> Floats:
     if narrow < 1e-7:
         return np.clip(d / wide + 0.5, 0.0, 1.0)
     below, far, near = np.abs(d), (wide + narrow) / 2, (wide - narrow) / 2
-    # the share that is cut off on the smaller side
+    # the area on the smaller side of the border
     corner = np.maximum(far - below, 0.0) ** 2 / (2 * wide * narrow)
     share = np.where(below >= near, corner, 0.5 - below / wide)
     return np.where(d > 0, 1.0 - share, share)
 
 
 def half_plane_chord(distance: ArrayLike, normal: ArrayLike) -> Floats:
-    """Find the length of a straight line within a unit square, the derivative of `half_plane_area`."""
+    """Return the length of a straight line within a unit square, the derivative of `half_plane_area`."""
     d = np.abs(np.asarray(distance, dtype=float))
     wide, narrow = np.sort(np.abs(np.asarray(normal, dtype=float)))[::-1]
     if narrow < 1e-7:
@@ -153,14 +153,14 @@ def half_plane_chord(distance: ArrayLike, normal: ArrayLike) -> Floats:
 
 
 def disc_area(x: ArrayLike, y: ArrayLike, radius: float) -> Floats:
-    """Find how much of unit squares lies in a disc about the origin.
+    """Return the area of unit squares within a disc about the origin.
 
     Parameters
     ----------
     x, y : array_like
-        Middles of the squares.
+        Centres of the squares.
     radius : float
-        Of the disc.
+        Radius of the disc.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def disc_area(x: ArrayLike, y: ArrayLike, radius: float) -> Floats:
 
 
 def _under_circle(left: Floats, right: Floats, height: Floats, radius: float) -> Floats:
-    """Area of the disc between left and right, and between the x axis and a height; negative below the axis."""
+    """Return the disc's area between left and right and between the x axis and a height; negative below the axis."""
     h = np.minimum(np.abs(height), radius)
     corner = np.sqrt(radius**2 - h**2)  # where the circle falls below the height
     flat = h * (np.clip(right, -corner, corner) - np.clip(left, -corner, corner))
@@ -183,13 +183,13 @@ def _under_circle(left: Floats, right: Floats, height: Floats, radius: float) ->
 
 
 def _circle_integral(x: Floats, radius: float) -> Floats:
-    """∫ √(r² − x²) dx from 0, constant beyond the circle."""
+    """Return ∫ √(r² − x²) dx from 0, constant beyond the circle."""
     s = np.clip(x / radius, -1.0, 1.0)
     return np.asarray(radius**2 / 2 * (s * np.sqrt(1 - s**2) + np.arcsin(s)))
 
 
 def _disc_chord(x: Floats, y: Floats, radius: float) -> Floats:
-    """Length of the circle in unit squares, as the tangent next to their middles has it."""
+    """Return the length of the circle in unit squares, approximated by the tangent nearest to their centres."""
     away = np.hypot(x, y)
     towards = np.arctan2(y, x)
     wide = np.maximum(np.abs(np.cos(towards)), np.abs(np.sin(towards)))
@@ -205,7 +205,7 @@ def _ratio(sums: list[list[float]]) -> float:
 def _pictures(
     make: MakeEngine, quality: str, camera: Pinhole, shape: trimesh.Trimesh, angles: Floats, offsets: Floats
 ) -> list[Floats]:
-    """Draw a bright shape at every place: share of its brightness, (height, width) each."""
+    """Draw a bright shape at every place; return its share of brightness, (height, width) each."""
     reach = 20.0 * max(camera.size)
     dark = _sheet(np.array([[-reach, -reach], [reach, -reach], [reach, reach], [-reach, reach]]), camera)
     dark.apply_translation([0.0, 0.0, _BEHIND])
@@ -214,7 +214,7 @@ def _pictures(
     try:
         drawn = []
         for angle, (u, v) in zip(angles, offsets, strict=True):
-            # turned clockwise, as y points down in the picture, and moved there
+            # rotated clockwise, because y points down in the picture, then translated
             pose = np.eye(4)
             pose[:2, :2] = [[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]]
             pose[:3, 3] = camera.place((float(u), float(v)), 0.0)
@@ -227,7 +227,7 @@ def _pictures(
 
 
 def _sheet(pixels: Floats, camera: Pinhole) -> trimesh.Trimesh:
-    """Flat convex polygon in the plane of motion from its corners, px from the principal point, y down."""
+    """Return a flat convex polygon in the plane of motion from its corners, px from the principal point, y down."""
     scale = camera.distance_m / camera.focal_px
     corners = np.column_stack([pixels * [scale, -scale], np.zeros(len(pixels))])
     middle = corners.mean(axis=0)

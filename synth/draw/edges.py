@@ -1,8 +1,8 @@
-"""Which pixels an edge crosses: those, and no others, need more than the light at their centre.
+"""Marks the pixels that an edge crosses; only those need more than the light at their centre.
 
-The edges themselves are walked, not the picture, so that a needle thinner than a pixel is found as well. What remains
-are the lines in which two bodies pass through each other, where no mesh has an edge: there the sign of the difference
-of their depths changes from one pixel's centre to the next.
+The search walks along the edges, not over the picture, so that a needle thinner than a pixel is found too. Lines in
+which two bodies pass through each other are not mesh edges: there the sign of the difference of the bodies' depths
+changes between neighbouring pixels' centres.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ Ints = NDArray[np.int32]
 Bools = NDArray[np.bool_]
 
 _CLOSE = 1e-6
-"""An edge that comes this close to a pixel crosses it, px."""
+"""An edge this close to a pixel counts as crossing it, px."""
 _BEHIND = 1e-9
-"""Relative difference of 1/depth that is rounding."""
+"""Relative difference of 1/depth that counts as rounding."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -39,23 +39,23 @@ def mark_edges(
     first: int,
     marked: Bools,
 ) -> None:
-    """Mark the pixels that an edge crosses which may be seen there.
+    """Mark the pixels crossed by an edge that may be visible there.
 
-    An edge is hidden in a pixel if all the pixel's neighbours show something nearer and of another part: some of them
-    stand on either side of the edge. A nearer surface that leaves part of the pixel open has an edge of its own there.
+    An edge is hidden in a pixel if all neighbours of the pixel show something nearer and of another part, because the
+    neighbours lie on both sides of the edge. A nearer surface that covers only part of the pixel has an edge there too.
 
     Parameters
     ----------
     edges, sides, sharp : ndarray
         Of `Surface`.
     front : ndarray
-        (m,), triangles that look at the camera.
+        (m,), whether a triangle faces the camera.
     part : ndarray
         (m,), their parts.
     pixels, inverse_depth : ndarray
         (n, 2) and (n,), of the vertices.
     every : bool
-        Every edge counts, not only those at which the picture breaks.
+        Whether every edge counts, not only those with a discontinuity of the picture.
     owner, depths : ndarray
         (rows, width), `synth.draw.depth.find_nearest`.
     margin : int
@@ -82,7 +82,7 @@ def mark_edges(
         top = max(int(np.floor(ya + 0.5 - _CLOSE)), first)
         bottom = min(int(np.floor(yb + 0.5 + _CLOSE)), first + rows - 1)
         for row in range(top, bottom + 1):
-            # the piece of the edge that lies in this row of pixels, as shares of its length
+            # the part of the edge within this row of pixels, as fractions of its length
             begin = min(max((row - 0.5 - ya) * across, 0.0), 1.0)
             end = min(max((row + 0.5 - ya) * across, 0.0), 1.0) if yb > ya else 1.0
             x0, x1 = xa + begin * (xb - xa), xa + end * (xb - xa)
@@ -105,7 +105,7 @@ def _visible(owner: Ints, depths: Floats, row: int, x: int, mine: int, closest: 
 
 @njit(cache=True, error_model="numpy")
 def mark_passages(nearest: Ints, owner: Ints, planes: Floats, margin: int, first: int, marked: Bools) -> None:
-    """Mark the pixels between whose centres two parts pass through each other.
+    """Mark neighbouring pixels between whose centres two parts pass through each other.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def mark_passages(nearest: Ints, owner: Ints, planes: Floats, margin: int, first
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _pass(planes: Floats, one: int, two: int, x: int, y: int, u: int, v: int) -> bool:
-    """Whether triangle one stands before triangle two at (x, y), and behind it at (u, v)."""
+    """Return whether triangle one is in front of triangle two at (x, y) and behind it at (u, v)."""
     gx = planes[one, 0, 0] - planes[two, 0, 0]
     gy = planes[one, 0, 1] - planes[two, 0, 1]
     q0 = planes[one, 0, 2] - planes[two, 0, 2]

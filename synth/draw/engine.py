@@ -1,4 +1,4 @@
-"""What any renderer does for us, so that the film does not care which one draws it."""
+"""The interface of a renderer."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from synth.spec import Render
 
 
 class Engine(Protocol):
-    """A scene of parts, ready to be drawn again and again."""
+    """A scene of parts that can be drawn repeatedly."""
 
     def draw(self, camera: Pinhole, poses: Mapping[str, NDArray[np.float64]], rows: slice) -> NDArray[np.float32]:
-        """Light of the wanted rows at one instant: (rows, width, 3), 0 to 1, before mirroring."""
+        """Return the light of some rows at one instant: (rows, width, 3), 0 to 1, before mirroring."""
         ...
 
     def close(self) -> None:
-        """Give back what the machine lent."""
+        """Release the engine's resources."""
         ...
 
 
 def make_engine(render: Render, parts: Sequence[Part], camera: Pinhole, gamma: float) -> Engine:
-    """Set a scene up; each engine's libraries are loaded only where it is used.
+    """Set up a scene; an engine's libraries are loaded only if it is used.
 
     Parameters
     ----------
     render : Render
         Engine and quality.
     parts : sequence of Part
-        All that can be seen.
+        Everything visible.
     camera : Pinhole
         The camera at rest.
     gamma : float
@@ -42,7 +42,7 @@ def make_engine(render: Render, parts: Sequence[Part], camera: Pinhole, gamma: f
     Returns
     -------
     Engine
-        To be closed in the end.
+        The caller closes it.
     """
     if render.engine == "pyrender":
         from synth.draw.gl import Gl

@@ -1,8 +1,8 @@
-"""The one place where pyrender is imported: pictures of a scene without a screen, through EGL.
+"""Draws a scene off-screen with pyrender through EGL; the only module that imports pyrender.
 
-pyrender pulls in its on-screen viewer at import, and with it pyglet and X11. A stand-in takes the viewer's place. Of
-pyrender only what works with numpy 2 is used: no bounds, no scale, no shadows. Its own physically based shader works
-at every pixel and takes five times as long on a machine without a GPU as ours, which works at the vertices.
+pyrender imports its on-screen viewer, and with it pyglet and X11, so the viewer is replaced by a stand-in. Only the
+parts of pyrender that work with numpy 2 are used: no bounds, no scale, no shadows. pyrender's physically based shader
+works per pixel and takes five times as long on a machine without a GPU as the shader here, which works per vertex.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from synth.draw.light import AMBIENT, LAMPS, TONE
 from synth.mechanism import Part
 
 os.environ["PYOPENGL_PLATFORM"] = "egl"
-# Mesa's software rasteriser would start a thread for every core in each of our workers.
+# Mesa's software rasteriser would start a thread per core in each worker process.
 os.environ.setdefault("LP_NUM_THREADS", "1")
 _viewer = ModuleType("pyrender.viewer")
 _viewer.Viewer = None  # type: ignore[attr-defined]
@@ -34,8 +34,8 @@ from pyrender.shader_program import ShaderProgramCache  # noqa: E402
 Floats = NDArray[np.float64]
 
 SAMPLES = {"draft": (1, 1), "standard": (2, 1), "metrology": (2, 4)}
-"""Pictures are drawn this many times too large and reduced, with four samples a pixel by OpenGL itself; and so many
-times in each direction, shifted by fractions of a pixel."""
+"""Oversampling: the factor by which pictures are drawn larger and then reduced, with OpenGL's four samples per pixel;
+and the number of drawings in each direction, shifted by fractions of a pixel."""
 
 _VERTEX = """#version 330 core
 layout(location = 0) in vec3 position;
@@ -57,7 +57,7 @@ void main()
     shade = clamp(pow(color_0.rgb * light, vec3({encode})), 0.0, 1.0);
 }}
 """
-"""Light adds up at the vertices; the lens distorts about the middle of the picture, where OpenGL has its zero."""
+"""Light is summed at the vertices; the lens distorts about the middle of the picture, which is OpenGL's origin."""
 
 _FRAGMENT = """#version 330 core
 in vec3 shade;
@@ -70,14 +70,14 @@ void main()
 
 
 class Gl:
-    """A scene and the OpenGL renderer that films it; one at a time in a process, closed before the process ends."""
+    """A scene and its OpenGL renderer; a process holds one at a time and closes it before it ends."""
 
     def __init__(self, parts: Sequence[Part], camera: Pinhole, quality: str, gamma: float) -> None:
         self._size = camera.size
         self._times, self._passes = SAMPLES[quality]
         self._light = ((np.arange(256) / 255.0) ** gamma).astype(np.float32)
         self._scene = pyrender.Scene()
-        # One primitive a body: every draw call costs as much as a thousand triangles.
+        # One primitive per body: every draw call costs as much as a thousand triangles.
         bodies = sorted({part.body for part in parts})
         self._nodes = {
             body: self._scene.add(pyrender.Mesh([_primitive([part for part in parts if part.body == body])]))
@@ -91,7 +91,7 @@ class Gl:
         self._renderer = pyrender.OffscreenRenderer(width, height)
         self._shaders = tempfile.TemporaryDirectory()
         _write_shaders(Path(self._shaders.name), camera)
-        # pyrender offers no other door to a shader of one's own.
+        # pyrender offers no other way to set a custom shader.
         self._renderer._renderer._program_cache = ShaderProgramCache(self._shaders.name)
 
     def draw(self, camera: Pinhole, poses: Mapping[str, Floats], rows: slice) -> NDArray[np.float32]:
@@ -100,11 +100,11 @@ class Gl:
         Parameters
         ----------
         camera : Pinhole
-            Where the camera is at that instant; size, lens and focal length are those given at the beginning.
+            The camera at that instant; size, lens and focal length must be those of the constructor.
         poses : mapping of str to ndarray
             (4, 4) pose of every body.
         rows : slice
-            Which rows of the picture are wanted; the whole is drawn anyway.
+            Rows to return; the whole picture is drawn anyway.
 
         Returns
         -------
@@ -122,12 +122,12 @@ class Gl:
         return np.asarray(total / self._passes**2, dtype=np.float32)[rows]
 
     def close(self) -> None:
-        """Give the graphics memory back."""
+        """Release the graphics memory."""
         self._renderer.delete()
         self._shaders.cleanup()
 
     def _once(self, camera: Pinhole, dx: float, dy: float) -> NDArray[np.float32]:
-        # OpenGL counts from the corner of the corner pixel, we from its centre.
+        # OpenGL's origin is the corner of the corner pixel, ours its centre.
         self._lens.cx, self._lens.cy = (
             self._times * (at + shift + 0.5) for at, shift in zip(camera.principal_px, (dx, dy), strict=True)
         )
@@ -140,7 +140,7 @@ class Gl:
 
 
 def _primitive(parts: Sequence[Part]) -> pyrender.Primitive:
-    """Put parts that move together into one piece."""
+    """Merge parts that move together into one primitive."""
     sizes = [len(part.mesh.vertices) for part in parts]
     firsts = np.cumsum([0, *sizes[:-1]])
     linear = (np.vstack([part.colours for part in parts]) / 255.0) ** TONE
@@ -154,7 +154,7 @@ def _primitive(parts: Sequence[Part]) -> pyrender.Primitive:
 
 
 def _write_shaders(folder: Path, camera: Pinhole) -> None:
-    """Write the two shaders under the names by which pyrender looks for its flat ones."""
+    """Write the two shaders under the file names of pyrender's flat shaders."""
     lamps = " + ".join(
         f"{strength} * max(dot(n, normalize(vec3({x}, {y}, {z}))), 0.0)" for (x, y, z), strength in LAMPS
     )

@@ -1,7 +1,7 @@
-"""How the rig is lit: soft light from everywhere and two lamps, worked out at the vertices.
+"""Lighting of the rig: ambient light and two lamps, computed at the vertices.
 
-The lamps stand still in the room, so the shade of the head changes as it turns, but little: most light is ambient.
-Both engines take these numbers, so that they draw the same picture.
+The lamps are fixed in the room, so the head's shading changes as it turns, but little, because most light is ambient.
+Both engines use these numbers, so that they draw the same picture.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ Floats = NDArray[np.float64]
 
 AMBIENT = 0.66
 LAMPS = (((0.24, 0.52, 0.82), 0.36), ((0.86, 0.17, 0.48), 0.12))
-"""Direction from the rig to the lamp, of about unit length, and its strength."""
+"""For each lamp the direction from the rig, of approximately unit length, and its strength."""
 
 TONE = 2.2
-"""Gamma of the display: (grey/255)^2.2 is what a surface of that colour sends back of the light that falls on it."""
+"""Gamma of the display: a surface of a colour reflects the share (grey/255)^2.2 of the light."""
 
 _LAMPS = np.array([[*np.divide(towards, np.linalg.norm(towards)), strength] for towards, strength in LAMPS])
 
 
 def albedo(colours: Floats, gamma: float) -> Floats:
-    """Turn display colours into what a sensor of another gamma makes of them in full light.
+    """Convert display colours to the light that a sensor of another gamma measures in full illumination.
 
     Parameters
     ----------
     colours : ndarray
         (n, 3), sRGB, 0-255.
     gamma : float
-        Of the sensor: its light is (grey/255)^gamma, and 1 takes the display's grey levels as light.
+        Gamma of the sensor: its light is (grey/255)^gamma, and 1 takes the display's grey levels as light.
 
     Returns
     -------
@@ -49,10 +49,10 @@ def light_vertices(
     gamma: float,
     light: Floats,
 ) -> None:
-    """Shade the vertices that are seen, as the shader of the other engine does.
+    """Shade the used vertices, as the shader of `synth.draw.gl` does.
 
-    Its grey level is clamp(((colour/255)^2.2 · E)^(1/2.2)), E the light that falls on the vertex; to the power
-    `gamma` that is min(albedo · E^(gamma/2.2), 1).
+    The shader's grey level is clamp(((colour/255)^2.2 · E)^(1/2.2)) with E the light on the vertex; to the power
+    `gamma` this is min(albedo · E^(gamma/2.2), 1).
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def light_vertices(
     normals, albedo : ndarray
         (n, 3) each.
     body : ndarray
-        (n,), the row of `turns` that moves a vertex.
+        (n,), each vertex's row of `turns`.
     turns : ndarray
         (b, 3, 3), linear part of each body's pose.
     gamma : float

@@ -1,9 +1,8 @@
-"""The engine that needs no graphics library: every edge of the picture with its exact area in each pixel.
+"""The engine without a graphics library: every edge of the picture covers its exact area in each pixel.
 
-The centre of each pixel finds the nearest triangle there (a depth buffer). Where the picture breaks, and only there,
-the pixel is cut up and every visible triangle counts with its area; everywhere else the light at the centre is the
-pixel's mean as far as light is affine. A band of rows comes out bit for bit as it does in the whole picture, and the
-same on every run.
+A depth buffer finds the nearest triangle at the centre of each pixel. Pixels with a discontinuity are cut up, and every
+visible triangle counts with its area. In all other pixels the light at the centre is the pixel's mean, as far as light
+is affine. A band of rows equals the same rows of the whole picture bit for bit, and every run gives the same result.
 """
 
 from __future__ import annotations
@@ -24,23 +23,23 @@ from synth.mechanism import Part
 Floats = NDArray[np.float64]
 
 _MARGIN = 1
-"""Rows beyond a band whose depths tell what its pixels' neighbours show."""
+"""Extra rows on each side of a band, whose depths `mark_edges` compares with the band's."""
 
 
 class Raster:
-    """A scene that is drawn on the processor, one core.
+    """A scene drawn on one processor core.
 
     Parameters
     ----------
     parts : sequence of Part
-        All that can be seen: closed bodies wound outwards, or sheets that face the camera. The lens bends vertices, not
-        edges, so that long edges before a bending lens must be made of short ones.
+        Everything visible: closed bodies wound outwards, or sheets that face the camera. The lens moves vertices, not
+        edges, so with a distorting lens long edges must be made of short ones.
     camera : Pinhole
-        The camera at rest, of which only the size of the picture counts.
+        The camera at rest; only the size of the picture is used.
     quality : str
-        ``draft``: the light at each pixel's centre, edges are jagged. ``standard``: exact areas wherever the picture
-        breaks: silhouettes, sharp edges, borders of colour, bodies passing through each other. ``metrology``: exact
-        areas in every pixel through which the edge of any triangle passes.
+        ``draft``: the light at each pixel's centre, with jagged edges. ``standard``: exact areas at every
+        discontinuity: silhouettes, sharp edges, borders of colour, bodies passing through each other. ``metrology``:
+        exact areas in every pixel that the edge of any triangle crosses.
     gamma : float
         Light is (grey level / 255) to this power.
     """
@@ -63,11 +62,11 @@ class Raster:
         Parameters
         ----------
         camera : Pinhole
-            Where the camera is at that instant; its size is the one given at the beginning.
+            The camera at that instant; its size must be that of the constructor.
         poses : mapping of str to ndarray
-            (4, 4) pose of every body; it may stretch.
+            (4, 4) pose of every body; it may include stretching.
         rows : slice
-            Which rows of the picture are wanted; only they are drawn.
+            Rows to draw.
 
         Returns
         -------
@@ -104,12 +103,12 @@ class Raster:
         return light
 
     def close(self) -> None:
-        """Nothing was lent; there is nothing to give back."""
+        """Do nothing: the engine holds no resources."""
 
     def _set_up(
         self, camera: Pinhole, poses: Mapping[str, Floats], top: int, bottom: int
     ) -> tuple[NDArray[np.int32], Floats]:
-        """Project and light whatever reaches into rows `top` to `bottom`: triangles and their planes."""
+        """Project and light the triangles that reach into rows `top` to `bottom`; return them and their planes."""
         surface = self._surface
         placed = np.array([poses[body][:3] for body in surface.bodies], dtype=float)
         project(

@@ -1,8 +1,8 @@
-"""All parts as one heap of triangles, and the edges along which the picture may break.
+"""All parts joined to one set of triangles, and the edges along which the picture may be discontinuous.
 
-Across most edges of a mesh nothing happens: the light goes on continuously and one pixel on it is as good as another.
-The picture breaks only where the surface ends, where its normals or its colour jump (a *sharp* edge), or where one of
-the two triangles looks away from the camera (the silhouette, which depends on the pose).
+Across most edges of a mesh the light is continuous. The picture is discontinuous only where the surface ends, where its
+normals or its colour jump (a *sharp* edge), or where one of the two triangles faces away from the camera (the
+silhouette, which depends on the pose).
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 _SAME_PLACE = 1e-9
-"""Vertices of a part that lie this close are one point, m."""
+"""Vertices of a part this close together count as one point, m."""
 _SAME_LOOK = 1e-6
-"""Difference of normals or of colours (0-255) that does not show."""
+"""Difference of normals or of colours (0-255) that counts as invisible."""
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Every part of the scene, each body in its own frame."""
+    """Every part of the scene, each body in its frame."""
 
     bodies: tuple[str, ...]
-    """Names by which poses are given."""
+    """Names of the bodies, the keys of the poses."""
     vertices: Floats
     """(n, 3), m."""
     normals: Floats
@@ -42,29 +42,29 @@ class Surface:
     faces: Ints
     """(m, 3), counter-clockwise seen from outside."""
     part: Ints
-    """(m,), number of the part that a face belongs to."""
+    """(m,), number of the face's part."""
     edges: Ints
     """(e, 2), vertices."""
     sides: Ints
-    """(e, 2), faces that meet there; -1 where there is no second one."""
+    """(e, 2), faces that meet there; -1 in place of a missing second face."""
     sharp: NDArray[np.bool_]
-    """(e,), whether the picture breaks there however the edge is seen."""
+    """(e,), whether the picture is discontinuous there in every view."""
 
 
 def join(parts: Sequence[Part], gamma: float) -> Surface:
-    """Heap up parts.
+    """Join parts.
 
     Parameters
     ----------
     parts : sequence of Part
         In their bodies' frames.
     gamma : float
-        Of the sensor, see `synth.draw.light.albedo`.
+        Gamma of the sensor, see `synth.draw.light.albedo`.
 
     Returns
     -------
     Surface
-        Its vertices and faces in the order of the parts.
+        With vertices and faces in the order of the parts.
     """
     bodies = tuple(sorted({part.body for part in parts}))
     vertices = np.vstack([part.mesh.vertices for part in parts]).astype(float)
@@ -93,7 +93,7 @@ def join(parts: Sequence[Part], gamma: float) -> Surface:
 def _edges(
     vertices: Floats, looks: Floats, faces: Ints, owner: NDArray[np.int64]
 ) -> tuple[Ints, Ints, NDArray[np.bool_]]:
-    """Find which faces of a part meet at which edge, though they may have vertices of their own there."""
+    """Find the faces of a part that meet at each edge, even if they do not share its vertices."""
     places = np.column_stack([owner, np.round(vertices / _SAME_PLACE)])
     place = np.unique(places, axis=0, return_inverse=True)[1].ravel()
     half = np.vstack([faces[:, [k, (k + 1) % 3]] for k in range(3)])
@@ -109,7 +109,7 @@ def _edges(
     firsts = np.flatnonzero(new)
     pairs = firsts[count == 2]
     differ = np.abs(looks[half[pairs]] - looks[half[pairs + 1]]).max(axis=(1, 2)) > _SAME_LOOK
-    # Where one face ends, or more than two meet, each is an end of its own.
+    # Where a single face ends, or more than two meet, each face has a separate edge.
     alone = np.repeat(count != 2, count)
     edges = np.vstack([half[pairs], half[alone]])
     sides = np.vstack(

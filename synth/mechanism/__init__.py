@@ -1,4 +1,4 @@
-"""The rig and the scene as triangles, built from the spec's own dimensions, and the poses of all that moves."""
+"""The rig and the scene as triangles with the spec's dimensions, and the poses of all moving bodies."""
 
 from synth.mechanism.assembly import build, poses
 from synth.mechanism.head import mouth_centre

@@ -1,4 +1,4 @@
-"""An antenna on the head: what swings by itself where a spec has a flexible appendage."""
+"""An antenna on the head, which shows the motion of the effect `flexible_appendage`."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from synth.mechanism.solids import joined, placed, rod, turn, turned
 Floats = NDArray[np.float64]
 
 HINGE = (-46 * MM, 150 * MM)
-"""On the back of the crown, m."""
+"""Position of the hinge on the back of the crown, m."""
 _LEAN = math.radians(32)
-"""Of the antenna at rest, backwards from upright."""
+"""Angle of the antenna at rest, backwards from upright, rad."""
 _LENGTH, _RADIUS, _TIP = 48 * MM, 1.4 * MM, 4 * MM
 
 
 def antenna() -> list[Part]:
-    """Build the antenna about its hinge, upright along +y of its own frame, and its socket on the head."""
-    lying = np.eye(4)[[0, 2, 1, 3]] * [[1], [1], [-1], [1]]  # what was turned about z stands along y
+    """Build the antenna about its hinge, upright along +y of its frame, and its socket on the head."""
+    lying = np.eye(4)[[0, 2, 1, 3]] * [[1], [1], [-1], [1]]  # from the lathe's axis z to y
     angles = np.linspace(-np.pi / 2, np.pi / 2, 13)
     ball = [(_TIP * math.cos(t), _LENGTH + _TIP * math.sin(t)) for t in angles]
     stem = turned([(0, 0), (_RADIUS, 0), (_RADIUS, _LENGTH)], 16)
@@ -34,5 +34,5 @@ def antenna() -> list[Part]:
 
 
 def antenna_pose(angle: float) -> Floats:
-    """Pose (4, 4) of the antenna in the head's frame, turned by `angle`, rad, from rest."""
+    """Return the pose (4, 4) of the antenna in the head's frame, turned by `angle`, rad, from rest."""
     return turn(HINGE, _LEAN + angle)

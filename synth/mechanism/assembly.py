@@ -1,4 +1,4 @@
-"""The rig put together: every part of it, and where each body is at any angle of the head.
+"""The assembled rig: all its parts, and the pose of each body at any angle of the head.
 
 The shaft is the z axis and points at the camera; the face looks along +x. Lengths in metres, colours 0-255.
 """
@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from synth.effects.flexible_appendage import FlexibleAppendage
+from synth.effects.pivot_offset import PivotOffset
 from synth.mechanism.antenna import antenna, antenna_pose
 from synth.mechanism.backdrop import backdrop
 from synth.mechanism.head import head, mouth_centre
@@ -22,7 +24,7 @@ from synth.spec import Rig, Spec
 Floats = NDArray[np.float64]
 
 TEXTURE = (2**32 - 1,)
-"""Spawn key of the skin's texture under the spec's seed; recordings count from 0 and never get there."""
+"""Spawn key of the skin's texture under the spec's seed; too large to collide with a recording's number."""
 
 
 def build(spec: Spec, offset: tuple[float, float] = (0.0, 0.0)) -> list[Part]:
@@ -31,15 +33,15 @@ def build(spec: Spec, offset: tuple[float, float] = (0.0, 0.0)) -> list[Part]:
     Parameters
     ----------
     spec : Spec
-        Its rig says what is built; its plant where the springs are hung; its effects whether there is an antenna,
-        and whether the marker is the bearing's; its camera how large the wall must be; its seed the skin's texture.
+        Its rig states what to build, its plant where the springs are attached, its effects whether there is an
+        antenna and whether the marker is on the bearing, its camera the size of the wall, its seed the skin's texture.
     offset : tuple of float
-        How far the marker stands off the axis where the spec has a ``pivot_offset``, m.
+        Distance of the marker from the axis if the spec has a ``pivot_offset``, m.
 
     Returns
     -------
     list of Part
-        In their bodies' frames.
+        Meshes in their bodies' frames.
     """
     rig = spec.rig
     rng = np.random.default_rng(np.random.SeedSequence(spec.seed, spawn_key=TEXTURE))
@@ -49,31 +51,31 @@ def build(spec: Spec, offset: tuple[float, float] = (0.0, 0.0)) -> list[Part]:
     if rig.neck == "human":
         return [*parts, *person(rig, rng)]
     hung = suspension(spec)
-    parts += shaft(rig, offset if spec.effects.pivot_offset else None)
+    parts += shaft(rig, offset if spec.effects.get(PivotOffset) else None)
     parts += [*links(rig.linkage, hung.arm), *springs(rig.linkage, hung), *stand(rig.linkage, hung.anchor)]
-    if spec.effects.flexible_appendage:
+    if spec.effects.get(FlexibleAppendage):
         parts += antenna()
     return parts
 
 
 def poses(rig: Rig, angle: float, appendage: float = 0.0, hung: Suspension = PAPER) -> dict[str, Floats]:
-    """Place the moving bodies.
+    """Return the poses of the moving bodies.
 
     Parameters
     ----------
     rig : Rig
-        Of which neck and linkage count.
+        Its neck and its linkage are used.
     angle : float
         Head angle θ from neutral, rad, upward positive.
     appendage : float
-        Angle of the antenna from its place of rest on the head, rad.
+        Angle of the antenna from its rest on the head, rad.
     hung : Suspension
-        Where the springs are hung, as `suspension` takes it from a spec.
+        Attachment of the springs, from `suspension`.
 
     Returns
     -------
     dict of str to ndarray
-        Body to its (4, 4) pose; a spring's stretches it along its coil.
+        Body to its (4, 4) pose; a spring's pose includes its stretch along the coil.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Smooth plane curves through a few drawn points: what the head is drawn with. Drawn in mm, handed out in metres."""
+"""Smooth plane curves through a few points of a drawing. Points are in mm, curves in m."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ MM = 1e-3
 
 
 def closed(points_mm: Points, spacing: float) -> Floats:
-    """Draw a closed smooth curve through the points.
+    """Return a closed smooth curve through the points.
 
     Parameters
     ----------
     points_mm : sequence of tuple of float
         (x, y), mm, the first not repeated.
     spacing : float
-        Distance between neighbouring samples, m; kept or a little less.
+        Largest distance between neighbouring samples, m.
 
     Returns
     -------
@@ -36,7 +36,7 @@ def closed(points_mm: Points, spacing: float) -> Floats:
 
 
 def opened(points_mm: Points, spacing: float) -> Floats:
-    """Draw a smooth curve from the first point to the last; a single point stays one. Otherwise as `closed`."""
+    """Return a smooth curve from the first point to the last; a single point stays a point. Otherwise as `closed`."""
     knots = np.array(points_mm, dtype=float) * MM
     if len(knots) == 1:
         return knots
@@ -45,18 +45,18 @@ def opened(points_mm: Points, spacing: float) -> Floats:
 
 
 def ellipse(centre_mm: tuple[float, float], radii_mm: tuple[float, float], spacing: float) -> Floats:
-    """Draw an ellipse with upright axes; otherwise as `closed`."""
+    """Return an ellipse with axes along x and y; otherwise as `closed`."""
     count = int(np.ceil(2 * np.pi * max(radii_mm) * MM / spacing))
     turns = np.linspace(0.0, 2 * np.pi, count, endpoint=False)
     return MM * (np.asarray(centre_mm) + np.asarray(radii_mm) * np.stack([np.cos(turns), np.sin(turns)], axis=1))
 
 
 def inside(curve: Floats, points: Floats) -> NDArray[np.bool_]:
-    """Tell which points lie inside a closed curve, by the parity of crossings to their right."""
+    """Return which points lie inside a closed curve, by the parity of crossings to their right."""
     found = np.zeros(len(points), dtype=bool)
     near = np.flatnonzero(((points >= curve.min(axis=0)) & (points <= curve.max(axis=0))).all(axis=1))
     (x0, y0), (x1, y1) = curve.T, np.roll(curve, -1, axis=0).T
-    for block in np.array_split(near, 1 + len(near) // 2000):  # points × edges at a time, in little memory
+    for block in np.array_split(near, 1 + len(near) // 2000):  # blocks limit the memory of points × edges
         x, y = points[block, :1], points[block, 1:]
         spans = (y0 > y) != (y1 > y)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,7 +1,7 @@
 """A woman's and a man's head drawn in profile, in mm: the face looks along +x, y is up, the shaft is the origin.
 
-The mouth stands about 120 mm in front of the shaft and level with it, as in the paper's Fig. 7. Faces and backs of
-heads are drawn apart: the robot's skull is open at the nape, where the linkage works; a person's is not.
+The mouth is about 120 mm in front of the shaft and level with it, as in the paper's Fig. 7. Faces and backs of heads
+are separate drawings: the robot's skull is open at the nape, where the linkage moves; a person's is closed.
 """
 
 from __future__ import annotations
@@ -13,31 +13,31 @@ from synth.mechanism.curves import Points
 Grey = float
 Rgb3 = tuple[float, float, float]
 Stroke = tuple[Points, float, Grey | Rgb3]
-"""A path, the half-width at which its effect has fallen to 1/e, and the effect in its middle: the share that is added
-to the height of the surface, or to its colour (one number, or red, green and blue)."""
+"""A path, the half-width at which its effect has fallen to 1/e, and the effect on the path itself: the relative change
+of the surface's height, or of its colour (one number, or red, green and blue)."""
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """All that a head is made from, mm."""
+    """The drawing of a head, mm."""
 
     face: Points
     """From the crown over nose, lips and chin to below the jaw."""
     skull: Points
-    """On from there to the crown, with the nape open."""
+    """From there back to the crown, with the nape open."""
     nape: Points
-    """The same of a person, with the nape closed."""
+    """The same for a person, with the nape closed."""
     lips: Points
-    """From the upper edge of the lips by the corner of the mouth to the lower edge; both ends lie on the face."""
+    """From the upper edge of the lips via the corner of the mouth to the lower edge; both ends lie on the face."""
     hair: Points
     brow: Points
     lash: Points
     """The line of the upper lid."""
     nostril: Points
     relief: tuple[Stroke, ...]
-    """Factors on the height over the plane of symmetry."""
+    """Relative changes of the height over the plane of symmetry."""
     shades: tuple[Stroke, ...]
-    """Factors on the colour."""
+    """Relative changes of the colour."""
 
 
 EYE: Points = [
@@ -45,7 +45,7 @@ EYE: Points = [
     (99.6, 62.6),
 ]  # fmt: skip
 IRIS, PUPIL = ((98.4, 67.0), (2.3, 3.7)), ((99.2, 67.1), (1.1, 1.8))
-"""Centre and radii: an eye that looks along +x shows its iris as a narrow ellipse."""
+"""Centre and radii, mm: the iris of an eye that looks along +x appears as a narrow ellipse."""
 EAR: Points = [
     (18.5, 58), (21.5, 68), (19, 78), (9, 84.5), (-2, 82), (-8.5, 72), (-8, 59), (-2.5, 46), (1, 35), (4.5, 26),
     (10.5, 22.5), (15.5, 27), (17, 35), (19.5, 42), (22.5, 47.5), (19, 52),

@@ -1,4 +1,4 @@
-"""The head: a drawing blown up and painted, and the place of its mouth."""
+"""The head: a drawing inflated to a body and painted, and the position of its mouth."""
 
 from __future__ import annotations
 
@@ -19,31 +19,31 @@ from synth.spec import Rig
 Floats = NDArray[np.float64]
 
 HALF_WIDTH = 66 * MM
-"""Half the breadth of the head."""
+"""Half the width of the head, m."""
 NEAR = (
     Lattice(1.6 * MM, (-14 * MM, 18 * MM, 28 * MM, 90 * MM)),  # ear
     Lattice(1.6 * MM, (80 * MM, -20 * MM, 142 * MM, 90 * MM)),  # eye, nose, mouth
     Lattice(2.4 * MM, (20 * MM, -60 * MM, 125 * MM, 125 * MM)),  # skin
     Lattice(3.4 * MM),
 )
-"""Vertices on the side that the camera sees, and on the other, where only what shows in a view from ahead is fine."""
+"""Vertices on the camera's side, and on the far side, which is fine only where a view from the front shows it."""
 FAR = (Lattice(3 * MM, band=12 * MM), Lattice(8 * MM))
 
 
 def head(rig: Rig, rng: np.random.Generator) -> list[Part]:
-    """Build the head in its own frame, which is the rig's at neutral.
+    """Build the head in its frame, which is the rig's at neutral.
 
     Parameters
     ----------
     rig : Rig
-        Whose head, the colours of skin and lips, and whether the neck is a person's.
+        Kind of head, colours of skin and lips, and whether the neck is human.
     rng : numpy.random.Generator
-        Of the skin's texture.
+        Source of the skin's texture.
 
     Returns
     -------
     list of Part
-        One for each region; neighbours share their boundary's vertices to the last bit.
+        One for each region; neighbouring regions share exactly the same boundary vertices.
     """
     profile, body = _shape(rig.head, rig.neck == "human")
     return dress(body, profile, "head", palette(rig.skin_rgb, rig.lips_rgb), rng)
@@ -52,7 +52,7 @@ def head(rig: Rig, rng: np.random.Generator) -> list[Part]:
 def dress(
     body: Body, profile: Profile, moves_with: str, colours: dict[str, Floats], rng: np.random.Generator
 ) -> list[Part]:
-    """Paint a body and cut it into one part for each of its regions."""
+    """Paint a body and split it into one part per region."""
     painted = dict(zip(colours, paint(body, colours, profile.shades, rng), strict=True))
     parts = []
     for name in np.unique(body.labels):
@@ -65,14 +65,14 @@ def dress(
 
 
 def mouth_centre(parts: list[Part], distance: float) -> Floats:
-    """Centre of the lips' area as the camera sees them at neutral, as a point of the plane z = 0.
+    """Return the centre of the lips' visible area at neutral, as a point of the plane z = 0.
 
     Parameters
     ----------
     parts : list of Part
-        With the lips.
+        Parts of the rig, including the lips.
     distance : float
-        Of the camera from the plane z = 0, m.
+        Distance of the camera from the plane z = 0, m.
 
     Returns
     -------
@@ -84,12 +84,12 @@ def mouth_centre(parts: list[Part], distance: float) -> Floats:
     corners = flat[lips.faces]
     ahead, behind = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = ahead[:, 0] * behind[:, 1] - ahead[:, 1] * behind[:, 0]
-    seen = area > 0  # the far side is wound the other way round
+    seen = area > 0  # faces on the far side are wound the other way round
     return np.asarray(np.average(corners[seen].mean(axis=1), axis=0, weights=area[seen]))
 
 
 def lips_outline(rig: Rig) -> Floats:
-    """Vertices (n, 3) of the lips at neutral on the side that the camera sees, m."""
+    """Return the vertices (n, 3) of the lips at neutral on the camera's side, m."""
     return _lips(rig.head, rig.neck == "human")
 
 

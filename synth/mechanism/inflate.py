@@ -1,8 +1,8 @@
-"""A flat drawing blown up to a body: the outline stays in the plane of symmetry and the inside rises like a cushion.
+"""Inflates a flat drawing to a body: the outline stays in the plane of symmetry and the inside rises like a cushion.
 
 The height over the plane is z = Z·sqrt(φ/φ_max) with ∇²φ = −1 inside and φ = 0 on the outline (finite elements on
-the drawing's own triangles). It is smooth everywhere and meets the plane at a right angle, so the silhouette seen
-square to the plane is the drawn outline itself.
+the drawing's triangles). The surface is smooth and meets the plane at a right angle, so the silhouette in a view square
+to the plane is the drawn outline itself.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 RING = 0.3 * MM
-"""How far inside the outline the first vertices stand, m: the cushion rises steepest there."""
+"""Distance of the first ring of vertices from the outline, m: the surface is steepest there."""
 
 
 @dataclass(frozen=True)
@@ -34,36 +34,36 @@ class Lattice:
     spacing: float
     """m."""
     box: tuple[float, ...] | None = None
-    """Low x, low y, high x, high y, m; everywhere where not given."""
+    """Low x, low y, high x, high y, m; the whole drawing by default."""
     band: float = math.inf
-    """Only so near to the outline, m."""
+    """Largest distance from the outline, m."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """A closed surface, symmetric about z = 0 but for its triangles, which know their region."""
+    """A closed surface whose triangles are labelled by region, symmetric about z = 0 except for its triangulation."""
 
     vertices: Floats
     """(n, 3), m."""
     normals: Floats
-    """(n, 3), unit length, outwards."""
+    """(n, 3), of unit length, pointing outwards."""
     faces: Ints
     """(m, 3), counter-clockwise seen from outside."""
     labels: NDArray[np.str_]
-    """(m,), a name of `Profile.regions`, or ``skin``."""
+    """(m,), a key of `Profile.regions`, or ``skin``."""
 
 
 def inflate(profile: Profile, half_width: float, near: Sequence[Lattice], far: Sequence[Lattice]) -> Body:
-    """Blow up a drawing.
+    """Inflate a drawing.
 
     Parameters
     ----------
     profile : Profile
-        Outline, regions and relief, m. Relief being factors on the height, it leaves the outline where it is.
+        Outline, regions and relief, m. Relief multiplies the height, so it does not move the outline.
     half_width : float
         Largest height over the plane of symmetry before the relief, m.
     near, far : sequence of Lattice
-        Vertices away from the curves, the finest first, on the side of +z, which the camera sees, and on the other.
+        Vertices away from the curves, the finest first, on the side of +z, which the camera sees, and on the far side.
 
     Returns
     -------
@@ -73,7 +73,7 @@ def inflate(profile: Profile, half_width: float, near: Sequence[Lattice], far: S
     rim = len(profile.outline)
     points, triangles, height = _half(profile, half_width, near)
     behind, turned, depth = _half(profile, half_width, far)
-    # The far side shares the rim, which comes first in both.
+    # Both sides share the rim's vertices, which come first in both.
     shared = np.concatenate([np.arange(rim), len(points) + np.arange(len(behind) - rim)])
     vertices = np.vstack([np.column_stack([points, height]), np.column_stack([behind, -depth])[rim:]])
     faces = np.vstack([triangles, shared[turned][:, ::-1]])
@@ -82,7 +82,7 @@ def inflate(profile: Profile, half_width: float, near: Sequence[Lattice], far: S
 
 
 def _half(profile: Profile, half_width: float, lattices: Sequence[Lattice]) -> tuple[Floats, Ints, Floats]:
-    """One side: points of the drawing, counter-clockwise triangles, and heights."""
+    """Return one side: points of the drawing, counter-clockwise triangles, and heights."""
     points = _points(profile, lattices)
     triangles = np.asarray(Delaunay(points).simplices, dtype=np.int64)
     triangles = triangles[inside(profile.outline, points[triangles].mean(axis=1))]
@@ -97,7 +97,7 @@ def _half(profile: Profile, half_width: float, lattices: Sequence[Lattice]) -> t
 
 
 def _points(profile: Profile, lattices: Sequence[Lattice]) -> Floats:
-    """Vertices: outline first, then the regions' curves, a ring within the outline, lattices where there is room."""
+    """Return the vertices: the outline, the regions' curves, a ring inside the outline, lattices in the free area."""
     outline = profile.outline
     drawn = outline
     for curve in profile.regions.values():
@@ -108,7 +108,7 @@ def _points(profile: Profile, lattices: Sequence[Lattice]) -> Floats:
     across = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
     ring = np.vstack([outline + RING * across, outline - RING * across])
     ring = ring[inside(outline, ring) & (cKDTree(outline).query(ring)[0] > 0.9 * RING)]
-    if len(drawn) > len(outline):  # nothing may come between a region's curve and the outline that it runs into
+    if len(drawn) > len(outline):  # keep the ring away from where a region's curve meets the outline
         ring = ring[cKDTree(drawn[len(outline) :]).query(ring)[0] > 2.2 * RING]
     drawn = np.vstack([drawn, ring])
     for lattice in lattices:
@@ -146,7 +146,7 @@ def _labels(profile: Profile, centres: Floats) -> NDArray[np.str_]:
 
 
 def _normals(vertices: Floats, faces: Ints) -> Floats:
-    """Vertex normals, weighted by the triangles' areas."""
+    """Return the vertex normals, weighted by the triangles' areas."""
     corners = vertices[faces]
     weighted = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = np.zeros_like(vertices)

@@ -1,6 +1,6 @@
-"""The four-bar before the head: shaft end with its marker, rocker, coupler, crank on the servo's horn.
+"""The four-bar in front of the head: shaft end with its marker, rocker, coupler, crank on the servo's horn.
 
-Each link lies in a layer of its own above the plane of motion, so that none runs into another at any angle.
+Each link lies in a separate layer above the plane of motion, so that links do not collide at any angle.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from synth.spec import NEUTRAL_SERVO, Rig
 Floats = NDArray[np.float64]
 
 FACE_Z = 92 * MM
-"""How far the shaft's end stands towards the camera."""
+"""Height of the shaft's end above the plane of motion, towards the camera, m."""
 MARKER, HOLE, END = 8.5 * MM, 4.5 * MM, 15 * MM
 """Radii of the dark marker, of the hole in a ring, and of the pale end of the shaft, m."""
 _ARMS = (80 * MM, 84 * MM)
@@ -28,20 +28,20 @@ _COUPLER = (85 * MM, 88 * MM)
 
 
 def shaft(rig: Rig, offset: tuple[float, float] | None) -> list[Part]:
-    """Build the shaft through the head, its pale end and the dark marker on it, all about the same axis.
+    """Build the shaft through the head, its pale end and the dark marker on it, all on the same axis.
 
     Parameters
     ----------
     rig : Rig
-        Of which the marker counts.
+        Its marker is used.
     offset : tuple of float or None
-        Where not ``None``, pale end and marker are no longer the shaft's but a cover of the bearing, which stands
-        still and is off the axis by this much, m.
+        Unless ``None``, pale end and marker are part of a cover of the bearing instead of the shaft. The cover does not
+        turn, and it is off the axis by this much, m.
 
     Returns
     -------
     list of Part
-        In their bodies' frames.
+        Meshes in their bodies' frames.
     """
     body, at = ("head", shift(0, 0)) if offset is None else ("ground", shift(*offset))
     edge = 0.6 * MM
@@ -64,17 +64,17 @@ def links(linkage: FourBar, arm: float) -> list[Part]:
     linkage : FourBar
         Link lengths, m.
     arm : float
-        From the shaft to where the springs pull at the rocker, m.
+        Distance from the shaft to the springs' attachment on the rocker, m.
 
     Returns
     -------
     list of Part
-        Rocker and coupler along +x of their bodies' frames, the rocker in its place on the head.
+        Rocker and coupler along +x of their bodies' frames, the rocker in its position on the head.
     """
     at_neutral = turn((0.0, 0.0), math.pi - neutral_rocker(linkage))
     reach = max(linkage.rocker, arm)
     rocker = joined([link(reach, (12 * MM, 9 * MM), *_ARMS), rod((0, 0), 11 * MM, 79.5 * MM, 84.6 * MM)])
-    # the springs pull at a rod across the head, which a second arm on the far side carries too
+    # the springs pull at a rod across the head, which has a second arm on the far side
     cross = joined([rod((arm, 0), 2 * MM, -84 * MM, 82 * MM, 16), link(arm, (12 * MM, 9 * MM), -84 * MM, -80 * MM)])
     holes = [rod((share * linkage.crank, 0), 1.1 * MM, 83 * MM, 84.25 * MM, 16) for share in (0.38, 0.56, 0.74)]
     return [
@@ -91,13 +91,13 @@ def links(linkage: FourBar, arm: float) -> list[Part]:
 
 
 def neutral_rocker(linkage: FourBar) -> float:
-    """θ_f with the head upright, rad: what a crank at 135° gives."""
+    """Return θ_f with the head upright, rad: the rocker's angle at a crank angle of 135°."""
     return float(head_angle(linkage, NEUTRAL_SERVO))
 
 
 def link_poses(linkage: FourBar, angle: float) -> dict[str, Floats]:
-    """Place crank and coupler for a head angle, rad, by exact closure; ``ValueError`` where the links cannot close."""
-    # θ_f is counted from the line B→A, so it shrinks as the head rises.
+    """Return the poses of crank and coupler at a head angle, rad; ``ValueError`` if the links cannot close."""
+    # θ_f is measured from the line B→A, so it decreases as the head rises.
     joint = joints(linkage, neutral_rocker(linkage) - angle)
     A, C, D = joint["A"], joint["C"], joint["D"]
     return {

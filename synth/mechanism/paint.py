@@ -1,8 +1,7 @@
-"""The colours of a head: what each region has, soft shades, and a texture fine enough to register by.
+"""The colours of a head: a colour per region, soft shades, and a texture fine enough for image registration.
 
-The texture moves with the head. It is a field over the drawing, a sum of waves and freckles, and holds next to
-nothing finer than 4 mm: the vertices of the skin, about 2 mm apart, carry it whole and so do pixels of half a
-millimetre.
+The texture moves with the head. It is a field over the drawing, a sum of waves and freckles, with practically no
+structure finer than 4 mm: the vertices of the skin, about 2 mm apart, sample it fully, and so do pixels of 0.5 mm.
 """
 
 from __future__ import annotations
@@ -18,17 +17,17 @@ from synth.spec import Rgb
 Floats = NDArray[np.float64]
 
 SHORTEST, LONGEST = 9 * MM, 50 * MM
-"""Of the texture's waves, m."""
+"""Wavelengths of the texture's waves, m."""
 _WAVES, _BLOTCHES = 48, 2.7
-"""How many, and the standard deviation of their sum, grey levels."""
+"""Number of waves, and the standard deviation of their sum, grey levels."""
 _FRECKLES, _FRECKLE, _DARKER = 170, 2.3 * MM, 5.5
-"""How many, standard deviation of the blot, m, and its depth, grey levels."""
+"""Number of freckles, standard deviation of a freckle's profile, m, and its depth, grey levels."""
 _SLANT = 0.15
-"""How much of the height above the plane counts as a third coordinate: enough that another view shows no stripes."""
+"""Weight of the height above the plane as a third coordinate: enough to avoid stripes in an oblique view."""
 PALE = 180.0
-"""Mean level of a skin on which the texture has its full contrast; on a dark one it has two thirds of it."""
+"""Mean level of a skin with the texture's full contrast; on dark skin the contrast is two thirds of it."""
 _STRANDS = 0.10
-"""Standard deviation of the strands of hair, share of its colour."""
+"""Standard deviation of the strands of hair, as a share of the hair's colour."""
 
 _HAIR: tuple[tuple[float, Rgb, Rgb], ...] = (
     (165, (88, 62, 46), (84, 114, 132)),
@@ -36,11 +35,11 @@ _HAIR: tuple[tuple[float, Rgb, Rgb], ...] = (
     (80, (42, 34, 31), (62, 44, 32)),
     (0, (31, 27, 27), (46, 33, 27)),
 )
-"""Mean level of a skin from which on hair and iris have these colours."""
+"""Colours of hair and iris by the mean level of the skin from which on they apply."""
 
 
 def palette(skin: Rgb, lips: Rgb) -> dict[str, Floats]:
-    """Choose a colour for every region of a head, sRGB 0-255."""
+    """Return a colour for every region of a head, sRGB 0-255."""
     base = np.asarray(skin, dtype=float)
     hair, iris = next((hair, iris) for level, hair, iris in _HAIR if base.mean() >= level)
     return {
@@ -63,18 +62,18 @@ def paint(body: Body, colours: dict[str, Floats], shades: tuple[Stroke, ...], rn
     Parameters
     ----------
     body : Body
-        What is painted.
+        The surface to paint.
     colours : dict
         Region to colour.
     shades : tuple of Stroke
-        Factors on the colour.
+        Relative changes of the colour.
     rng : numpy.random.Generator
-        Of the texture.
+        Source of the texture.
 
     Returns
     -------
     ndarray
-        (regions, n, 3): for each region in the order of `colours` the colours of all vertices, sRGB 0-255.
+        (regions, n, 3): the colours of all vertices for each region, in the order of `colours`, sRGB 0-255.
     """
     factor = np.ones((len(body.vertices), 3))
     for stroke in shades:
@@ -98,23 +97,23 @@ def texture(points: Floats, rng: np.random.Generator) -> Floats:
     points : ndarray
         (n, 3), m.
     rng : numpy.random.Generator
-        Of the waves and freckles.
+        Source of the waves and freckles.
 
     Returns
     -------
     ndarray
-        (n,), grey levels to be added.
+        (n,), grey levels to add.
     """
     waves = _waves(points * [1.0, 1.0, _SLANT], SHORTEST, LONGEST, rng)
     freckles = rng.uniform([-40 * MM, -60 * MM], [140 * MM, 160 * MM], (_FRECKLES, 2))
-    # a round blot is the product of one along x and one along y
+    # a round freckle is the product of a profile along x and a profile along y
     across, up = (np.exp(-((points[:, k, None] - freckles[:, k]) ** 2) / (2 * _FRECKLE**2)) for k in (0, 1))
     blots = np.einsum("pf,pf->p", across, up)
     return np.asarray(_BLOTCHES * waves - _DARKER * np.tanh(blots))
 
 
 def _strands(points: Floats, rng: np.random.Generator) -> Floats:
-    """Strands that run together at the back of the head, where they fade before they get too fine."""
+    """Return strands that converge at the back of the head, where they fade before they become too fine."""
     x, y = points[:, 0] + 92 * MM, points[:, 1] - 112 * MM
     away = np.hypot(x, y)
     unrolled = np.stack([0.25 * away, 90 * MM * np.arctan2(y, x), 0.25 * points[:, 2]], axis=1)
@@ -122,7 +121,7 @@ def _strands(points: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _waves(points: Floats, shortest: float, longest: float, rng: np.random.Generator) -> Floats:
-    """Sum plane waves of evenly spread logarithmic wavelength to unit standard deviation."""
+    """Return a sum of plane waves with log-uniform wavelengths and unit standard deviation."""
     number = 2 * np.pi / np.exp(rng.uniform(np.log(shortest), np.log(longest), _WAVES))
     heading = rng.standard_normal((_WAVES, 3))
     heading /= np.linalg.norm(heading, axis=1, keepdims=True)

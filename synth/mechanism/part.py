@@ -1,4 +1,4 @@
-"""One coloured piece of the rig or of the scene around it."""
+"""A coloured part of the rig or of the scene."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ PALE, DARK = (238, 238, 234), (22, 22, 24)
 
 @dataclass(frozen=True)
 class Part:
-    """One coloured piece that moves as a whole."""
+    """A coloured part that moves as a rigid body."""
 
     name: str
     body: str
-    """What it moves with, ``ground`` where it does not: a key of what `poses` or `prop_poses` returns."""
+    """The body it moves with, a key of `poses` or `prop_poses`; ``ground`` if it is fixed."""
     mesh: trimesh.Trimesh
-    """In the body's own frame, m."""
+    """In the body's frame, m."""
     colours: Floats
     """(n, 3), one for each vertex, sRGB 0-255."""
 
 
 def machined(name: str, body: str, mesh: trimesh.Trimesh, rgb: Rgb) -> Part:
-    """Give a piece one colour."""
+    """Return a part of a single colour."""
     return Part(name, body, mesh, np.tile(np.asarray(rgb, dtype=float), (len(mesh.vertices), 1)))

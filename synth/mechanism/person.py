@@ -1,6 +1,6 @@
-"""A person's neck and shoulders, which stand still while the head nods about the rig's axis.
+"""A person's neck and shoulders, which are fixed while the head nods about the rig's axis.
 
-The neck's upper end is a ball about that axis within the head, so no gap opens as the head turns.
+The neck's upper end is a ball about that axis inside the head, so that no gap opens as the head turns.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from synth.mechanism.profile import Profile, Stroke
 from synth.spec import Rig
 
 HALF_WIDTH = 76 * MM
-"""Half the breadth of the shoulders."""
+"""Half the width of the shoulders, m."""
 _OUTLINE: Points = [
     (-34, 32), (-8, 42), (22, 36), (42, 20), (47, 0), (44, -24), (39, -44), (36, -66), (36, -88), (40, -108),
     (52, -132), (70, -170), (84, -220), (88, -280), (0, -300), (-120, -300), (-166, -260), (-160, -200),

@@ -1,4 +1,4 @@
-"""A head's drawing as curves in metres: outline, regions that differ in colour, strokes of relief and shade."""
+"""A head's drawing as curves in metres: outline, coloured regions, strokes of relief and shade."""
 
 from __future__ import annotations
 
@@ -17,40 +17,40 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Stroke:
-    """A soft line: what it does falls off with the distance from its path as exp(−(d/width)²)."""
+    """A soft line: its effect falls off with the distance d from its path as exp(−(d/width)²)."""
 
     path: Floats
     """(n, 2), samples closer together than the width, m."""
     width: float
     """m."""
     gain: Floats
-    """In its middle: shape () for a height, () or (3,) for a colour."""
+    """Effect on the path itself: shape () for a height, () or (3,) for a colour."""
 
     def share(self, points: Floats) -> Floats:
-        """Tell how much of the stroke's gain reaches points (n, 2): (n,), 1 on its path."""
+        """Return the share of the stroke's gain at points (n, 2): (n,), 1 on its path."""
         away = cKDTree(self.path).query(points, distance_upper_bound=5 * self.width)[0]  # 1e-11 beyond
         return np.asarray(np.exp(-((away / self.width) ** 2)))
 
 
 @dataclass(frozen=True)
 class Profile:
-    """A drawing ready to be blown up."""
+    """A drawing ready for `inflate`."""
 
     outline: Floats
     """(n, 2), closed without repeating its first point, m."""
     regions: dict[str, Floats]
-    """Name to closed curve; later ones lie on top of earlier ones."""
+    """Name to closed curve; later regions lie on top of earlier ones."""
     relief: tuple[Stroke, ...] = ()
     shades: tuple[Stroke, ...] = ()
 
 
 def head_profile(drawing: Drawing, nape: bool = False, spacing: float = 1.0 * MM) -> Profile:
-    """Draw a head.
+    """Return the profile of a head.
 
     Parameters
     ----------
     drawing : Drawing
-        Whose.
+        The head's drawing.
     nape : bool
         Whether the nape is closed, as a person's, or open for the linkage.
     spacing : float
@@ -87,7 +87,7 @@ def _stroke(path: drawings.Points, width: float, gain: float | tuple[float, floa
 
 
 def _lips(drawing: Drawing, outline: Floats, spacing: float) -> Floats:
-    """Close the lips over the outline's own points, so that lips and skin share every vertex there."""
+    """Close the lips along the outline's points, so that lips and skin share every vertex there."""
     top, bottom = (int(np.argmin(np.hypot(*(outline - np.array(drawing.lips[end]) * MM).T))) for end in (0, -1))
     front = outline[top : bottom + 1]
     inner = opened([tuple(front[0] / MM), *drawing.lips[1:-1], tuple(front[-1] / MM)], spacing)

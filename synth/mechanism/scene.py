@@ -1,7 +1,7 @@
-"""What else is in the picture: a sync lamp, bars that pass before the mouth, a mug of the lips' colour.
+"""Other objects in the picture: a sync lamp, bars that pass in front of the mouth, a mug of the lips' colour.
 
-They stand before the camera at the pixels that the spec asks for, square to the line of sight and nearer than the
-rig, so neither the view nor the head ever hides them; what is not to be seen waits behind the wall.
+They are fixed to the camera at the spec's pixels, square to the line of sight and nearer than the rig, so that neither
+the view nor the head ever hides them. Objects that are not visible at a time are placed behind the wall.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ from synth.spec.picture import Distractor, Occluder
 Floats = NDArray[np.float64]
 
 NEARER, NEAREST = 170 * MM, 190 * MM
-"""How much nearer to the camera than the plane of motion lamp and mug stand, and the bars, m."""
+"""Heights above the plane of motion, towards the camera, of lamp and mug, and of the bars, m."""
 LENS_PX, HOUSING_PX = 7.0, 10.0
-"""Radii of the lamp."""
+"""Radii of the lamp's lens and housing, px."""
 SWAY_HZ = 0.5
 _HOUSING, _GLASS, _LIT, _SHELF = (40, 40, 44), (74, 62, 54), (255, 247, 222), (92, 80, 70)
 
 
 def props(spec: Spec, camera: Pinhole) -> list[Part]:
-    """Build what the scene holds besides the rig.
+    """Build the scene's objects besides the rig.
 
     Parameters
     ----------
     spec : Spec
-        Of which the scene counts, and the lips' colour.
+        Its scene and the lips' colour are used.
     camera : Pinhole
         At rest.
 
     Returns
     -------
     list of Part
-        Lamp housing and shelf of body ``ground``, the rest of the bodies that `prop_poses` places.
+        Lamp housing and shelf belong to body ``ground``, the others to the bodies of `prop_poses`.
     """
     scene = spec.scene
     parts = []
@@ -61,23 +61,23 @@ def props(spec: Spec, camera: Pinhole) -> list[Part]:
 
 
 def prop_poses(spec: Spec, camera: Pinhole, time: float, lamp_on: bool) -> dict[str, Floats]:
-    """Place what moves in the scene.
+    """Return the poses of the scene's moving objects.
 
     Parameters
     ----------
     spec : Spec
-        Of which the scene counts, and the head whose mouth the bars cover.
+        Its scene is used, and the head whose mouth the bars cover.
     camera : Pinhole
-        At rest: a camera that trembles does not take the scene along.
+        At rest: the scene does not move with a vibrating camera.
     time : float
-        Since the recording began, s.
+        Time since the recording began, s.
     lamp_on : bool
         Whether the lamp is lit.
 
     Returns
     -------
     dict of str to ndarray
-        ``lamp``, ``mug`` and ``occluder-0``, … to their (4, 4) poses, as far as the scene has them.
+        (4, 4) poses of ``lamp``, ``mug`` and ``occluder-0``, …, as far as the scene has them.
     """
     scene = spec.scene
     placed_at = {}
@@ -95,12 +95,12 @@ def prop_poses(spec: Spec, camera: Pinhole, time: float, lamp_on: bool) -> dict[
 
 
 def _passing(occluder: Occluder, camera: Pinhole, mouth: Floats, time: float) -> Floats:
-    """Where the bar is: at `from_s` its leading edge touches the mouth, `for_s` later its other edge leaves it."""
+    """Return a bar's pose: at `from_s` its leading edge reaches the mouth, `for_s` later its trailing edge leaves."""
     low, high = mouth[:, 0].min(), mouth[:, 0].max()
     width = occluder.width_px
     gone = (width + high - low) / occluder.for_s * (time - occluder.from_s)
     x = high + width / 2 - gone if camera.mirrored else low - width / 2 + gone
-    # a lens may pull in what is outside the picture by a little
+    # lens distortion can move points just outside the picture into it
     outside = abs(x - (camera.size[0] - 1) / 2) > 0.75 * camera.size[0] + width / 2
     if outside:
         return _hidden(camera)

@@ -1,4 +1,4 @@
-"""Places before the camera rather than in the room: what shall be seen at a pixel stands there in every view."""
+"""Positions fixed to the camera rather than to the room: an object placed at a pixel appears there in every view."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from synth.camera import Pinhole
 Floats = NDArray[np.float64]
 
 _STEPS = 40
-"""In which the lens's distortion is undone; each gains a factor of about 2·k1·r²."""
+"""Iterations to invert the lens distortion; each reduces the error by a factor of about 2·k1·r²."""
 
 
 def before(camera: Pinhole, pixels: Floats, height: float) -> Floats:
-    """Points (…, 3) that a lens without distortion shows at pixels (…, 2) before mirroring.
+    """Return the points (…, 3) that a lens without distortion shows at pixels (…, 2) before mirroring.
 
-    They lie in the plane square to the line of sight that stands nearer to the camera than the shaft's point in the
-    plane of motion by `height`, m.
+    They lie in the plane square to the line of sight that is nearer to the camera than the shaft's point in the plane
+    of motion by `height`, m.
     """
     off = (pixels - np.asarray(camera.principal_px)) * [1.0, -1.0]
     plane = np.full((*off.shape[:-1], 1), height)
@@ -25,7 +25,7 @@ def before(camera: Pinhole, pixels: Floats, height: float) -> Floats:
 
 
 def facing(camera: Pinhole, pixels: Floats, height: float) -> Floats:
-    """Pose (4, 4) of a body whose x, y and z point to the right, up and at the camera, and its origin as `before`."""
+    """Return the pose (4, 4) of a body with its origin as in `before` and axes to the right, up and at the camera."""
     pose = np.eye(4)
     pose[:3, :3] = camera.rotation.T
     pose[:3, 3] = before(camera, pixels, height)
@@ -33,12 +33,12 @@ def facing(camera: Pinhole, pixels: Floats, height: float) -> Floats:
 
 
 def metres(camera: Pinhole, height: float) -> float:
-    """Length that measures one pixel at a height above the shaft's point, m."""
+    """Return the length that appears as one pixel at a height above the shaft's point, m."""
     return (camera.distance_m - height) / camera.focal_px
 
 
 def ideal(camera: Pinhole, pixel: tuple[float, float]) -> Floats:
-    """Where a lens without distortion would show, before mirroring, what the picture shows at a pixel, px (2,)."""
+    """Return the undistorted place before mirroring of what the picture shows at a pixel, px (2,)."""
     x = camera.size[0] - 1 - pixel[0] if camera.mirrored else pixel[0]
     seen = np.array([x, pixel[1]]) - camera.lens_px
     off = seen.copy()

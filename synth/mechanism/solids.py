@@ -1,7 +1,7 @@
-"""Machined pieces: blocks, turned pieces, links and wires, with sharp edges cut up finely.
+"""Machined parts: blocks, turned parts, links and wires, with finely divided sharp edges.
 
-A lens bends straight lines, and the renderers bend vertices: what is long must have many. Each face of a piece has
-vertices of its own, and with them its own normals.
+Lens distortion bends straight lines, but the renderers move only vertices, so long edges need many vertices. The faces
+of a part do not share vertices, so that each face has separate normals.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 LONGEST = 9e-3
-"""Of the steps along an edge, m."""
+"""Longest step along an edge, m."""
 
 
 def block(low: tuple[float, float, float], high: tuple[float, float, float]) -> trimesh.Trimesh:
@@ -40,22 +40,22 @@ def sheet(corner: Floats, one: Floats, other: Floats) -> trimesh.Trimesh:
 
 
 def turned(profile: Sequence[tuple[float, float]], sections: int = 72) -> trimesh.Trimesh:
-    """Turn a piece about the z axis on a lathe.
+    """Build a solid of revolution about the z axis.
 
     Parameters
     ----------
     profile : sequence of tuple of float
-        (radius, z) from the lower end to the upper, m; each straight piece between two of them is a face of its own.
+        (radius, z) from the lower end to the upper, m; each straight segment is a separate face.
     sections : int
-        Around the axis.
+        Number of sections around the axis.
 
     Returns
     -------
     trimesh.Trimesh
-        Closed where the profile begins and ends on the axis.
+        Closed if the profile begins and ends on the axis.
     """
     angles = np.linspace(0, 2 * np.pi, sections + 1)
-    angles[-1] = 0.0  # the seam's two sides are the same points
+    angles[-1] = 0.0  # so that both sides of the seam are exactly the same points
     around = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
     bands = []
     for (r0, z0), (r1, z1) in itertools.pairwise(profile):
@@ -69,7 +69,7 @@ def turned(profile: Sequence[tuple[float, float]], sections: int = 72) -> trimes
 
 
 def rod(centre: tuple[float, float], radius: float, low: float, high: float, sections: int = 40) -> trimesh.Trimesh:
-    """Build a cylinder along z with its edge broken at the upper end, m."""
+    """Build a cylinder along z with a chamfer at the upper end, m."""
     edge = min(0.4e-3, radius / 4)
     return placed(
         turned([(0, low), (radius, low), (radius, high - edge), (radius - edge, high), (0, high)], sections),
@@ -78,9 +78,9 @@ def rod(centre: tuple[float, float], radius: float, low: float, high: float, sec
 
 
 def link(length: float, widths: tuple[float, float], low: float, high: float) -> trimesh.Trimesh:
-    """Build a flat link from the origin to (length, 0), round at both ends and straight between, m."""
+    """Build a flat link from the origin to (length, 0) with round ends and straight flanks, m."""
     first, last = widths[0] / 2, widths[1] / 2
-    # where the straight flanks touch the round ends
+    # where the straight flanks are tangent to the round ends
     lean = np.arcsin(np.clip((first - last) / length, -1, 1))
     start = np.linspace(np.pi, np.pi / 2 - lean, 13)[:-1]
     end = np.linspace(np.pi / 2 - lean, 0, 13)[1:]
@@ -114,10 +114,10 @@ def link(length: float, widths: tuple[float, float], low: float, high: float) ->
 
 
 def tube(path: Floats, radius: float, sides: int) -> trimesh.Trimesh:
-    """Lay a round wire along a path (n, 3), m; its ends stay open."""
+    """Build a round wire along a path (n, 3), m, with open ends."""
     tangent = np.gradient(path, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
-    # one axis of each cross-section lies in the plane that the path's own axis, x, spans with the tangent
+    # one axis of each cross-section lies in the plane spanned by x, the path's axis, and the tangent
     one = np.cross(tangent, [1.0, 0.0, 0.0])
     straight = np.linalg.norm(one, axis=1) < 1e-6
     one[straight] = [0.0, 0.0, 1.0]
@@ -130,9 +130,9 @@ def tube(path: Floats, radius: float, sides: int) -> trimesh.Trimesh:
 
 
 def annulus(inner: float, outer: float, z: float, sections: int = 288) -> trimesh.Trimesh:
-    """Build a flat ring, or a disc where `inner` is 0, that faces along +z, m.
+    """Build a flat ring, or a disc if `inner` is 0, that faces along +z, m.
 
-    With 288 sections its area is 8e-5 short of the circle's.
+    With 288 sections its area is 8e-5 smaller than the circle's.
     """
     return turned([(outer, z), (inner, z)], sections)
 
@@ -146,11 +146,11 @@ def woven(grid: Floats, normals: Floats) -> trimesh.Trimesh:
     points = grid.reshape(-1, 3)
     corners = points[faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return _mesh(points, normals.reshape(-1, 3), faces[area > 1e-15])  # where a circle is one point, half of them
+    return _mesh(points, normals.reshape(-1, 3), faces[area > 1e-15])  # no slivers where a circle is a point
 
 
 def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
-    """Put pieces into one without merging their vertices."""
+    """Join meshes without merging their vertices."""
     firsts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
     return _mesh(
         np.vstack([mesh.vertices for mesh in meshes]),
@@ -160,19 +160,19 @@ def joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
 
 
 def placed(mesh: trimesh.Trimesh, pose: Floats) -> trimesh.Trimesh:
-    """Move a piece by a rigid pose (4, 4)."""
+    """Return a mesh moved by a rigid pose (4, 4)."""
     return _mesh(mesh.vertices @ pose[:3, :3].T + pose[:3, 3], mesh.vertex_normals @ pose[:3, :3].T, mesh.faces)
 
 
 def shift(x: float, y: float, z: float = 0.0) -> Floats:
-    """Pose (4, 4) of a piece that is moved and not turned, m."""
+    """Return the pose (4, 4) of a translation, m."""
     pose = np.eye(4)
     pose[:3, 3] = x, y, z
     return pose
 
 
 def turn(about: Floats | tuple[float, float], angle: float) -> Floats:
-    """Pose (4, 4) of a body whose origin stands at `about`, m, turned by `angle`, rad."""
+    """Return the pose (4, 4) of a body with its origin at `about`, m, turned by `angle`, rad."""
     pose = shift(float(about[0]), float(about[1]))
     pose[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
     return pose

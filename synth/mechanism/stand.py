@@ -1,4 +1,4 @@
-"""What does not move: servo, its bracket, the upright that carries the shaft, the base."""
+"""The fixed parts: servo, its bracket, the upright that carries the shaft, the base."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from synth.mechanism.solids import block, joined, rod
 
 
 def stand(linkage: FourBar, anchor: float) -> list[Part]:
-    """Build what does not move.
+    """Build the fixed parts.
 
     Parameters
     ----------
     linkage : FourBar
-        Of which the ground link says where the servo's axis stands.
+        Its ground link determines the position of the servo's axis.
     anchor : float
-        From the shaft back to the rod at which the springs are hung, m.
+        Distance from the shaft back to the rod at which the springs are attached, m.
 
     Returns
     -------
     list of Part
-        All of body ``ground``.
+        Parts of body ``ground``.
     """
     A = -linkage.ground
     servo = [

@@ -1,12 +1,12 @@
-"""The true motion: what is commanded, what the drive makes of it, and how the head answers, from event to event.
+"""The true motion of a recording, from the command to the head's angle.
 
-    command   rows of the command file, a human nod
-    drive     controller, dead time, rate limit, play and lag in closed form
-    plant     the base model or the paper's neck, the four-bar, the servo's limits
-    load      friction, springs, gravity, what swings on the head
-    integrate the whole from kink to kink
+    command    rows of the command file; nod: a human nod
+    drive      the command after the controller and the effects on the command, in closed form
+    mechanism  the plant's equation of motion: the base model, or the paper's neck (neck, linkage, servo)
+    system     plant and effects (`synth.effects`) as a piecewise smooth right-hand side
+    integrate  the integration from kink to kink
 
-Nothing is smoothed, and nothing comes from what `anglecam` fits with.
+Nothing is smoothed, and no code is shared with the models that `anglecam` fits.
 """
 
 from synth.motion.command import command_rows

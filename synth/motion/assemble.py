@@ -1,24 +1,28 @@
-"""From the spec to the system that moves, and where that stands before anything is commanded."""
+"""Builds the moving system from the spec, and finds the angle at which it rests before anything is commanded."""
 
 from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.optimize import brentq
 
-from synth.motion.friction import build_friction
+from synth.effects import Effect
+from synth.effects.coulomb_friction import CoulombFriction, build_friction
+from synth.effects.dead_zone import DeadZone
+from synth.effects.linkage_geometry import LinkageGeometry
+from synth.effects.torque_saturation import TorqueSaturation
 from synth.motion.linkage import transmission
-from synth.motion.loads import loads, shaking
 from synth.motion.mechanism import BaseModel, Mechanism
 from synth.motion.neck import build_neck
 from synth.motion.servo import build_servo
-from synth.motion.system import PULL_SLOP, Appendage, Slack, System, Warming
+from synth.motion.system import TORQUE_SLOP, Acting, System, state_count, state_places
 from synth.spec import Effects, NeckPlant, Spec
 
 SEARCHED = math.radians(90.0)
-"""How far from neutral a place to rest is looked for, rad."""
+"""Half-width of the range around neutral in which a rest angle is searched for, rad."""
 
 
 def assemble(spec: Spec) -> System:
@@ -27,7 +31,7 @@ def assemble(spec: Spec) -> System:
     Parameters
     ----------
     spec : Spec
-        Of which plant, linkage and the effects of actuator and load act here.
+        Its plant, its linkage and its effects of actuator and load are used.
 
     Returns
     -------
@@ -36,9 +40,7 @@ def assemble(spec: Spec) -> System:
     """
     effects = spec.effects
     mechanism = _mechanism(spec)
-    zone, limit, swung = effects.dead_zone, effects.torque_saturation, effects.flexible_appendage
-    rate = 2 * math.pi * swung.frequency_hz if swung else 0.0
-    slack, warming, dry = effects.slack_spring, effects.warming_damping, effects.coulomb_friction
+    zone, limit, dry = effects.get(DeadZone), effects.get(TorqueSaturation), effects.get(CoulombFriction)
     return System(
         mechanism=mechanism,
         servo=build_servo(
@@ -46,48 +48,56 @@ def assemble(spec: Spec) -> System:
             math.radians(zone.half_width_deg) if zone else None,
             limit.limit if limit else None,
         ),
-        loads=loads(effects),
-        shake=shaking(effects.periodic_disturbance),
-        slack=Slack(slack.stiffness, math.radians(slack.slack_deg)) if slack else None,
-        appendage=Appendage(rate**2, 2 * swung.damping_ratio * rate, swung.inertia_share) if swung else None,
-        warming=Warming(warming.share, warming.work) if warming else None,
+        acting=_acting(effects.present()),
         friction=build_friction(dry) if dry else None,
-        by_sense=dry is not None or effects.quadratic_drag is not None,
+        count=state_count(effects.present()),
     )
 
 
 def rest_angle(system: System) -> float:
-    """Where the head stands before the recording, uncommanded and unshaken, rad.
+    """Return the angle at which the head stands before the recording, uncommanded and undisturbed, rad.
 
-    A rig has been standing for a while when its film begins, so a steady torque does not set it in motion at time 0.
-    Let down from neutral without haste it stops at the first angle at which friction holds what pulls it or nothing
-    pulls it any more; where there is none it is let go at neutral.
+    A rig has been standing for a while when its film begins, so a constant torque does not set it in motion at time 0.
+    Lowered slowly from neutral, the head stops at the first angle at which friction holds the remaining torque or the
+    torque vanishes. Where there is no such angle the head is released at neutral.
     """
 
-    def still(t: float) -> float:
+    def no_command(t: float) -> float:
         return 0.0
 
-    def pull(theta: float) -> float:
-        state = [theta, 0.0, 0.0, 0.0, 0.0]
-        return system.pull(0.0, state, system.mode(0.0, state, still), still)[0] - system.shake(0.0)
+    def torque(theta: float) -> float:
+        state = [theta] + [0.0] * (system.count - 1)
+        mode = system.mode(0.0, state, no_command)
+        return system.torque(0.0, state, mode, no_command)[0] - system.disturbance(0.0)
 
-    first, friction = pull(0.0), system.friction
+    first, friction = torque(0.0), system.friction
     sense = friction.sense(first) if friction else int(np.sign(first))
     if sense == 0:
         return 0.0
-    held = friction.breakaway(sense) - PULL_SLOP if friction else 0.0
+    held = friction.breakaway(sense) - TORQUE_SLOP if friction else 0.0
     low, high = system.mechanism.reach
     angles = np.linspace(0.0, min(SEARCHED, high) if sense > 0 else max(-SEARCHED, low), 361)
     for before, after in itertools.pairwise(angles.tolist()):
-        if sense * pull(after) <= held:
-            return float(brentq(lambda theta: sense * pull(theta) - held, before, after, xtol=1e-15, rtol=1e-14))
+        if sense * torque(after) <= held:
+            return float(brentq(lambda theta: sense * torque(theta) - held, before, after, xtol=1e-15, rtol=1e-14))
     return 0.0
+
+
+def _acting(effects: Sequence[Effect]) -> tuple[Acting, ...]:
+    places, acting, edges = state_places(effects), [], 0
+    for effect in effects:
+        dynamics = effect.dynamics()
+        if dynamics is None:
+            continue
+        acting.append(Acting(dynamics, places.get(effect.id, slice(0, 0)), edges if dynamics.has_edge else None))
+        edges += dynamics.has_edge
+    return tuple(acting)
 
 
 def _mechanism(spec: Spec) -> Mechanism:
     if isinstance(spec.plant, NeckPlant):
         return build_neck(spec.plant, spec.rig.linkage)
-    geometry = spec.effects.linkage_geometry
+    geometry = spec.effects.get(LinkageGeometry)
     return BaseModel(
         a=spec.plant.a,
         b=spec.plant.b,
@@ -98,6 +108,6 @@ def _mechanism(spec: Spec) -> Mechanism:
 
 
 def _servo_share(effects: Effects) -> float:
-    """Share of b that is the servo's position feedback: all of it unless an effect says otherwise."""
-    saying = effects.torque_saturation or effects.linkage_geometry
-    return saying.share if saying else 1.0
+    """Return the share of b that is the servo's position feedback: all of it unless an effect states another."""
+    stated = effects.get(TorqueSaturation) or effects.get(LinkageGeometry)
+    return stated.share if stated else 1.0

@@ -1,4 +1,4 @@
-"""Command rows, exactly as they are written to the command file: what the file says is what the plant gets."""
+"""Command rows exactly as written to the command file, so that the plant gets what the file states."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from synth.spec import Chirp, Free, Nod, PaperSeries, RandomSteps, Recording, Re
 Floats = NDArray[np.float64]
 
 UPDATE_S = 0.02
-"""A servo takes a new position 50 times a second: smooth commands are stairs of this tread."""
+"""Sample time of smooth commands, s: a servo takes a new position 50 times a second."""
 
 PAPER_SERIES_DEG = (22.0, 0.0, 12.0, -8.0, 18.0, 5.0, -15.0, 10.0, 0.0)
-"""Levels of the paper's verification. Figs. 11 and 15 show steps of several heights from several angles and print no
-number but the 22° of the text. These begin with it and go both ways over the -23.9° to 31.1° of the linkage, so that
-no step overshoots the reach with the 14 % that the paper measured."""
+"""Levels of the paper's verification. Figs. 11 and 15 show steps of several heights from several angles; the only
+printed number is the 22° of the text. These levels begin with 22° and go in both directions within the linkage's
+−23.9° to 31.1°, so that no step leaves the reach with the 14 % overshoot that the paper measured."""
 
 
 def command_rows(recording: Recording, seed: np.random.SeedSequence) -> Floats | None:
-    """Work out the command of one recording.
+    """Return the command of one recording.
 
     Parameters
     ----------
     recording : Recording
-        Its kind and numbers.
+        Its command and duration are used.
     seed : numpy.random.SeedSequence
-        Where random steps come from.
+        Source of random steps.
 
     Returns
     -------
     ndarray or None
-        Rows (time_s, command_deg), each held until the next; ``None`` where nothing is commanded.
+        Rows (time_s, command_deg), each held until the next; ``None`` without a command.
     """
     command, end = recording.command, recording.duration_s
     start = command.rest_s
@@ -53,11 +53,11 @@ def command_rows(recording: Recording, seed: np.random.SeedSequence) -> Floats |
             changes = _random_steps(command, end, np.random.default_rng(seed))
         case Triangle() | Chirp():
             since = np.arange(0.0, max(end - start, 0.0), UPDATE_S)
-            # The level of the middle of each tread, so that the stairs neither lead nor lag the smooth curve.
+            # Sampled at the middle of each hold, so that the staircase neither leads nor lags the smooth curve.
             levels = _smooth(command, since + UPDATE_S / 2, end - start)
             changes = list(zip(start + since, levels, strict=True))
     rows = np.array([(0.0, 0.0), *changes])
-    # Rounded here, once: the file and the plant must not differ by a digit.
+    # Rounded once, here, so that the file and the plant use identical numbers.
     return np.round(rows[rows[:, 0] < end], 6)
 
 

@@ -1,8 +1,8 @@
-"""The paper's servo controller, Table 2: it rounds the commanded position and repeats it in pulses.
+"""The paper's servo controller, Table 2: it quantises the commanded position and sends it in pulses.
 
-A position is an unsigned number over 180° of the servo's arm, 8 bits in the paper (Fig. 13), which the straight line
-of Eq. (3) turns into head angle: 180°/255 · 0.357 = 0.25° of the head a level. Neutral is a level. A new position is
-taken over when the next pulse begins, 50 times a second in the paper.
+A position is an unsigned integer over 180° of the servo's arm, 8 bits in the paper (Fig. 13). The straight line of
+Eq. (3) converts it to head angle: 180°/255 · 0.357 = 0.25° of the head per level. Neutral is one of the levels. A new
+position takes effect when the next pulse begins, 50 times a second in the paper.
 """
 
 from __future__ import annotations
@@ -19,32 +19,32 @@ from synth.spec import Controller
 Floats = NDArray[np.float64]
 
 PUNCTUAL_PULSES = 1e-6
-"""A command this share of a period late still makes it into the pulse: rows are rounded to a microsecond."""
+"""A command late by this share of a period still counts for the pulse, because rows are rounded to a microsecond."""
 
 
 def level_size(bits: int, linkage: FourBar) -> float:
-    """Head angle from one level to the next, rad."""
+    """Return the head angle between adjacent levels, rad."""
     return math.pi / (2**bits - 1) * abs(straight_gamma(linkage))
 
 
 def send(times: Floats, angles: Floats, controller: Controller, linkage: FourBar) -> tuple[Floats, Floats]:
-    """Turn what is commanded into what the servo is told.
+    """Quantise commands and delay them to the controller's pulses.
 
     Parameters
     ----------
     times : ndarray
-        Of the commands, s, ascending.
+        Times of the commands, s, ascending.
     angles : ndarray
         Commanded head angles, rad, each held until the next.
     controller : Controller
-        Bits and pulses, each of which may be absent.
+        Bits and pulses, either of which may be absent.
     linkage : FourBar
         Link lengths, m.
 
     Returns
     -------
     times, angles : ndarray
-        When which head angle is told; a command that another one overtakes before the next pulse is lost.
+        The head angles that the servo receives and their times; a command replaced before the next pulse is lost.
     """
     if controller.bits is not None:
         size = level_size(controller.bits, linkage)

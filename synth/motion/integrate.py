@@ -1,9 +1,9 @@
-"""Integrate a system from kink to kink: Dormand and Prince's eighth-order method within each smooth piece.
+"""Integrates a system from kink to kink, with Dormand and Prince's eighth-order method within each smooth piece.
 
 Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, sec. II.5-II.6: steps of order 8 with
-an interpolant of order 7 between them. scipy's own loop over events looks at the ends of a step only and cannot change
-the right-hand side, so the steps are taken here: each is searched for the first end of its mode, which is found on the
-interpolant to the last digit of the time.
+an interpolant of order 7. scipy's event loop checks only the ends of a step and cannot change the right-hand side, so
+the steps are taken here. Each step is searched for the first end of its mode, which is located on the interpolant to
+the last digit of the time.
 """
 
 from __future__ import annotations
@@ -17,32 +17,32 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853, DenseOutput, OdeSolution
 from scipy.optimize import brentq
 
-from synth.motion.drive import Drive
+from synth.effects import PiecewiseLinear
 from synth.motion.system import Mode, Signal, State, System
 
 Floats = NDArray[np.float64]
 
 LONGEST_STEP_S = 0.005
-"""Keeps the interpolant as good as the steps, and no reversal of the head is stepped over."""
-LOOKS = 3
-"""Times at which a step is searched for the end of its mode."""
+"""Longest step, s: keeps the interpolant as accurate as the steps, and steps over no reversal of the head."""
+CHECKS = 3
+"""Number of times within a step at which the end of its mode is checked for."""
 AT_THE_EDGE = 1e-3
-"""A step that fails this close to the end of the reach, rad, failed because of it."""
+"""A step that fails this close to the end of the reach is attributed to the end of the reach, rad."""
 
 
 def integrate(
-    system: System, drive: Drive, lag: float, start_angle: float, begin: float, end: float
+    system: System, drive: PiecewiseLinear, lag: float, start_angle: float, begin: float, end: float
 ) -> Callable[[Floats], Floats]:
-    """Follow the motion from rest.
+    """Integrate the motion from rest.
 
     Parameters
     ----------
     system : System
-        What moves.
-    drive : Drive
-        What the load is asked for, rad.
+        Plant and effects.
+    drive : PiecewiseLinear
+        The command as it reaches the load, rad.
     lag : float
-        τ between that and the torque, s; 0 for none.
+        τ of the lag between command and torque, s; 0 without a lag.
     start_angle : float
         θ at rest, rad.
     begin, end : float
@@ -51,7 +51,7 @@ def integrate(
     Returns
     -------
     callable
-        Times of shape (n,), s, between `begin` and `end` → states of shape (5, n).
+        Times of shape (n,), s, between `begin` and `end` → states of shape (m, n).
 
     Raises
     ------
@@ -59,11 +59,11 @@ def integrate(
         If the head leaves the range in which the linkage closes, or runs away.
     """
     ends, interpolants = [begin], []
-    state: State = [start_angle, 0.0, 0.0, 0.0, 0.0]
+    state: State = [start_angle] + [0.0] * (system.count - 1)
     v, sense, step = 0.0, 1, LONGEST_STEP_S / 10
     inside = drive.knots[(drive.knots > begin) & (drive.knots < end)]
     for start, until in itertools.pairwise([begin, *inside.tolist(), end]):
-        arriving = drive.after(lag, start, v)
+        arriving = drive.lagged(lag, start, v)
         mode, now = system.mode(start, state, arriving, sense), start
         while now < until:
             rates = system.rates(mode, arriving)
@@ -99,13 +99,13 @@ def integrate(
 
 
 def _first_end(system: System, mode: Mode, drive: Signal, way: DenseOutput, begin: float, end: float) -> float | None:
-    """First instant of a step at which its mode ends."""
+    """Return the first time within a step at which its mode ends; ``None`` if it does not end."""
 
     def margin(t: float) -> float:
         return min(system.margins(t, way(t).tolist(), mode, drive))
 
-    looks = np.linspace(begin, end, LOOKS + 1)
-    for before, after, state in zip(looks.tolist(), looks[1:].tolist(), way(looks[1:]).T.tolist(), strict=False):
+    checks = np.linspace(begin, end, CHECKS + 1)
+    for before, after, state in zip(checks.tolist(), checks[1:].tolist(), way(checks[1:]).T.tolist(), strict=False):
         if min(system.margins(after, state, mode, drive)) < 0:
             if margin(before) <= 0:
                 return before
@@ -119,4 +119,4 @@ def _why(system: System, time: float, angle: float) -> str:
         return f"the head would leave the range in which the linkage closes, at t = {time:.3f} s"
     if not math.isfinite(angle) or abs(angle) > math.tau:
         return f"the head runs away, at t = {time:.3f} s"
-    return f"the motion cannot be followed further than t = {time:.3f} s"
+    return f"the motion cannot be integrated beyond t = {time:.3f} s"

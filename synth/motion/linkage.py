@@ -1,11 +1,11 @@
 """The exact four-bar between servo and head, as functions of the head's angle from neutral.
 
-The head's angle is θ = θ_f0 − θ_f, upwards where positive (Table 3: Δθ = 45° − θ_f), the crank's is θ_s − θ_s0. Their
-rate γ = dθ_f/dθ_s is the slope of Fig. 4 at one point; it follows from differentiating |CD|² = L3² along the motion:
+The head's angle is θ = θ_f0 − θ_f, positive upwards (Table 3: Δθ = 45° − θ_f); the crank's is θ_s − θ_s0. Their ratio
+γ = dθ_f/dθ_s is the slope of Fig. 4 at one point. It follows from differentiating |CD|² = L3² along the motion:
 
     γ = (C − D)·dC/dθ_s / (C − D)·dD/dθ_f
 
-At either end of the reach crank and coupler lie in one line: γ is 0 there and goes like a square root.
+At either end of the reach crank and coupler are collinear: γ vanishes there like a square root.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ STRAIGHT_FROM, STRAIGHT_TO = math.radians(60.0), math.radians(220.0)
 """Crank angles over which the paper fits its straight line, Fig. 4, rad."""
 
 SERIES_DEGREE = 96
-"""Of the Chebyshev series of Γ; the paper's linkage needs about half of it for 1e-15 rad."""
+"""Degree of the Chebyshev series of Γ; the paper's linkage needs about half of it for 1e-15 rad."""
 
 
 class Ratio(NamedTuple):
@@ -43,7 +43,7 @@ NOWHERE = Ratio(math.nan, math.nan, math.nan)
 
 @dataclass(frozen=True)
 class Transmission:
-    """A four-bar at its neutral."""
+    """A four-bar with its neutral position."""
 
     linkage: FourBar
     neutral_rocker: float
@@ -53,17 +53,17 @@ class Transmission:
 
     @cached_property
     def reach(self) -> tuple[float, float]:
-        """Lowest and highest θ at which the links close, rad."""
+        """Return the lowest and highest θ at which the links close, rad."""
         low, high = reach(self.linkage)
         return self.neutral_rocker - high, self.neutral_rocker - low
 
     @cached_property
     def neutral_gamma(self) -> float:
-        """γ at neutral."""
+        """Return γ at neutral."""
         return self.at(0.0).gamma
 
     def at(self, theta: float) -> Ratio:
-        """Work out the crank's angle and γ; not numbers where the links do not close or γ is 0 or infinite."""
+        """Return the crank's angle and γ; NaN where the links do not close or γ is 0 or infinite."""
         low, high = self.reach
         if not low < theta < high:
             return NOWHERE
@@ -77,7 +77,7 @@ class Transmission:
         if along_c == 0.0 or along_d == 0.0:
             return NOWHERE
         gamma = along_c / along_d
-        # the same once more: d(C − D)/dθ_s, and from it what becomes of numerator and denominator
+        # second derivative: d(C − D)/dθ_s, and with it the derivatives of numerator and denominator
         dx, dy = -r * sin_s - gamma * L6 * sin_f, r * cos_s - gamma * L6 * cos_f
         c_changes = r * (-dx * sin_s + dy * cos_s) - r * (x * cos_s + y * sin_s)
         d_changes = L6 * (dx * sin_f + dy * cos_f) + gamma * L6 * (x * cos_f - y * sin_f)
@@ -85,7 +85,7 @@ class Transmission:
         return Ratio(crank - self.neutral_crank, gamma, -per_crank / gamma)
 
     def gathered(self, theta: float) -> float:
-        """Γ(θ) = ∫γ dθ from neutral, rad: the paper's θ_a = γΔθ of Eqs. (3) and (12) where γ is not constant."""
+        """Return Γ(θ) = ∫γ dθ from neutral, rad: the paper's θ_a = γΔθ of Eqs. (3) and (12) for a variable γ."""
         low, high = self.reach
         if not low < theta < high:
             return math.nan
@@ -97,7 +97,7 @@ class Transmission:
 
     @cached_property
     def _series(self) -> list[float]:
-        """Chebyshev series of Γ in ξ, where θ = mid − half·cos ξ: in ξ the square roots at both ends are smooth."""
+        """Return the Chebyshev series of Γ in ξ, θ = mid − half·cos ξ: the square roots at the ends are smooth in ξ."""
         low, high = self.reach
         mid, half = (low + high) / 2, (high - low) / 2
 
@@ -113,7 +113,7 @@ class Transmission:
 
 @lru_cache(maxsize=16)
 def transmission(linkage: FourBar) -> Transmission:
-    """Set a linkage to its neutral, Table 3.
+    """Return a linkage with its neutral position of Table 3.
 
     Raises
     ------
@@ -125,6 +125,6 @@ def transmission(linkage: FourBar) -> Transmission:
 
 
 def straight_gamma(linkage: FourBar) -> float:
-    """Slope of the paper's straight line, Eq. (3) and Fig. 4, over as much of 60°–220° as the linkage has."""
+    """Return the slope of the paper's straight line, Eq. (3) and Fig. 4, over the reachable part of 60°–220°."""
     ends = servo_angle(linkage, np.array(reach(linkage)))
     return straight_line(linkage, max(STRAIGHT_FROM, ends.min()), min(STRAIGHT_TO, ends.max())).slope

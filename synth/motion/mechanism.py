@@ -1,11 +1,11 @@
-"""What a plant does with nothing switched on top of it; here the base model of Eq. (30), with or without its linkage.
+"""A plant without effects; here the base model of Eq. (30), with or without its linkage.
 
-Whatever the plant, its motion is brought to
+The equation of motion of every plant is written as
 
-    inertia(θ)·θ̈ = lever(θ)·servo(v − feedback(θ)) + passive(θ, θ̇) + what effects add
+    inertia(θ)·θ̈ = lever(θ)·servo(v − feedback(θ)) + passive(θ, θ̇) + effects
 
-where servo is `gain` times its argument unless it has a dead zone or a limit (`synth.motion.servo`), and all terms are
-angular accelerations of the head.
+where servo is `gain` times its argument unless it has a dead zone or a limit (`synth.motion.servo`). All terms are
+angular accelerations of the head; `synth.effects` supplies the effects' terms.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Terms(NamedTuple):
     passive: float
     """rad/s²."""
     inertia: float
-    """As a share of the head's at neutral."""
+    """Relative to the head's inertia at neutral."""
 
 
 class Mechanism(Protocol):
@@ -34,22 +34,22 @@ class Mechanism(Protocol):
 
     @property
     def gain(self) -> float:
-        """Of the servo, rad/s² for each unit of v."""
+        """Return the servo's gain, rad/s² per unit of v."""
 
     @property
     def reach(self) -> tuple[float, float]:
-        """Lowest and highest angle for which there are terms, rad."""
+        """Return the lowest and highest angle at which the terms are defined, rad."""
 
-    def terms(self, theta: float, omega: float, oil: float) -> Terms:
-        """Terms at an angle, rad, a speed, rad/s, and a share of the viscous damping that is left."""
+    def terms(self, theta: float, omega: float, damping: float) -> Terms:
+        """Return the terms at an angle, rad, and a speed, rad/s; `damping` is a factor on the viscous damping."""
 
 
 @dataclass(frozen=True)
 class BaseModel:
-    """θ̈ = c·v − a·θ̇ − b·θ, of whose b a share is the servo's position feedback and the rest a spring on the head.
+    """θ̈ = c·v − a·θ̇ − b·θ; a share of b is the servo's position feedback, the rest a spring on the head.
 
-    With a linkage the servo feels the crank's angle, φ(θ) in the head angle that it would mean if γ were constant, and
-    by virtual work its torque reaches the head with the lever φ′(θ):
+    With a linkage the servo measures the crank's angle. In units of the head angle at constant γ it is φ(θ), and by
+    virtual work the servo's torque acts on the head with the lever φ′(θ):
 
         θ̈ = φ′(θ)·(c·v − share·b·φ(θ)) − (1 − share)·b·θ − a·θ̇
 
@@ -65,16 +65,16 @@ class BaseModel:
 
     @property
     def reach(self) -> tuple[float, float]:
-        """That of the linkage, if it has one."""
+        """Return the linkage's reach, unlimited without a linkage."""
         return self.through.reach if self.through else (-math.inf, math.inf)
 
-    def terms(self, theta: float, omega: float, oil: float) -> Terms:
-        """See `Mechanism`."""
+    def terms(self, theta: float, omega: float, damping: float) -> Terms:
+        """Return the terms, see `Mechanism`."""
         phi, lever = theta, 1.0
         if self.through:
             ratio = self.through.at(theta)
             phi = -self.through.neutral_gamma * ratio.crank
             lever = self.through.neutral_gamma / ratio.gamma
-        servos = self.share * self.b
-        passive = (servos - self.b) * theta - self.a * oil * omega
-        return Terms(servos / self.gain * phi, lever, passive, 1.0)
+        servo_b = self.share * self.b
+        passive = (servo_b - self.b) * theta - self.a * damping * omega
+        return Terms(servo_b / self.gain * phi, lever, passive, 1.0)

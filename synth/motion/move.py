@@ -9,10 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from synth.effects import Effect
+from synth.effects.actuator_lag import ActuatorLag
+from synth.effects.flexible_appendage import FlexibleAppendage
 from synth.motion.assemble import assemble, rest_angle
 from synth.motion.drive import drive
 from synth.motion.integrate import integrate
 from synth.motion.nod import nod
+from synth.motion.system import state_count, state_places
 from synth.spec import Free, Nod, Recording, Spec
 
 Floats = NDArray[np.float64]
@@ -20,22 +24,24 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Motion:
-    """θ, θ̇ and what swings on the head, at any time: at rest before the motion begins, and still after its end."""
+    """θ, θ̇ and the states of the effects at any time: at rest before the motion begins, and still after its end."""
 
     state: Callable[[Floats], Floats]
-    """Times of shape (n,), s → rows θ, θ̇, ψ, ψ̇ and w, the share of the oil that is warm, shape (5, n)."""
+    """Times of shape (n,), s → rows θ, θ̇ and the effects' states, shape (m, n)."""
+    places: dict[str, slice]
+    """Rows of each effect's states, by effect id."""
 
     def angle(self, times: ArrayLike) -> Floats:
-        """θ of the head, rad, in the shape of the times, s."""
+        """Return θ of the head, rad, in the shape of the times, s."""
         return self._row(0, times)
 
     def speed(self, times: ArrayLike) -> Floats:
-        """θ̇ of the head, rad/s, in the shape of the times, s."""
+        """Return θ̇ of the head, rad/s, in the shape of the times, s."""
         return self._row(1, times)
 
     def appendage(self, times: ArrayLike) -> Floats:
-        """ψ of the appendage from the head, rad, in the shape of the times, s; zero where there is none."""
-        return self._row(2, times)
+        """Return ψ of the appendage from the head, rad, in the shape of the times, s; zero without an appendage."""
+        return self._row(self.places[FlexibleAppendage.id].start, times)
 
     def _row(self, row: int, times: ArrayLike) -> Floats:
         at = np.asarray(times, dtype=float)
@@ -50,11 +56,11 @@ def move(spec: Spec, recording: Recording, rows: Floats | None, until: float) ->
     spec : Spec
         Plant, controller, linkage and effects.
     recording : Recording
-        What is commanded; a nod has no plant, and a free head is held until it is let go.
+        Its command; a nod needs no plant, and a free head is held until it is released.
     rows : ndarray or None
         Command rows (time_s, command_deg).
     until : float
-        The motion is known to this time, s.
+        End of the motion, s.
 
     Returns
     -------
@@ -66,23 +72,39 @@ def move(spec: Spec, recording: Recording, rows: Floats | None, until: float) ->
     ValueError
         If the head leaves the range in which the linkage closes or runs away, or the spec contradicts itself.
     """
-    command = recording.command
+    command, effects = recording.command, spec.effects.present()
+    places, count = state_places(effects), state_count(effects)
     if isinstance(command, Nod):
-        return Motion(lambda times: np.vstack([nod(command, times), np.zeros((3, len(times)))]))
+        return Motion(lambda times: np.vstack([nod(command, times), np.zeros((count - 2, len(times)))]), places)
     system = assemble(spec)
     if isinstance(command, Free):
         start, begin = math.radians(command.initial_angle_deg), command.rest_s
     else:
         start, begin = rest_angle(system), 0.0
     if begin >= until:
-        return Motion(lambda times: np.outer([start, 0.0, 0.0, 0.0, 0.0], np.ones(len(times))))
-    lag = spec.effects.actuator_lag.tau_s if spec.effects.actuator_lag else 0.0
-    states = integrate(system, drive(rows, spec), lag, start, begin, until)
-    return Motion(lambda times: _known(states, times, begin, until))
+        return Motion(lambda times: np.outer([start] + [0.0] * (count - 1), np.ones(len(times))), places)
+    lag = spec.effects.get(ActuatorLag)
+    states = integrate(system, drive(rows, spec), lag.tau_s if lag else 0.0, start, begin, until)
+    speeds = _speed_rows(effects, places)
+    return Motion(lambda times: _clamped(states, times, begin, until, speeds), places)
 
 
-def _known(states: Callable[[Floats], Floats], times: Floats, begin: float, until: float) -> Floats:
-    """States, standing still outside of the time that was integrated."""
+def _speed_rows(effects: tuple[Effect, ...], places: dict[str, slice]) -> list[int]:
+    """Return the rows of the state that are speeds."""
+    return [1] + [
+        places[effect.id].start + number
+        for effect in effects
+        for number, variable in enumerate(effect.states)
+        if variable.is_speed
+    ]
+
+
+def _clamped(
+    states: Callable[[Floats], Floats], times: Floats, begin: float, until: float, speeds: list[int]
+) -> Floats:
+    """Return the states, standing still outside the interval that was integrated."""
     rows = states(np.clip(times, begin, until))
-    rows[1::2, (times < begin) | (times > until)] = 0.0  # both speeds
+    outside = (times < begin) | (times > until)
+    for row in speeds:
+        rows[row, outside] = 0.0
     return rows

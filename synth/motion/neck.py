@@ -3,9 +3,10 @@
     T = c3·U − J_r·θ̈_a − K_m²/(G_g²·R_a)·θ̇_a − c3·h·θ_a,   c3 = K_m·G_a/(G_g·R_a)                    Eq. (11)
     J·θ̈ + C·θ̇ + F_s·L_s − M_h·g·L·sin(θ0 + θ) = T,   J = M_h·L² + J_cg                               Eq. (16)
 
-Eqs. (3) and (12) put θ_a = γΔθ with one γ = −0.36, the slope dθ_f/dθ_s of Fig. 4: printed the wrong way round, and in
-the torque too, yet it is what Eq. (28) and the identified b rest on. Here γ is the exact four-bar's at every angle, so
-θ_a = Γ(θ) = ∫γ dθ, θ̇_a = γ·θ̇, θ̈_a = γ·θ̈ + γ′·θ̇², and Eq. (28) is what remains at small angles, with γ at neutral.
+Eqs. (3) and (12) use θ_a = γΔθ with a constant γ = −0.36, the slope dθ_f/dθ_s of Fig. 4. This slope is printed
+inverted, in the torque as well, but Eq. (28) and the identified b are based on it. Here γ is the exact four-bar's at
+every angle, so θ_a = Γ(θ) = ∫γ dθ, θ̇_a = γ·θ̇, θ̈_a = γ·θ̈ + γ′·θ̇². At small angles this reduces to Eq. (28) with γ
+at neutral.
 """
 
 from __future__ import annotations
@@ -19,22 +20,23 @@ from synth.motion.mechanism import Terms
 from synth.spec import LinearPlant, NeckPlant, Plant
 
 SPARE = 1.25
-"""Neither spring is ever let out by more than its stretch at neutral divided by this."""
+"""Safety factor of the springs' pre-tension: stretch at neutral over the largest reduction of stretch in the reach."""
 
 
 @dataclass(frozen=True)
 class Springs:
-    """Two springs, before and behind the shaft, that carry the head at neutral and pull it back.
+    """Two springs, in front of and behind the shaft, that carry the head at neutral and restore it.
 
-    The paper has two springs (Figs. 2, 3) and writes one that also pushes, F_s = K·Δx with either sign. One that only
-    pulls would hang slack 9° below neutral. So they stand against each other, the mirror image of each other at
-    neutral and of half the rate each; their common stretch is so large that neither goes slack within the linkage's
-    reach, and their difference carries the head, Eqs. (23)-(24).
+    The paper has two springs (Figs. 2, 3) but writes a single spring that can also push, F_s = K·Δx with either sign. A
+    single spring that only pulls would be slack 9° below neutral. Here two springs of half the rate act against each
+    other, mirror images at neutral. Their common stretch is so large that neither goes slack within the linkage's
+    reach, and the difference of their stretches carries the head, Eqs. (23)-(24).
 
     Each has the length ℓ(θ′)² = L2² + L6² − 2·L2·L6·cos θ′ and the arm ℓ′ of Eq. (17), with θ′ = θ′0 ± θ. Neutral is
-    the right angle of Fig. 6 (c), cos θ′0 = L2/L6, where the arm is L2 as the paper says; there ℓ″ = 0, so that the
-    stretch adds no stiffness. The tangent of Eqs. (24)-(28) is K·L2·L6, because Eq. (18a) counts L6·Δθ as the change
-    in length. The lengths of Eq. (18b) change by L2·Δθ; both agree if K there is the paper's K times L6/L2, as here.
+    the right angle of Fig. 6 (c), cos θ′0 = L2/L6, where the arm is L2 as in the paper; there ℓ″ = 0, so that the
+    stretch adds no stiffness. The tangent stiffness of Eqs. (24)-(28) is K·L2·L6, because Eq. (18a) uses L6·Δθ as the
+    change in length. The lengths of Eq. (18b) change by L2·Δθ. Both agree if K in Eq. (18b) is the paper's K times
+    L6/L2, as here.
     """
 
     base: float
@@ -42,19 +44,19 @@ class Springs:
     arm: float
     """L6, m."""
     rate: float
-    """Of each, N/m."""
+    """Rate of each spring, N/m."""
     behind: float
-    """Stretch of the one that pulls the head down to −θ, at neutral, m."""
+    """Stretch at neutral of the spring that pulls the head towards −θ, m."""
     before: float
-    """Stretch of the other at neutral, m."""
+    """Stretch at neutral of the other spring, m."""
 
     def stretched(self, theta: float) -> tuple[float, float]:
-        """Stretch of the spring behind and of the one before, m."""
+        """Return the stretch of the spring behind the shaft and of the spring in front of it, m."""
         rest = self._length(0.0)
         return self.behind + self._length(theta) - rest, self.before + self._length(-theta) - rest
 
     def torque(self, theta: float) -> float:
-        """F_s·L_s of Eq. (16), N·m: against θ where positive."""
+        """Return F_s·L_s of Eq. (16), N·m; a positive torque acts against θ."""
         behind, before = self.stretched(theta)
         return self.rate * (behind * self._arm_at(theta) - before * self._arm_at(-theta))
 
@@ -79,25 +81,25 @@ class Neck:
 
     @property
     def inertia(self) -> float:
-        """J, kg·m²."""
+        """Return J, kg·m²."""
         return self.plant.mass * self.plant.centre_of_mass**2 + self.plant.own_inertia
 
     @property
     def gain(self) -> float:
-        """c3/J, 1/(s²·V)."""
+        """Return c3/J, 1/(s²·V)."""
         p = self.plant
         return p.motor_constant * p.amplifier_gain / (p.gear_ratio * p.output_impedance) / self.inertia
 
     @property
     def reach(self) -> tuple[float, float]:
-        """That of the linkage."""
+        """Return the linkage's reach."""
         return self.through.reach
 
-    def terms(self, theta: float, omega: float, oil: float) -> Terms:
-        """See `Mechanism`; oil is left of C alone, the motor's own damping stays."""
+    def terms(self, theta: float, omega: float, damping: float) -> Terms:
+        """Return the terms, see `Mechanism`; `damping` multiplies C only, the motor's damping is unaffected."""
         p = self.plant
         _, gamma, bend = self.through.at(theta)
-        viscous = p.damping * oil + _motor_damping(p) * gamma
+        viscous = p.damping * damping + _motor_damping(p) * gamma
         weight = p.mass * p.gravity * p.centre_of_mass * math.sin(math.radians(p.neutral_deg) + theta)
         torque = weight - self.springs.torque(theta) - viscous * omega - p.rotor_inertia * bend * omega**2
         return Terms(
@@ -109,7 +111,7 @@ class Neck:
 
 
 def build_neck(plant: NeckPlant, linkage: FourBar) -> Neck:
-    """Put servo, linkage, springs and head together."""
+    """Assemble servo, linkage, springs and head."""
     through = transmission(linkage)
     rate = plant.spring_rate * plant.spring_arm / plant.spring_base / 2
     carried = plant.mass * plant.gravity * plant.centre_of_mass * math.sin(math.radians(plant.neutral_deg))
@@ -122,7 +124,7 @@ def build_neck(plant: NeckPlant, linkage: FourBar) -> Neck:
 
 
 def linear_model(plant: Plant, linkage: FourBar) -> tuple[float, float, float]:
-    """Give the a, b, c to which a plant tends at small angles.
+    """Return a, b, c of a plant in the limit of small angles.
 
     Parameters
     ----------
@@ -134,7 +136,7 @@ def linear_model(plant: Plant, linkage: FourBar) -> tuple[float, float, float]:
     Returns
     -------
     a, b, c : float
-        1/s, 1/s², 1/s²: the plant's own, or those of Eq. (28) with γ the linkage's slope at neutral.
+        1/s, 1/s², 1/s²: those of the linear plant, or those of Eq. (28) with γ at neutral.
 
     Raises
     ------
@@ -154,5 +156,5 @@ def linear_model(plant: Plant, linkage: FourBar) -> tuple[float, float, float]:
 
 
 def _motor_damping(plant: NeckPlant) -> float:
-    """K_m²/(G_g²·R_a) of Eq. (11), N·m·s."""
+    """Return K_m²/(G_g²·R_a) of Eq. (11), N·m·s."""
     return plant.motor_constant**2 / (plant.gear_ratio**2 * plant.output_impedance)

@@ -1,7 +1,7 @@
-"""A human nod: muscles bring the head along the smoothest way from rest to rest.
+"""A human nod: a minimum-jerk motion from rest to rest.
 
-Least jerk between two rests is 10τ³ − 15τ⁴ + 6τ⁵ of the way after a share τ of the time (Flash and Hogan, J. Neurosci.
-5(7), 1985, Eq. (3)). The paper's subject took 0.3 s for 70° without overshoot, Fig. 10 (b).
+After a share τ of the time a minimum-jerk motion has covered 10τ³ − 15τ⁴ + 6τ⁵ of its distance (Flash and Hogan,
+J. Neurosci. 5(7), 1985, Eq. (3)). The paper's subject took 0.3 s for 70° without overshoot, Fig. 10 (b).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 
 def nod(command: Nod, times: Floats) -> Floats:
-    """Move along a nod: rest, rise, hold, and back the same way.
+    """Return the motion of a nod: rest, rise, hold, and back.
 
     Parameters
     ----------
@@ -34,15 +34,15 @@ def nod(command: Nod, times: Floats) -> Floats:
     rise = math.radians(command.rise_deg)
     up = (times - command.rest_s) / command.rise_s
     down = up - 1 - command.hold_s / command.rise_s
-    angle = math.radians(command.from_deg) + rise * (_way(up) - _way(down))
-    return np.stack([angle, rise / command.rise_s * (_pace(up) - _pace(down))])
+    angle = math.radians(command.from_deg) + rise * (_distance(up) - _distance(down))
+    return np.stack([angle, rise / command.rise_s * (_speed(up) - _speed(down))])
 
 
-def _way(share: Floats) -> Floats:
+def _distance(share: Floats) -> Floats:
     tau = np.clip(share, 0.0, 1.0)
     return tau**3 * (10 - 15 * tau + 6 * tau**2)
 
 
-def _pace(share: Floats) -> Floats:
+def _speed(share: Floats) -> Floats:
     tau = np.clip(share, 0.0, 1.0)
     return 30 * tau**2 * (1 - tau) ** 2

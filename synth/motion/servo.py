@@ -1,8 +1,8 @@
-"""The servo's torque over its error: straight lines with kinks, where it has a dead zone or a limit.
+"""The servo's torque as a piecewise linear function of its error, with a dead zone and a limit.
 
-    servo(e) = gain·dz(e),  dz(e) = sgn(e)·max(|e| − width, 0),  and never beyond ±limit
+    servo(e) = gain·dz(e) limited to ±limit,  dz(e) = sgn(e)·max(|e| − width, 0)
 
-With error e = v − feedback and without either it is gain·e.
+The error is e = v − feedback. Without dead zone and limit the torque is gain·e.
 """
 
 from __future__ import annotations
@@ -13,34 +13,34 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Servo:
-    """Sectors of error, each with its straight line."""
+    """Intervals of the error, called sectors, each with a straight line."""
 
     kinks: tuple[float, ...]
-    """Errors between one sector and the next, ascending."""
+    """Errors at the borders between sectors, ascending."""
     lines: tuple[tuple[float, float], ...]
-    """Of each sector: slope and offset of the torque, as angular acceleration of the head."""
+    """For each sector the slope and offset of the torque, as angular acceleration of the head."""
 
     def sector(self, error: float) -> int:
-        """Where an error lies."""
+        """Return the sector of an error."""
         return bisect_right(self.kinks, error)
 
     def torque(self, sector: int, error: float) -> float:
-        """Angular acceleration, rad/s², along the line of a sector."""
+        """Return the angular acceleration, rad/s², on the line of a sector."""
         slope, offset = self.lines[sector]
         return slope * error + offset
 
 
 def build_servo(gain: float, width: float | None, limit: float | None) -> Servo:
-    """Lay out the sectors.
+    """Return a servo's sectors.
 
     Parameters
     ----------
     gain : float
-        rad/s² for each unit of error.
+        rad/s² per unit of error.
     width : float or None
-        Half the dead zone, unit of error.
+        Half-width of the dead zone, in units of the error; ``None`` without one.
     limit : float or None
-        rad/s².
+        Limit of the torque, rad/s²; ``None`` without one.
     """
     kinks: list[float] = []
     lines = [(gain, 0.0)]

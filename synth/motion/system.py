@@ -1,174 +1,197 @@
-"""The whole right-hand side, and the kinks between which it is smooth.
+"""The right-hand side of the equation of motion, and the kinks between which it is smooth.
 
-The state is θ, θ̇, the appendage's angle ψ from the head and ψ̇, and the share w of the oil that is warm. The appendage
-turns about the head's own axis, held to it by a spring and a damper; with I its inertia and J the head's,
-
-    I·(θ̈ + ψ̈) = −k·ψ − d·ψ̇        and the head gets the opposite torque, so with s = I/J, ω² = k/I, 2ζω = d/I
-    ψ̈ = −ω²·ψ − 2ζω·ψ̇ − θ̈          head: + s·(ω²·ψ + 2ζω·ψ̇)
-
-A mode names the smooth piece in which the state is: which straight line of the servo, whether the one-sided spring is
-taut, and which way the head slides. Nothing is smoothed; the integrator stops where a mode ends.
+The state vector is θ, θ̇ and the states of the effects (`state_places`). A mode names the smooth piece in which the
+state lies: the straight line of the servo, the side of each effect's edge, and the direction in which the head slides.
+Nothing is smoothed; the integrator stops where a mode ends.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
-from synth.motion.friction import Friction
-from synth.motion.loads import Load
+from synth.effects import REGISTRY, Dynamics, Effect
+from synth.effects.coulomb_friction import Friction
 from synth.motion.mechanism import Mechanism
 from synth.motion.servo import Servo
 
 State = list[float]
-"""θ, θ̇, ψ, ψ̇, w."""
+"""θ, rad, θ̇, rad/s, and the states of the effects."""
 Signal = Callable[[float], float]
 
 SLOP = 1e-12
-"""A mode ends this much beyond its kink (rad, rad/s or V), so that the next one does not end at once."""
-PULL_SLOP = 1e-9
-"""The same for the pull on a resting head, rad/s²."""
+"""A mode ends this far beyond its kink (rad, rad/s or V), so that the next mode does not end at once."""
+TORQUE_SLOP = 1e-9
+"""The same for the torque on a resting head, rad/s²."""
 
 
 class Mode(NamedTuple):
     """A smooth piece of the right-hand side."""
 
     sector: int
-    """Of the servo's error."""
-    taut: bool
-    """The one-sided spring pulls."""
+    """Sector of the servo's error."""
+    above: tuple[bool, ...]
+    """For each effect with an edge: whether the head is above it."""
     sense: int
-    """Of the sliding head, +1 or −1; 0 while it sticks."""
+    """Direction of the sliding head, +1 or −1; 0 while it sticks."""
 
 
-class Slack(NamedTuple):
-    """A one-sided spring."""
+class Acting(NamedTuple):
+    """The dynamics of one effect and its place in the system."""
 
-    stiffness: float
-    """1/s²."""
-    angle: float
-    """Above which it pulls, rad."""
-
-
-class Appendage(NamedTuple):
-    """What swings on the head."""
-
-    stiffness: float
-    """k/I, 1/s²."""
-    damping: float
-    """d/I, 1/s."""
-    share: float
-    """I/J."""
+    dynamics: Dynamics
+    place: slice
+    """Place of its states in the state vector."""
+    edge: int | None
+    """Index of its edge in `Mode.above`; ``None`` without an edge."""
 
 
-class Warming(NamedTuple):
-    """Oil that warms by ẇ = (1 − w)·θ̇²/work and loses a share of its damping when warm."""
+def state_places(effects: Sequence[Effect]) -> dict[str, slice]:
+    """Return the place of each effect's states in the state vector, by effect id.
 
-    share: float
-    work: float
-    """rad²/s."""
+    Effects with `Effect.keeps_places` come first and are always listed, whether they act or not.
+    """
+    kept = [effect for effect in REGISTRY if effect.keeps_places]
+    places, start = {}, 2
+    for effect in [*kept, *(type(effect) for effect in effects if not effect.keeps_places)]:
+        places[effect.id] = slice(start, start + len(effect.states))
+        start += len(effect.states)
+    return places
+
+
+def state_count(effects: Sequence[Effect]) -> int:
+    """Return the length of the state vector."""
+    return max((place.stop for place in state_places(effects).values()), default=2)
 
 
 @dataclass(frozen=True)
 class System:
-    """A plant and all effects of actuator and load; what is absent is ``None``."""
+    """A plant and all effects of actuator and load."""
 
     mechanism: Mechanism
     servo: Servo
-    loads: tuple[Load, ...]
-    shake: Signal
-    """Torque from elsewhere, rad/s²."""
-    slack: Slack | None
-    appendage: Appendage | None
-    warming: Warming | None
+    acting: tuple[Acting, ...]
+    """In the order in which their torques are added."""
     friction: Friction | None
-    by_sense: bool
-    """Whether something changes its form where the motion turns round."""
+    count: int
+    """Length of the state vector."""
 
     def rates(self, mode: Mode, drive: Signal) -> Callable[[float, State], State]:
-        """Give the right-hand side within one mode, (t, state) → the state's rates."""
-        appendage, warming, friction, sense = self.appendage, self.warming, self.friction, mode.sense
+        """Return the right-hand side within one mode, (t, state) → rates of the state."""
+        friction, sense, stateful = self.friction, mode.sense, self._with("rates")
 
         def rates(t: float, state: State) -> State:
-            _, omega, psi, swing, warm = state
+            omega = state[1]
             acceleration = 0.0
             if sense:
-                pull, inertia = self.pull(t, state, mode, drive)
+                torque, inertia = self.torque(t, state, mode, drive)
                 dry = friction.sliding(sense, omega) if friction else 0.0
-                acceleration = (pull + dry) / inertia
-            swung = -appendage.stiffness * psi - appendage.damping * swing - acceleration if appendage else 0.0
-            warmed = (1 - warm) * omega * omega / warming.work if warming else 0.0
-            return [omega, acceleration, swing, swung, warmed]
+                acceleration = (torque + dry) / inertia
+            out = [omega, acceleration] + [0.0] * (self.count - 2)
+            for dynamics, place, _ in stateful:
+                out[place] = dynamics.rates(omega, acceleration, state[place])
+            return out
 
         return rates
 
-    def pull(self, t: float, state: State, mode: Mode, drive: Signal) -> tuple[float, float]:
-        """Everything but friction, rad/s², and the inertia that it moves, as a share of the head's."""
-        theta, omega, psi, swing, warm = state
-        oil = 1 - self.warming.share * warm if self.warming else 1.0
-        feedback, lever, pull, inertia = self.mechanism.terms(theta, omega, oil)
-        pull += lever * self.servo.torque(mode.sector, drive(t) - feedback) + self.shake(t)
-        for load in self.loads:
-            pull += load(theta, omega)
-        if self.slack and mode.taut:
-            pull -= self.slack.stiffness * (theta - self.slack.angle)
-        if self.appendage:
-            pull += self.appendage.share * (self.appendage.stiffness * psi + self.appendage.damping * swing)
-        return pull, inertia
+    def torque(self, t: float, state: State, mode: Mode, drive: Signal) -> tuple[float, float]:
+        """Return all torques but friction, rad/s², and the inertia they act on, relative to the head's."""
+        theta, omega = state[0], state[1]
+        damping = 1.0
+        for dynamics, place, _ in self._damping:
+            damping *= dynamics.damping_factor(state[place])
+        feedback, lever, torque, inertia = self.mechanism.terms(theta, omega, damping)
+        torque += lever * self.servo.torque(mode.sector, drive(t) - feedback) + self.disturbance(t)
+        for dynamics, place, edge in self._torques:
+            torque += dynamics.torque(theta, omega, state[place], edge is not None and mode.above[edge])
+        return torque, inertia
+
+    def disturbance(self, t: float) -> float:
+        """Return the torques that depend on time alone, rad/s²."""
+        return sum((dynamics.disturbance(t) for dynamics, _, _ in self._disturbances), 0.0)
 
     def mode(self, t: float, state: State, drive: Signal, sense: int = 1) -> Mode:
-        """Find the mode of a state; `sense` is kept where the state does not tell."""
+        """Return the mode of a state; `sense` is kept where the state does not determine it."""
         error = drive(t) - self.mechanism.terms(state[0], 0.0, 1.0).feedback
-        mode = Mode(self.servo.sector(error), bool(self.slack and state[0] > self.slack.angle), sense or 1)
-        return self._turned(t, state, mode, drive) if self.by_sense else mode
+        above = tuple(dynamics.edge(state[0]) > 0 for dynamics, _, _ in self._edges)
+        mode = Mode(self.servo.sector(error), above, sense or 1)
+        return self._with_sense(t, state, mode, drive) if self.reverses else mode
 
-    @property
+    @cached_property
+    def reverses(self) -> bool:
+        """Whether the right-hand side has a kink where the motion reverses."""
+        return self.friction is not None or any(acting.dynamics.reverses for acting in self.acting)
+
+    @cached_property
     def kinked(self) -> bool:
         """Whether a mode can end at all."""
-        return bool(self.servo.kinks or self.slack or self.by_sense)
+        return bool(self.servo.kinks or self._edges or self.reverses)
 
     def margins(self, t: float, state: State, mode: Mode, drive: Signal) -> list[float]:
-        """How far it is to each end of the mode; below zero beyond it.
+        """Return the distance to each end of the mode, negative beyond it.
 
-        The ends are the lower and upper one of the servo's line, the one-sided spring's edge, and standstill; for a
-        sticking head, in place of standstill, breaking away downwards and upwards.
+        The ends are the lower and upper end of the servo's line, the edge of each effect that has one, and standstill;
+        for a sticking head breaking away downwards and upwards in place of standstill.
         """
-        margins = [math.inf] * 5
+        margins = [math.inf] * (4 + len(self._edges))
         if self.servo.kinks:
             error = drive(t) - self.mechanism.terms(state[0], 0.0, 1.0).feedback
             if mode.sector > 0:
                 margins[0] = error - self.servo.kinks[mode.sector - 1] + SLOP
             if mode.sector < len(self.servo.kinks):
                 margins[1] = self.servo.kinks[mode.sector] - error + SLOP
-        if self.slack:
-            above = state[0] - self.slack.angle
-            margins[2] = (above if mode.taut else -above) + SLOP
-        if self.by_sense and mode.sense:
-            margins[3] = mode.sense * state[1] + SLOP
+        for number, (dynamics, _, _) in enumerate(self._edges):
+            distance = dynamics.edge(state[0])
+            margins[2 + number] = (distance if mode.above[number] else -distance) + SLOP
+        if self.reverses and mode.sense:
+            margins[-2] = mode.sense * state[1] + SLOP
         elif self.friction and not mode.sense:
-            pull = self.pull(t, state, mode, drive)[0]
-            margins[3] = pull + self.friction.breakaway(-1) + PULL_SLOP
-            margins[4] = self.friction.breakaway(+1) - pull + PULL_SLOP
+            torque = self.torque(t, state, mode, drive)[0]
+            margins[-2] = torque + self.friction.breakaway(-1) + TORQUE_SLOP
+            margins[-1] = self.friction.breakaway(+1) - torque + TORQUE_SLOP
         return margins
 
     def beyond(self, end: int, t: float, state: State, mode: Mode, drive: Signal) -> tuple[Mode, State]:
-        """Cross an end of a mode, by its place among the margins: the mode beyond it, and the state there."""
+        """Cross an end of a mode, given by its index in `margins`; return the mode beyond it and the state there."""
         if end <= 1:
             return mode._replace(sector=mode.sector + (1 if end else -1)), state
-        if end == 2:
-            return mode._replace(taut=not mode.taut), state
+        edge = end - 2
+        if edge < len(self._edges):
+            flipped = (*mode.above[:edge], not mode.above[edge], *mode.above[edge + 1 :])
+            return mode._replace(above=flipped), state
         if mode.sense == 0:
-            return mode._replace(sense=-1 if end == 3 else 1), state
+            return mode._replace(sense=-1 if edge == len(self._edges) else 1), state
         standing = [state[0], 0.0, *state[2:]]
-        return self._turned(t, standing, mode._replace(sense=-mode.sense), drive), standing
+        return self._with_sense(t, standing, mode._replace(sense=-mode.sense), drive), standing
 
-    def _turned(self, t: float, state: State, mode: Mode, drive: Signal) -> Mode:
-        """Give a mode the sense of its motion; at standstill, of the motion that begins."""
+    def _with_sense(self, t: float, state: State, mode: Mode, drive: Signal) -> Mode:
+        """Set a mode's sense to that of the motion; at standstill, to that of the motion that begins."""
         if state[1] != 0.0:
             return mode._replace(sense=1 if state[1] > 0 else -1)
-        pull = self.pull(t, state, mode, drive)[0]
+        torque = self.torque(t, state, mode, drive)[0]
         if self.friction:
-            return mode._replace(sense=self.friction.sense(pull))
-        return mode if pull == 0.0 else mode._replace(sense=1 if pull > 0 else -1)
+            return mode._replace(sense=self.friction.sense(torque))
+        return mode if torque == 0.0 else mode._replace(sense=1 if torque > 0 else -1)
+
+    def _with(self, method: str) -> tuple[Acting, ...]:
+        """Return the effects that override a method of `Dynamics`; the others would add nothing."""
+        return tuple(a for a in self.acting if getattr(type(a.dynamics), method) is not getattr(Dynamics, method))
+
+    @cached_property
+    def _torques(self) -> tuple[Acting, ...]:
+        return self._with("torque")
+
+    @cached_property
+    def _damping(self) -> tuple[Acting, ...]:
+        return self._with("damping_factor")
+
+    @cached_property
+    def _disturbances(self) -> tuple[Acting, ...]:
+        return self._with("disturbance")
+
+    @cached_property
+    def _edges(self) -> tuple[Acting, ...]:
+        return tuple(acting for acting in self.acting if acting.edge is not None)

@@ -1,6 +1,6 @@
-"""The spec of a session to be rendered, section by section."""
+"""The spec of a session to render, section by section."""
 
-from synth.spec.base import Pixel, Rgb
+from synth.section import Pixel, Rgb
 from synth.spec.commands import (
     Chirp,
     Command,
@@ -13,7 +13,7 @@ from synth.spec.commands import (
     Step,
     Triangle,
 )
-from synth.spec.effects import CoulombFriction, Effects
+from synth.spec.effects import Effects
 from synth.spec.picture import NEUTRAL_SERVO, Camera, Flicker, Render, Rig, Scene, Shake
 from synth.spec.plant import Controller, LinearPlant, NeckPlant, Plant
 from synth.spec.session import Recording, Spec, read_spec
@@ -24,7 +24,6 @@ __all__ = [
     "Chirp",
     "Command",
     "Controller",
-    "CoulombFriction",
     "Effects",
     "Flicker",
     "Free",

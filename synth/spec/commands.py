@@ -1,4 +1,4 @@
-"""What is commanded in a recording, and the movements that nobody commands."""
+"""The commands of a recording, and motions without a command."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from synth.spec.base import Finite, NotNegative, Positive, Section
+from synth.section import Finite, NotNegative, Positive, Section
 
 Rest = Annotated[float, Field(ge=0.5, allow_inf_nan=False)]
-"""Rest before the first change, s: long enough to see the neutral and the noise."""
+"""Rest before the first change, s: long enough to measure the neutral and the noise."""
 
 
 class Step(Section):
-    """One step to ``amplitude_deg``, held to the end; the paper's is 22°."""
+    """One step to ``amplitude_deg``, held to the end; 22° in the paper."""
 
     kind: Literal["step"]
     amplitude_deg: Finite = 15.0
@@ -21,7 +21,7 @@ class Step(Section):
 
 
 class Stairs(Section):
-    """Level after level."""
+    """A sequence of levels."""
 
     kind: Literal["stairs"]
     levels_deg: Annotated[list[Finite], Field(min_length=1)]
@@ -30,7 +30,7 @@ class Stairs(Section):
 
 
 class PaperSeries(Section):
-    """The paper's verification: steps of several heights, each from where the one before it ended (Figs. 11, 15)."""
+    """The paper's verification: steps of several heights, each from the end of the previous step (Figs. 11, 15)."""
 
     kind: Literal["paper_series"]
     tread_s: Positive = 1.5
@@ -38,7 +38,7 @@ class PaperSeries(Section):
 
 
 class Triangle(Section):
-    """Slowly up, down through zero and back."""
+    """A slow triangle wave, beginning upwards."""
 
     kind: Literal["triangle"]
     amplitude_deg: Finite = 15.0
@@ -47,7 +47,7 @@ class Triangle(Section):
 
 
 class Chirp(Section):
-    """A sine whose frequency grows linearly until the recording ends."""
+    """A sine whose frequency increases linearly until the recording ends."""
 
     kind: Literal["chirp"]
     amplitude_deg: Finite = 8.0
@@ -66,7 +66,7 @@ class Release(Section):
 
 
 class RandomSteps(Section):
-    """Levels drawn evenly within ±``amplitude_deg``, each held for a time drawn between the two treads."""
+    """Levels drawn uniformly within ±``amplitude_deg``, each held for a time drawn uniformly between the two limits."""
 
     kind: Literal["random"]
     amplitude_deg: Finite = 15.0
@@ -82,7 +82,7 @@ class RandomSteps(Section):
 
 
 class Free(Section):
-    """No command at all: the head is held at ``initial_angle_deg`` by hand and let go after ``rest_s``."""
+    """No command: the head is held at ``initial_angle_deg`` by hand and released after ``rest_s``."""
 
     kind: Literal["free"]
     initial_angle_deg: Finite = 15.0
@@ -90,9 +90,9 @@ class Free(Section):
 
 
 class Nod(Section):
-    """A human nod, no plant at all: smoothly up by ``rise_deg`` in ``rise_s`` with least jerk, hold, and back.
+    """A human nod without a plant: up by ``rise_deg`` in ``rise_s`` with minimum jerk, hold, and back.
 
-    The paper's subject took 0.3 s for 70° (Fig. 10 (b)). A neck without a linkage is needed to reach that far.
+    The paper's subject took 0.3 s for 70° (Fig. 10 (b)). Only a neck without a linkage reaches that far.
     """
 
     kind: Literal["nod"]

@@ -1,4 +1,4 @@
-"""What moves, and what stands between the command file and the servo.
+"""The sections of a spec that describe the plant and the servo controller.
 
 A plant is the base model of Eq. (30), or the paper's neck with its servo, linkage, springs and head.
 """
@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from synth.spec.base import Finite, NotNegative, Positive, Section
+from synth.section import Finite, NotNegative, Positive, Section
 
 
 class LinearPlant(Section):
@@ -43,11 +43,11 @@ class NeckPlant(Section):
     mass: Positive = 2.31
     """M_h, kg."""
     centre_of_mass: Positive = 0.05
-    """L, from the pivot, m."""
+    """L, distance from the pivot, m."""
     own_inertia: NotNegative = 0.075e-3
     """J_cg, kg·m²."""
     neutral_deg: Annotated[float, Field(gt=-90, lt=90, allow_inf_nan=False)] = 45.0
-    """θ0, of the centre of mass from upright at neutral."""
+    """θ0, angle of the centre of mass from upright at neutral."""
     damping: NotNegative = 0.15
     """C, N·m·s."""
     spring_rate: Positive = 1877.8
@@ -62,7 +62,7 @@ class NeckPlant(Section):
     @model_validator(mode="after")
     def _spring_at_a_right_angle(self) -> NeckPlant:
         if self.spring_arm <= self.spring_base:
-            raise ValueError("spring_arm: must be longer than spring_base, it is the long side of a right triangle")
+            raise ValueError("spring_arm: must be longer than spring_base, it is a right triangle's hypotenuse")
         return self
 
 
@@ -77,11 +77,11 @@ Plant = Annotated[
 
 
 class Controller(Section):
-    """The servo controller of Table 2, which rounds what it is told and repeats it in pulses; absent by default."""
+    """The servo controller of Table 2, which quantises the command and sends it in pulses; absent by default."""
 
     pulse_hz: Positive | None = None
     """Position pulses per second, 50 in the paper; a command waits for the next pulse."""
     bits: Annotated[int, Field(ge=4, le=16)] | None = None
-    """Of the command, 8 in the paper: so many levels over 180° of the servo's arm."""
+    """Resolution of the command, 8 in the paper: 2^bits levels over 180° of the servo's arm."""
     phase_s: Finite = 0.0
-    """When a pulse begins, on the clip's clock."""
+    """Time at which a pulse begins, on the clip's clock."""

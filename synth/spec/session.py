@@ -1,8 +1,8 @@
-"""What is to be filmed: one YAML file, validated whole before anything moves.
+"""The spec of a session: one YAML file, fully validated before anything is simulated.
 
-`plant`, `controller` and `effects` say how the head moves and stay secret; `rig`, `scene`, `camera` and `render` say
-what the film shows; `recordings` say what is commanded; `declare` is handed out word for word as the session's
-``rig.yaml``, right or wrong, because a wrong declaration may be the very thing under test.
+`plant`, `controller` and `effects` determine the motion and are written to the truth only; `rig`, `scene`, `camera` and
+`render` determine the picture; `recordings` hold the commands; `declare` is copied to the session's ``rig.yaml``
+without any check, because a test may be about a wrong declaration.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import yaml
 from pydantic import Field, ValidationError, model_validator
 
 from synth.errors import SpecError
-from synth.spec.base import Section
+from synth.section import Section
 from synth.spec.commands import Command, Nod
 from synth.spec.effects import Effects
 from synth.spec.picture import Camera, Render, Rig, Scene
@@ -22,7 +22,7 @@ from synth.spec.plant import Controller, LinearPlant, NeckPlant, Plant
 
 
 class Recording(Section):
-    """One clip and what is commanded while it is taken."""
+    """One clip and its command."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$", max_length=100)]
     duration_s: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
@@ -30,7 +30,7 @@ class Recording(Section):
 
 
 class Spec(Section):
-    """A whole session to be rendered."""
+    """A whole session to render."""
 
     seed: Annotated[int, Field(ge=0)] = 0
     plant: Plant = LinearPlant()
@@ -46,34 +46,34 @@ class Spec(Section):
     @model_validator(mode="after")
     def _fits_together(self) -> Spec:
         if isinstance(self.plant, NeckPlant):
-            for name in ("gravity_geometry", "linkage_geometry", "dead_zone"):
-                if getattr(self.effects, name) is not None:
-                    raise ValueError(f"effects.{name}: belongs to a linear plant, a neck has its own")
+            for effect in self.effects.present():
+                if effect.linear_plant_only:
+                    raise ValueError(f"effects.{effect.id}: only for a linear plant; a neck models it already")
         if self.rig.neck == "human":
             for number, recording in enumerate(self.recordings):
                 if not isinstance(recording.command, Nod):
-                    raise ValueError(f"recordings.{number}.command: a human neck only nods, say kind: nod")
+                    raise ValueError(f"recordings.{number}.command: a human neck only nods, set kind: nod")
         return self
 
     @model_validator(mode="after")
     def _names_differ(self) -> Spec:
-        # disks differ in whether they tell capitals apart
+        # some file systems ignore case
         names = [recording.name.lower() for recording in self.recordings]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            raise ValueError(f"recordings: the name {twice[0]} stands twice")
+            raise ValueError(f"recordings: the name {twice[0]} appears twice")
         return self
 
 
 class _EveryKeyOnce(yaml.SafeLoader):
-    """YAML as it should be: a key that stands twice is a mistake, and nothing but plain data is made."""
+    """A safe YAML loader that rejects duplicate keys."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         keys = [self.construct_object(key, deep=True) for key, _ in node.value]
         for number, key in enumerate(keys):
             if key in keys[:number]:
                 raise yaml.constructor.ConstructorError(
-                    problem=f"the key {key} stands twice", problem_mark=node.start_mark
+                    problem=f"the key {key} appears twice", problem_mark=node.start_mark
                 )
         return super().construct_mapping(node, deep)
 
@@ -89,12 +89,12 @@ def read_spec(path: Path) -> Spec:
     Returns
     -------
     Spec
-        With the defaults in place of what is not given.
+        With defaults for missing keys.
 
     Raises
     ------
     SpecError
-        One line that names the file, the key and the cause.
+        If the spec is wrong; one line with the file, the key and the cause.
     """
     try:
         content = yaml.load(path.read_text(encoding="utf-8"), _EveryKeyOnce)
@@ -121,11 +121,11 @@ _TAGS = {
     "plant": {"linear", "neck"},
     "command": {"step", "stairs", "paper_series", "triangle", "chirp", "release", "random", "free", "nod"},
 }
-"""What pydantic puts after a key to say which of several kinds was meant."""
+"""Tags that pydantic inserts after a key to state which of several kinds was validated."""
 
 
 def _first_finding(error: ValidationError) -> str:
-    """Say the most telling finding in one line; an unknown key explains most of the others, a deep one the shallow."""
+    """Format the most specific finding as one line: an unknown key, as it causes other findings, else the deepest."""
     findings = error.errors()
     unknown = [finding for finding in findings if finding["type"] in _UNKNOWN]
     finding = unknown[0] if unknown else max(findings, key=lambda finding: len(finding["loc"]))
@@ -133,7 +133,7 @@ def _first_finding(error: ValidationError) -> str:
     key = ".".join(
         part
         for at, part in enumerate(where)
-        if "[" not in part and not (at and part in _TAGS.get(where[at - 1], ()))  # alternatives are no keys of the file
+        if "[" not in part and not (at and part in _TAGS.get(where[at - 1], ()))  # tags are not keys of the file
     )
     if unknown:
         return f"unknown key {key}"

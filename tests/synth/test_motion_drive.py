@@ -7,19 +7,21 @@ import pytest
 
 from anglecam.neck import FourBar
 from support.moved import spec_of
+from synth.effects import PiecewiseLinear
+from synth.effects.backlash import play
 from synth.motion.controller import level_size
-from synth.motion.drive import Drive, drive, play
+from synth.motion.drive import drive
 from synth.motion.linkage import straight_gamma
 
 ROWS = np.array([[0.0, 0.0], [0.5, 10.0], [0.6, 0.0], [1.5, 5.0]])
 PULSED = {"pulse_hz": 50, "bits": 8}
 
 
-def asked(rows: np.ndarray, effects: dict | None = None, controller: dict | None = None) -> Drive:
+def asked(rows: np.ndarray, effects: dict | None = None, controller: dict | None = None) -> PiecewiseLinear:
     return drive(rows, spec_of(effects or {}, controller=controller or {}))
 
 
-def sampled(line: Drive, times: np.ndarray) -> np.ndarray:
+def sampled(line: PiecewiseLinear, times: np.ndarray) -> np.ndarray:
     k = np.searchsorted(line.knots, times, side="right") - 1
     values = line.levels[k] + line.slopes[k] * (times - line.knots[k])
     return np.where(k >= 0, values, 0.0)
@@ -43,7 +45,7 @@ def test_play_takes_the_way_of_a_play_operator_stepped_finely():
     knots = np.sort(rng.choice(np.arange(1, 5000), 60, replace=False)) / 1000  # on the grid below
     slopes = rng.normal(0, math.radians(60), 60) * (rng.random(60) < 0.8)
     levels = np.cumsum(rng.normal(0, math.radians(2), 60))
-    leader, half_width = Drive(knots, levels, slopes), math.radians(1.5)
+    leader, half_width = PiecewiseLinear(knots, levels, slopes), math.radians(1.5)
     times = np.arange(0, 20001) / 4000
     follower, at = [], 0.0
     # a step within the grid needs the value just before each knot as well: a straight line may turn there
@@ -102,7 +104,7 @@ def test_controller_dead_time_rate_limit_and_play_act_in_this_order():
 
 
 def test_the_lag_has_the_closed_form_of_a_ramp_through_a_first_order_system():
-    line = Drive(np.array([0.0, 0.5]), np.array([0.0, 0.0]), np.array([0.0, 2.0]))
+    line = PiecewiseLinear(np.array([0.0, 0.5]), np.array([0.0, 0.0]), np.array([0.0, 2.0]))
     v = line.after(0.05, 0.5, 0.3)
     t = 0.62
     assert v(t) == pytest.approx(2.0 * (t - 0.5 - 0.05) + (0.3 + 0.1) * math.exp(-(t - 0.5) / 0.05), abs=1e-14)

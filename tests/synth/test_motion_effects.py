@@ -7,9 +7,8 @@ import pytest
 
 from anglecam.neck import FourBar, servo_angle
 from support.moved import PLANT, STEP, UNDAMPED, let_go, moved
-from synth.motion.friction import build_friction
+from synth.effects.coulomb_friction import CoulombFriction, build_friction
 from synth.motion.linkage import transmission
-from synth.spec import CoulombFriction
 
 B, C = PLANT["b"], PLANT["c"]
 RATE = math.sqrt(B)

@@ -4,9 +4,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from synth.effects import REGISTRY
 from synth.errors import SpecError
-from synth.spec import read_spec
-from synth.spec.base import Section
+from synth.section import Section
+from synth.spec import Effects, read_spec
 
 GOOD = {"recordings": [{"name": "a", "duration_s": 1.0, "command": {"kind": "step"}}]}
 
@@ -58,8 +59,8 @@ def test_defaults_are_the_papers_neck(tmp_path):
         ({"rig": {"linkage": {"crank": 0.2}}}, "rig: linkage: the four links cannot close"),
         ({"rig": {"linkage": {"lever": 0.2}}}, "unknown key rig.linkage.lever"),
         ({"recordings": []}, "recordings"),
-        ({"recordings": 2 * GOOD["recordings"]}, "the name a stands twice"),
-        ({"recordings": [GOOD["recordings"][0], {**GOOD["recordings"][0], "name": "A"}]}, "the name a stands twice"),
+        ({"recordings": 2 * GOOD["recordings"]}, "the name a appears twice"),
+        ({"recordings": [GOOD["recordings"][0], {**GOOD["recordings"][0], "name": "A"}]}, "the name a appears twice"),
         ({"recordings": [{**GOOD["recordings"][0], "name": 300 * "a"}]}, "recordings.0.name"),
         ({"recordings": [{**GOOD["recordings"][0], "name": "a\nb"}]}, "recordings.0.name"),
         ({"camera": {"codec": "h264", "container": "avi", "dropped": 0.1}}, "camera: dropped"),
@@ -99,8 +100,9 @@ def test_what_is_no_spec_at_all_is_one_line_too(tmp_path, content):
 
 def test_the_reference_names_every_key_of_every_section():
     reference = (Path(__file__).parents[2] / "configs" / "README.md").read_text()
-    for module in ("plant", "effects", "commands", "picture", "session"):
-        for name, section in vars(importlib.import_module(f"synth.spec.{module}")).items():
-            if isinstance(section, type) and issubclass(section, Section):
-                for key in section.model_fields:
-                    assert f"{key}" in reference, f"{name}.{key}"
+    modules = [importlib.import_module(f"synth.spec.{name}") for name in ("plant", "commands", "picture", "session")]
+    sections = [Effects, *REGISTRY, *(value for module in modules for value in vars(module).values())]
+    for section in sections:
+        if isinstance(section, type) and issubclass(section, Section):
+            for key in section.model_fields:
+                assert f"{key}" in reference, f"{section.__name__}.{key}"

@@ -1,4 +1,4 @@
-"""What every section of a spec is made of: numbers with bounds, and strictness about keys."""
+"""Building blocks of a spec: bounded numbers, and sections that reject unknown keys."""
 
 from __future__ import annotations
 
@@ -17,6 +17,6 @@ Pixel = tuple[Finite, Finite]
 
 
 class Section(BaseModel):
-    """A part of the spec: an unknown key is an error, and nothing changes once it is read."""
+    """A part of the spec. An unknown key is an error, and a section cannot change once it has been read."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
