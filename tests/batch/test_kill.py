@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from anglecam.batch.process import Lost, MeasuringProcess
+from anglecam.batch.measuring_process import MeasuringProcess, ProcessLost
 from anglecam.batch.run import Options
 from anglecam.batch.run import run_batch as run_here
 from anglecam.errors import RigError
@@ -37,7 +37,7 @@ def wait_until(true, timeout=60.0):
 
 
 def end_of(process):
-    """Bury a killed batch and wait until its workers have seen that it is gone."""
+    """Reap a killed batch."""
     process.wait()
     process.stdout.close()
     process.stderr.close()
@@ -90,8 +90,8 @@ def test_a_measuring_process_that_dies_costs_its_clip_alone(lab, unbroken, tmp_p
 
 def test_a_clip_that_takes_too_long_is_ended_and_the_next_is_measured(tmp_path):
     process, clip = MeasuringProcess(), tiny_clip(tmp_path / "a.avi")
-    request = {"clip": str(clip), "rig": None, "into": str(tmp_path), "keep": None}
-    with pytest.raises(Lost, match=r"took longer than its time limit of 0\.05 s"):
+    request = {"clip": str(clip), "rig": None, "into": str(tmp_path), "series_file": None}
+    with pytest.raises(ProcessLost, match=r"took longer than its time limit of 0\.05 s"):
         process.ask(request, 0.05)
     assert process.ask(request, 60.0)["frames"] == 8
     process.close()

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from anglecam.batch.run import Options, run_batch
-from anglecam.batch.sessions import SessionJob, _configuration
-from anglecam.batch.work import Settings
+from anglecam.batch.session_job import SessionJob, _configuration
+from anglecam.batch.worker import Settings
 from anglecam.data.series import AngleSeries
 from anglecam.io.series_csv import write_series
 from anglecam.io.session import read_session
@@ -22,7 +22,7 @@ from support.motion import Plant
 from support.series import session as make_records
 from support.tiny import tiny_clip, tiny_lab
 
-pytestmark = pytest.mark.usefixtures("kept_processes")
+pytestmark = pytest.mark.usefixtures("shared_processes")
 
 QUIET = Options(jobs=2, quiet=True)
 
@@ -112,5 +112,5 @@ def test_a_session_depends_on_tracks_that_stand_in_a_clips_place(tmp_path):
     found = []
     for x in (10.0, 11.0):
         tracks.write_text(f"scorer,a,a,a\nbodyparts,nose,nose,nose\ncoords,x,y,likelihood\n0,{x},20.0,0.9\n")
-        found.append(_configuration(job, settings, []))
+        found.append(_configuration(job, settings))
     assert found[0] != found[1]

@@ -7,8 +7,8 @@ from pathlib import Path
 import fsspec
 import pytest
 
-from anglecam.batch.output_paths import clip_places, session_places
-from anglecam.batch.sessions import find_sessions
+from anglecam.batch.output_paths import assign_clip_paths, assign_session_folders
+from anglecam.batch.session_job import find_sessions
 from anglecam.batch.sources import Source, find_sources
 from anglecam.errors import RigError
 
@@ -83,23 +83,23 @@ def test_no_two_clips_share_a_place_and_the_first_keeps_its_own():
         Source("/lab/tue/a.avi", "/lab/tue"),
         Source("/other/tue/a.avi", "/other/tue"),
     ]
-    places = clip_places(sources)
+    places = assign_clip_paths(sources)
     assert places["/lab/mon/a.avi"] == "a"
     assert places["/lab/mon/a.mp4"] == "a.mp4"
     assert places["/lab/mon/sub/b.avi"] == "sub/b"
     assert places["/lab/tue/a.avi"] == "tue/a"
     assert len(set(places.values())) == len(sources)
-    fewer = clip_places([sources[0], sources[3]])
+    fewer = assign_clip_paths([sources[0], sources[3]])
     assert fewer["/lab/tue/a.avi"] == places["/lab/tue/a.avi"]  # what else is there makes no difference
 
 
 def test_a_place_of_an_earlier_call_is_not_given_away():
-    assert clip_places([Source("/lab/tue/a.avi", "/lab/tue")], {"a"}) == {"/lab/tue/a.avi": "tue/a"}
+    assert assign_clip_paths([Source("/lab/tue/a.avi", "/lab/tue")], {"a"}) == {"/lab/tue/a.avi": "tue/a"}
 
 
 def test_no_place_is_outside_the_output_folder():
     odd = ["s3://bucket/lab/../../../etc/a.avi", "s3://bucket/lab/./b.avi", "s3://bucket/lab//c.avi"]
-    places = clip_places([Source(address, "s3://bucket/lab") for address in odd])
+    places = assign_clip_paths([Source(address, "s3://bucket/lab") for address in odd])
     for place in places.values():
         assert not place.startswith("/")
         assert not {".", "..", ""} & set(place.split("/"))
@@ -113,4 +113,4 @@ def test_a_session_is_a_folder_with_commands_all_of_whose_clips_are_asked_for(tm
     ]
     part, _ = find_sources([str(tmp_path / "s/a.avi")], tmp_path / "out")
     assert not find_sessions(part)
-    assert session_places([("/x/mon", "/x/mon"), ("/x/tue", "/x/tue")]) == {"/x/mon": "", "/x/tue": "tue"}
+    assert assign_session_folders([("/x/mon", "/x/mon"), ("/x/tue", "/x/tue")]) == {"/x/mon": "", "/x/tue": "tue"}

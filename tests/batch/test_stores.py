@@ -11,7 +11,7 @@ from anglecam.camera.calibration import Calibration, write_calibration
 from anglecam.errors import RigError
 from support.tiny import results, tiny_lab
 
-pytestmark = pytest.mark.usefixtures("kept_processes")
+pytestmark = pytest.mark.usefixtures("shared_processes")
 
 QUIET = Options(jobs=2, quiet=True)
 
@@ -69,7 +69,7 @@ def test_clips_in_s3_give_what_clips_in_a_folder_give_and_are_fetched_once(lab, 
         assert [str(p) for p in result.problems] == ["s3://lab/day/mon/empty.mp4: empty file"]
         same_but_for_addresses(results(tmp_path), lab, "s3://lab/day", from_folder)
         fetched = []
-        monkeypatch.setattr("anglecam.batch.work.fetch", lambda address, to: fetched.append(address))
+        monkeypatch.setattr("anglecam.batch.clip_job.fetch", lambda address, to: fetched.append(address))
         run_batch(["s3://lab/day"], tmp_path, QUIET)
         assert fetched == []  # the store says that nothing has changed
         monkeypatch.undo()
