@@ -13,7 +13,6 @@ import secrets
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -22,18 +21,8 @@ from anglecam.batch.output_folder import OutputFolder
 from anglecam.errors import RigError
 
 
-@dataclass(frozen=True)
-class Run:
-    """One call of the batch, from taking the lock to releasing it."""
-
-    name: str
-    """A random name."""
-    interrupted: str | None = None
-    """Name of the run before, if it was killed or interrupted."""
-
-
 @contextmanager
-def locked(folder: OutputFolder) -> Iterator[Run]:
+def locked(folder: OutputFolder) -> Iterator[str | None]:
     """Keep every other batch out of an output folder until the block or the process ends.
 
     Parameters
@@ -43,8 +32,8 @@ def locked(folder: OutputFolder) -> Iterator[Run]:
 
     Yields
     ------
-    Run
-        The new run.
+    str or None
+        The name of the last run, if it was killed or interrupted.
 
     Raises
     ------
@@ -65,20 +54,46 @@ def locked(folder: OutputFolder) -> Iterator[Run]:
     except OSError as problem:
         raise RigError(f"{shown}: cannot be locked ({problem.strerror})") from problem
     with lock:
-        run = Run(secrets.token_hex(8), interrupted=next(iter(_lines(folder.run_file)[1:]), None))
-        try:
-            folder.run_file.write_text(f"process {os.getpid()} on {socket.gethostname()}\n{run.name}\n")
-        except OSError as problem:
-            raise RigError(f"{shown}: cannot be written to ({problem.strerror})") from problem
-        yield run
+        interrupted = "".join(_lines(folder.run_file)[1:2])
+        # a batch that is killed before `start_run` leaves the interrupted run to the next
+        _write_run(folder, interrupted)
+        yield interrupted or None
         # an exception skips this, so that the next batch finds the name of the run that was interrupted
         with contextlib.suppress(OSError):
             folder.run_file.unlink()
 
 
+def start_run(folder: OutputFolder) -> str:
+    """Start a run in a locked output folder, and end the last one.
+
+    Returns
+    -------
+    str
+        The name of the new run.
+
+    Raises
+    ------
+    RigError
+        If the folder cannot be written to.
+    """
+    run = secrets.token_hex(8)
+    _write_run(folder, run)
+    return run
+
+
 def is_current(folder: OutputFolder, run: str) -> bool:
     """Return whether a run still has the folder: a worker on another machine may outlive the batch it works for."""
     return _lines(folder.run_file)[1:] == [run]
+
+
+def _write_run(folder: OutputFolder, run: str) -> None:
+    """Write the run file: a line that names this process, and one that names a run."""
+    made = folder.run_file.with_name("run.unfinished")
+    try:
+        made.write_text(f"process {os.getpid()} on {socket.gethostname()}\n{run}\n")
+        made.replace(folder.run_file)
+    except OSError as problem:
+        raise RigError(f"--out {folder.path}: cannot be written to ({problem.strerror})") from problem
 
 
 def _lines(file: Path) -> list[str]:

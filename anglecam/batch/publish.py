@@ -133,10 +133,9 @@ def publish(finished: Finished, folder: OutputFolder, database: RecordDatabase) 
             (folder.path / output).unlink(missing_ok=True)
         database.save(record)
     except OSError as problem:
-        return replace(finished, record=_not_written(record, problem))
-    finally:
-        if finished.workspace:
-            shutil.rmtree(folder.path / finished.workspace, ignore_errors=True)
+        finished = replace(finished, record=_not_written(record, problem))
+    if finished.workspace:  # after an interruption it stays, for `recover`
+        shutil.rmtree(folder.path / finished.workspace, ignore_errors=True)
     return finished
 
 

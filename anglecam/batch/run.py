@@ -19,7 +19,7 @@ from anglecam.batch.address import is_of_one_process, join, normalised, stem
 from anglecam.batch.clip_job import ClipJob, run_clip_job
 from anglecam.batch.database import RecordDatabase
 from anglecam.batch.local_pool import LocalPool
-from anglecam.batch.lock import locked
+from anglecam.batch.lock import locked, start_run
 from anglecam.batch.measuring_process import MeasuringProcess
 from anglecam.batch.output_folder import OutputFolder
 from anglecam.batch.output_paths import assign_clip_paths, assign_session_folders
@@ -115,17 +115,18 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
         _require_shared(sources)
     with (
         open_log(options.log) as log,
-        locked(folder) as run,
+        locked(folder) as interrupted,
         RecordDatabase(folder.database_file) as database,
     ):
         earlier = database.read_all(ClipRecord)  # before anything is written: what cannot be read must not be replaced
-        if run.interrupted is not None:
-            recover(run.interrupted, folder, database)
+        if interrupted is not None:
+            recover(interrupted, folder, database)
             earlier = database.read_all(ClipRecord)
         folder.clear_unfinished()
+        run = start_run(folder)
         settings = Settings(
             out=str(folder.path),
-            run=run.name,
+            run=run,
             rig=None if options.rig is None else str(options.rig.resolve()),
             retry_failed=options.retry_failed,
             time_limit=options.time_limit,
@@ -133,7 +134,7 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
         plan = _plan(sources, asked, earlier, database.read_all(SessionRecord), options)
         with contextlib.suppress(OSError):  # such as a full disk
             database.save(*(replace(record, removed=True) for record in plan.removed))
-        summary = Summary(folder, run.name, plan.earlier, plan.earlier_sessions, plan.sessions)
+        summary = Summary(folder, run, plan.earlier, plan.earlier_sessions, plan.sessions)
         with (
             _worker_pool(settings, options) as pool,
             show_progress(len(sources), len(plan.sessions), quiet=options.quiet) as display,

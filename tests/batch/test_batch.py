@@ -6,11 +6,15 @@ import csv
 import json
 import os
 import shutil
+from dataclasses import replace
 
 import duckdb
 import pandas as pd
 import pytest
 
+from anglecam.batch.database import RecordDatabase
+from anglecam.batch.output_folder import OutputFolder
+from anglecam.batch.records import ClipRecord
 from anglecam.batch.run import Options, run_batch
 from anglecam.errors import RigError
 from anglecam.io.rig import Rig
@@ -111,10 +115,10 @@ def test_nothing_is_done_twice_and_what_has_changed_is_done_again(done, tmp_path
     lab, out, _ = done
     lab, out = shutil.copytree(lab, tmp_path / "clips"), tmp_path / "out"
     run_batch([str(lab)], out, QUIET)
-    first, notes = results(out), notes_of(out)
+    first, records = results(out), records_of(out)
     again = run_batch([str(lab)], out, QUIET)
-    assert (results(out), notes_of(out)) == (first, notes)
-    assert len(again.problems) == 2  # what failed is told again, and not tried again
+    assert (results(out), records_of(out)) == (first, records)
+    assert len(again.problems) == 2  # failures are reported again, and not tried again
     tiny_clip(lab / "b.avi", seed=11)  # its content,
     (lab / "mon" / "rig.yaml").write_text("facing: left\n")  # its rig
     (lab / "tue" / "a.command.csv").write_text("time_s,command_deg\n0,0\n0.1,5\n")  # or its command
@@ -122,24 +126,17 @@ def test_nothing_is_done_twice_and_what_has_changed_is_done_again(done, tmp_path
     run_batch([str(lab)], out, QUIET)
     changed = {name for name, content in results(out).items() if first.get(name) != content}
     assert {"b.angles.csv", "mon/a.angles.csv", "mon/a.mkv.angles.csv"} <= changed
-    redone = {name for name in notes if notes_of(out)[name] != notes[name]}
+    redone = {address for address, record in records_of(out).items() if record != records[address]}
     assert len(redone) == 5  # b, two in mon and its empty one, tue/a
-    assert rows(out)[f"{lab}/tue/text.avi"]["wall_time_s"] == first_row(first, f"{lab}/tue/text.avi", notes)
+    first_time = records[f"{lab}/tue/text.avi"].row.wall_time_s
+    assert rows(out)[f"{lab}/tue/text.avi"]["wall_time_s"] == str(first_time)
 
 
-def first_row(first, path, notes):
-    found = [json.loads(note) for note in notes.values() if json.loads(note)["row"]["path"] == path]
-    return str(found[0]["row"]["wall_time_s"])
-
-
-def notes_of(out):
-    """Return what is remembered of each clip; a note is written anew only where something is done."""
-    found = {}
-    for path in (out / ".anglecam" / "clips").glob("*.json"):
-        note = json.loads(path.read_text())
-        note.pop("settled")
-        found[path.name] = json.dumps(note)
-    return found
+def records_of(out):
+    """Return each clip's job record; its wall time changes only if the clip is measured again."""
+    with RecordDatabase(OutputFolder(out).database_file) as database:
+        found = database.read_all(ClipRecord)
+    return {record.address: replace(record, stamp_is_reliable=False) for record in found}
 
 
 def test_a_clip_that_was_merely_touched_is_not_measured_again(tmp_path):
