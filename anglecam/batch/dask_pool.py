@@ -106,7 +106,7 @@ class DaskPool(Generic[Job, Done]):
                 continue
             except (CancelledError, FutureCancelledError, CommClosedError) as fault:
                 raise InputError(
-                    f"--dask {self._address}: the scheduler is lost ({_line(fault)}); repeat the same call to resume"
+                    f"--dask {self._address}: the scheduler is lost ({_line(fault)}); the same call goes on from here"
                 ) from fault
             return done
 

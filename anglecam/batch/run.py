@@ -192,7 +192,7 @@ def _plan(
 def _do_jobs(
     plan: Plan,
     pool: WorkerPool,
-    publish: Callable[[Finished], Finished],
+    put_in_place: Callable[[Finished], Finished],
     summary: Summary,
     display: ProgressDisplay,
     log: Log,
@@ -206,7 +206,7 @@ def _do_jobs(
         while waiting and under_way < pool.capacity:
             pool.start(waiting.popleft())
             under_way += 1
-        finished = publish(pool.next_done())
+        finished = put_in_place(pool.next_done())
         under_way -= 1
         record = finished.record
         if isinstance(record, SessionRecord):

@@ -1,4 +1,4 @@
-"""A folder of clips from beginning to end: what `measure` writes, an index, nothing done twice, nothing lost."""
+"""A folder of clips from beginning to end: results as `measure` writes them, the index, and what is measured again."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ QUIET = Options(jobs=1, quiet=True)
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
-    """Return a lab's folder with two bad clips in it, and what one batch made of it."""
+    """Return a folder of clips, two of them unreadable, the output folder of a batch, and the finished process."""
     top = tmp_path_factory.mktemp("lab")
     lab = tiny_lab(top / "clips", ["b.avi", "mon/a.avi", "mon/a.mkv.avi", "tue/a.avi"])
     (lab / "mon" / "empty.mp4").touch()
     (lab / "tue" / "text.avi").write_text("not a film\n" * 50)
     (lab / "tue" / "rig.yaml").write_text("facing: left\n")
-    told = run(lab, "--out", top / "out", "--jobs", 2, "--log", top / "log.jsonl")
-    return lab, top / "out", told
+    call = run(lab, "--out", top / "out", "--jobs", 2, "--log", top / "log.jsonl")
+    return lab, top / "out", call
 
 
 def rows(out):
@@ -45,7 +45,7 @@ def rows(out):
         return {row["path"]: row for row in csv.DictReader(stream)}
 
 
-def test_each_clip_has_what_measure_writes_in_the_folder_it_has_below_the_one_asked_for(done, tmp_path):
+def test_each_clip_has_the_files_that_measure_writes_in_its_folder_below_the_given_one(done, tmp_path):
     lab, out, _ = done
     for name, rig in (("b.avi", Rig()), ("mon/a.avi", Rig()), ("tue/a.avi", Rig(facing="left"))):
         clip = lab / name
@@ -58,7 +58,7 @@ def test_each_clip_has_what_measure_writes_in_the_folder_it_has_below_the_one_as
         assert rows(out)[str(clip)]["notes"] == "; ".join(measured.notes)
 
 
-def test_the_index_has_a_row_a_clip_and_says_what_became_of_it(done):
+def test_the_index_has_a_row_per_clip_with_its_outcome(done):
     lab, out, _ = done
     index = rows(out)
     assert list(index) == sorted(str(p) for p in lab.rglob("*") if p.suffix in (".avi", ".mp4"))
@@ -76,7 +76,7 @@ def test_the_index_has_a_row_a_clip_and_says_what_became_of_it(done):
     assert index[f"{lab}/mon/empty.mp4"]["cause"] == "empty file"
 
 
-def test_the_index_can_be_asked_by_duckdb_and_pandas(done):
+def test_the_index_can_be_queried_by_duckdb_and_pandas(done):
     _, out, _ = done
     counted = duckdb.sql(f"SELECT status, count(*) FROM '{out}/index.parquet' GROUP BY 1 ORDER BY 1").fetchall()
     assert counted == [("failed", 2), ("ok", 4)]
@@ -86,15 +86,15 @@ def test_the_index_can_be_asked_by_duckdb_and_pandas(done):
     assert list(text.columns) == list(table.columns)
 
 
-def test_a_clip_that_fails_costs_itself_one_line_and_exit_status_1(done):
-    lab, _, told = done
-    assert told.returncode == 1
-    lines = [line for line in told.stderr.splitlines() if " of 6: " not in line]
+def test_a_clip_that_fails_gives_one_line_and_exit_status_1(done):
+    lab, _, call = done
+    assert call.returncode == 1
+    lines = [line for line in call.stderr.splitlines() if " of 6: " not in line]
     assert lines == [
         f"{lab}/mon/empty.mp4: empty file",
         f"{lab}/tue/text.avi: not a readable video file (Invalid data found when processing input)",
     ]
-    assert "6 clips: 4 ok, 2 failed" in told.stdout
+    assert "6 clips: 4 ok, 2 failed" in call.stdout
 
 
 def test_the_log_is_a_line_of_json_for_every_clip(done):
@@ -104,14 +104,14 @@ def test_the_log_is_a_line_of_json_for_every_clip(done):
     assert all(line.keys() >= {"time", "status", "cause", "wall_time_s"} for line in lines)
 
 
-def test_progress_is_plain_lines_where_there_is_no_terminal_and_quiet_is_quiet(done):
-    lab, out, told = done
-    assert sum(" of 6: " in line for line in told.stderr.splitlines()) == 6
+def test_progress_is_plain_lines_without_a_terminal_and_nothing_with_quiet(done):
+    lab, out, call = done
+    assert sum(" of 6: " in line for line in call.stderr.splitlines()) == 6
     quiet = run(lab / "mon" / "a.avi", lab / "b.avi", "--out", out.parent / "quiet", "--quiet")
     assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
 
 
-def test_nothing_is_done_twice_and_what_has_changed_is_done_again(done, tmp_path):
+def test_only_what_has_changed_is_measured_again(done, tmp_path):
     lab, out, _ = done
     lab, out = shutil.copytree(lab, tmp_path / "clips"), tmp_path / "out"
     run_batch([str(lab)], out, QUIET)
@@ -139,7 +139,7 @@ def records_of(out):
     return {record.address: replace(record, stamp_is_reliable=False) for record in found}
 
 
-def test_a_clip_that_was_merely_touched_is_not_measured_again(tmp_path):
+def test_a_clip_with_new_times_and_the_same_content_is_not_measured_again(tmp_path):
     clip = tiny_clip(tmp_path / "clips" / "a.avi")
     run_batch([str(clip)], tmp_path / "out", QUIET)
     before = (tmp_path / "out" / "a.angles.csv").stat().st_mtime_ns
@@ -148,7 +148,7 @@ def test_a_clip_that_was_merely_touched_is_not_measured_again(tmp_path):
     assert (tmp_path / "out" / "a.angles.csv").stat().st_mtime_ns == before
 
 
-def test_what_failed_is_tried_again_when_asked_or_changed_and_its_old_results_are_gone(tmp_path):
+def test_a_failed_clip_is_measured_again_on_request_or_after_a_change_and_has_no_old_results(tmp_path):
     clip, out = tiny_clip(tmp_path / "clips" / "a.avi"), tmp_path / "out"
     assert not run_batch([str(clip)], out, QUIET).problems
     whole = clip.read_bytes()
@@ -162,16 +162,16 @@ def test_what_failed_is_tried_again_when_asked_or_changed_and_its_old_results_ar
     assert run_batch([str(clip)], out, Options(jobs=1, quiet=True, retry_failed=True)).rows[0].status == "ok"
 
 
-def test_a_wrong_rig_file_costs_its_own_folder_and_is_exit_status_2_at_the_end(tmp_path):
+def test_a_wrong_rig_file_affects_its_folder_only_and_gives_exit_status_2(tmp_path):
     lab = tiny_lab(tmp_path / "clips", ["good/a.avi", "wrong/b.avi"])
     (lab / "wrong" / "rig.yaml").write_text("pivott: {}\n")
-    told = run(lab, "--out", tmp_path / "out", "--quiet")
-    assert told.returncode == 2
-    assert told.stderr.splitlines() == [f"{lab}/wrong/b.avi: {lab}/wrong/rig.yaml: unknown key pivott"]
+    call = run(lab, "--out", tmp_path / "out", "--quiet")
+    assert call.returncode == 2
+    assert call.stderr.splitlines() == [f"{lab}/wrong/b.avi: {lab}/wrong/rig.yaml: unknown key pivott"]
     assert (tmp_path / "out" / "good" / "a.angles.csv").exists()
 
 
-def test_the_index_goes_on_telling_of_other_folders_and_forgets_what_is_no_longer_there(tmp_path):
+def test_the_index_keeps_other_folders_and_drops_clips_that_are_gone(tmp_path):
     out = tmp_path / "out"
     mon, tue = tiny_lab(tmp_path / "mon", ["a.avi", "b.avi"]), tiny_lab(tmp_path / "tue", ["a.avi"])
     run_batch([str(mon)], out, QUIET)
@@ -185,7 +185,7 @@ def test_the_index_goes_on_telling_of_other_folders_and_forgets_what_is_no_longe
     run_batch([str(mon)], out, QUIET)
     assert list(rows(out)) == [f"{mon}/a.avi", f"{tue}/a.avi"]
     run_batch([str(tue)], out, QUIET)
-    assert list(rows(out)) == [f"{mon}/a.avi", f"{tue}/a.avi"]  # whatever is asked for next
+    assert list(rows(out)) == [f"{mon}/a.avi", f"{tue}/a.avi"]  # also after a batch of another folder
     (tue / "b.avi").write_bytes((tue / "a.avi").read_bytes())
     run_batch([str(tue)], out, QUIET)
     (mon / "b.avi").write_bytes((mon / "a.avi").read_bytes())
@@ -193,16 +193,16 @@ def test_the_index_goes_on_telling_of_other_folders_and_forgets_what_is_no_longe
     run_batch([str(tue)], out, QUIET)
     found = [row["series"] for row in rows(out).values()]
     assert found == ["a.angles.csv", "b.angles.csv", "tue/a.angles.csv", "tue/b.angles.csv"]
-    assert all((out / series).exists() for series in found)  # what is gone keeps its results' place
+    assert all((out / series).exists() for series in found)  # the output path of a removed clip stays taken
 
 
 def test_wrong_calls_are_exit_status_2_and_do_nothing(tmp_path):
     lab = tiny_lab(tmp_path / "clips", ["a.avi"])
     (tmp_path / "rig.yaml").write_text("facing: up\n")
     (tmp_path / "file").touch()
-    told = run(lab, "--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out")
-    assert told.returncode == 2
-    assert told.stderr.splitlines() == [f"{tmp_path}/rig.yaml: facing: input should be 'right' or 'left' (got up)"]
+    call = run(lab, "--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out")
+    assert call.returncode == 2
+    assert call.stderr.splitlines() == [f"{tmp_path}/rig.yaml: facing: input should be 'right' or 'left' (got up)"]
     for out, options, says in (
         (tmp_path / "file", QUIET, "is a file"),
         (tmp_path / "out", Options(jobs=1, log=tmp_path), "--log"),

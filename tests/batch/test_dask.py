@@ -1,4 +1,4 @@
-"""The same jobs on Dask workers: real processes, one of which is killed."""
+"""The same jobs on Dask workers, in real processes; one of them is killed."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def cluster(tmp_path):
         process.wait(30)
 
 
-def test_a_worker_killed_in_the_middle_loses_nothing(cluster, tmp_path):
+def test_a_worker_that_is_killed_loses_no_clip(cluster, tmp_path):
     address, workers = cluster
     lab, out = tiny_lab(tmp_path / "lab", [f"{k}.avi" for k in range(12)]), tmp_path / "out"
     killed = []
@@ -69,7 +69,7 @@ def test_a_worker_killed_in_the_middle_loses_nothing(cluster, tmp_path):
     assert results(out) == results(tmp_path / "here")
 
 
-def test_what_is_no_address_is_told_at_once(tmp_path):
+def test_an_invalid_scheduler_address_is_refused_at_once(tmp_path):
     lab = tiny_lab(tmp_path / "lab", ["a.avi"])
     with pytest.raises(
         RigError, match=r"^--dask nonsense: neither local nor an address with a port, as tcp://HOST:8786$"
@@ -77,7 +77,7 @@ def test_what_is_no_address_is_told_at_once(tmp_path):
         run_batch([str(lab)], tmp_path / "out", Options(jobs=1, quiet=True, dask="nonsense"))
 
 
-def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path, monkeypatch):
+def test_a_missing_scheduler_is_reported_in_one_line(tmp_path, monkeypatch):
     monkeypatch.setattr("anglecam.batch.cluster._WAIT_S", 1.0)
     lab = tiny_lab(tmp_path / "lab", ["a.avi"])
     with pytest.raises(RigError, match=r"^--dask tcp://127\.0\.0\.1:9: no scheduler with a worker there \(.*\)$"):
