@@ -99,10 +99,7 @@ class RecordDatabase:
             out = self._file.parent.parent
             raise RigError(f"--out {out}: {self._file} cannot be read ({problem})") from problem
         except (sqlite3.DatabaseError, ValueError, TypeError):  # damaged
-            self._connection.close()
-            for file in (self._file, self._file.with_name(f"{self._file.name}-journal")):
-                file.unlink(missing_ok=True)
-            self._connection = self._connect()
+            self._start_anew()
             return []
 
     def find(self, kind: type[AnyRecord], address: str) -> AnyRecord | None:
@@ -141,6 +138,18 @@ class RecordDatabase:
         """
         with self._transaction() as connection:
             connection.execute(f"DELETE FROM {_TABLES[kind]} WHERE address = ?", (os.fsencode(address),))
+
+    def _start_anew(self) -> None:
+        self._connection.close()
+        try:
+            for file in (self._file, self._file.with_name(f"{self._file.name}-journal")):
+                file.unlink(missing_ok=True)
+        except OSError as problem:
+            out = self._file.parent.parent
+            raise RigError(
+                f"--out {out}: {self._file} is damaged and cannot be removed ({problem.strerror})"
+            ) from problem
+        self._connection = self._connect()
 
     def _connect(self) -> sqlite3.Connection:
         try:
