@@ -1,1 +1,1 @@
-"""Folders of clips: every clip measured once, on one machine or many, and an index that says what became of each."""
+"""Folders of clips: every clip is measured once, on one machine or several, and an index states each outcome."""

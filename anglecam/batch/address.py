@@ -1,7 +1,7 @@
-"""Where clips lie: a path on this machine, or an address that fsspec reads, such as ``s3://bucket/clip.avi``.
+"""Addresses of clips: a path on this machine, or an address that fsspec reads, such as ``s3://bucket/clip.avi``.
 
-Every function takes either. Local files are not read through fsspec, so that what the system says of them (permission
-denied, no such file) comes through as it is.
+Every function takes both. Local files are not read through fsspec, so that the operating system's error messages
+(permission denied, no such file) reach the user unchanged.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ import fsspec
 
 from anglecam.errors import AnglecamError, InputError, RigError
 
-_PROCESS_ONLY = ("memory",)
-"""Stores that exist within one process."""
+_IN_MEMORY = ("memory",)
+"""Protocols of stores that exist within one process only."""
 
 
-class PassingError(InputError):
-    """A store could not be asked; another time may be different."""
+class TransientError(InputError):
+    """A store did not answer; the next attempt may succeed."""
 
 
 def normalised(address: str) -> str:
-    """Return a local path as an absolute one, without ``file://``; a remote address without a slash at its end."""
+    """Return a local path in absolute form without ``file://``, or a remote address without a slash at its end."""
     if address.startswith(("file://", "local://")):
         address = address.partition("://")[2] or "/"
     if is_remote(address):
@@ -35,68 +35,68 @@ def normalised(address: str) -> str:
 
 
 def is_remote(address: str) -> bool:
-    """Tell whether an address is not a path on this machine."""
+    """Return whether an address is not a path on this machine."""
     return "://" in address and not address.startswith(("file://", "local://"))
 
 
 def is_of_one_process(address: str) -> bool:
-    """Tell whether an address means something in this process only."""
-    return address.partition("://")[0] in _PROCESS_ONLY
+    """Return whether an address is valid in this process only."""
+    return address.partition("://")[0] in _IN_MEMORY
 
 
 def store(address: str) -> tuple[Any, str]:
-    """Open the file system that a remote address lies in.
+    """Open the file system of a remote address.
 
     Parameters
     ----------
     address : str
-        With its protocol.
+        An address with its protocol.
 
     Returns
     -------
     fs : fsspec.AbstractFileSystem
         The file system.
     path : str
-        The address as that file system writes it.
+        The address in the notation of that file system.
 
     Raises
     ------
     RigError
-        Where the protocol is not known, or what reads it is not installed.
+        If the protocol is unknown, or the package that reads it is not installed.
     """
     protocol = address.partition("://")[0]
     try:
         return fsspec.core.url_to_fs(address)
     except ImportError as error:
         extra = "; pip install 'anglecam[s3]'" if protocol in ("s3", "s3a") else ""
-        raise RigError(f"{address}: what reads {protocol}:// is not installed{extra}") from error
+        raise RigError(f"{address}: the package that reads {protocol}:// is not installed{extra}") from error
     except ValueError as error:
         raise RigError(f"{address}: {protocol}:// is no protocol that fsspec knows") from error
 
 
 @contextmanager
 def asking(address: str) -> Iterator[tuple[Any, str]]:
-    """Give a remote address's file system and path, and turn whatever its library raises into one line.
+    """Give the file system and path of a remote address, and turn the exceptions of its library into one line.
 
     Raises
     ------
-    PassingError
-        Where the store does not answer or refuses.
+    TransientError
+        If the store does not answer, or refuses the request.
     FileNotFoundError
-        Where nothing is there.
+        If there is no such file.
     """
     fs, path = store(address)
     try:
         yield fs, path
     except (AnglecamError, FileNotFoundError):
         raise
-    except Exception as fault:  # every store has exceptions of its own
-        said = (str(fault).strip() or type(fault).__name__).splitlines()[0]
-        raise PassingError(f"{address}: cannot be read ({getattr(fault, 'strerror', None) or said})") from fault
+    except Exception as fault:  # every store's library has its own exceptions
+        message = (str(fault).strip() or type(fault).__name__).splitlines()[0]
+        raise TransientError(f"{address}: cannot be read ({getattr(fault, 'strerror', None) or message})") from fault
 
 
 def parent(address: str) -> str:
-    """Return the folder that a file lies in."""
+    """Return the folder that contains a file."""
     if not is_remote(address):
         return os.path.dirname(address)  # noqa: PTH120
     protocol, _, rest = address.partition("://")
@@ -119,7 +119,7 @@ def join(folder: str, file: str) -> str:
 
 
 def names_in(folder: str) -> frozenset[str]:
-    """List the names in a folder; none where it is not there, or is here and cannot be listed."""
+    """Return the names in a folder; none if there is no such folder, or if it is local and cannot be listed."""
     if not is_remote(folder):
         try:
             return frozenset(entry.name for entry in Path(folder).iterdir())
@@ -133,7 +133,7 @@ def names_in(folder: str) -> frozenset[str]:
 
 
 def read_small(address: str) -> bytes | None:
-    """Read a whole file; ``None`` where it is not there, or is here and cannot be read."""
+    """Return a file's content; ``None`` if there is no such file, or if it is local and cannot be read."""
     if not is_remote(address):
         try:
             return Path(address).read_bytes()
@@ -151,8 +151,10 @@ def fetch(address: str, to: Path) -> None:
 
     Raises
     ------
-    PassingError
-        Where it cannot be read, or not be written here.
+    TransientError
+        If it cannot be read, or cannot be written on this machine.
+    InputError
+        If there is no such file.
     """
     to.parent.mkdir(parents=True, exist_ok=True)
     try:

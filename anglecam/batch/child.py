@@ -1,7 +1,7 @@
-"""The program that measures: a line of JSON in for each clip or session, a line of JSON out.
+"""The program of a measuring process: it reads a line of JSON for each clip or session and answers with another.
 
-It makes files in the folder that it is told and nowhere else, and says what it found; where they go, and what is
-remembered, is not its concern. It uses one core, and ends when whoever started it is gone.
+It writes files only to the folder that the request names. Moving them to their output paths and recording the outcome
+is the batch's part. It uses one core, and ends when the process that started it is gone.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from anglecam.measurement.tracks import MeasuredTracks
 from anglecam.workflow.clip import measure_source, open_recording, open_source, write_measurement
 
 _GRACE_S = 60.0
-"""After its time limit a process whose starter is gone, and which does not heed that, ends by itself."""
+"""Time after its time limit at which a process ends itself if it has not noticed that its starter is gone, in s."""
 
 
 def measure(request: dict[str, Any]) -> dict[str, Any]:
@@ -39,13 +39,14 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
     Parameters
     ----------
     request : dict
-        ``clip``; ``rig`` or null; ``into``, an existing folder; ``keep``, a file for the whole series or null.
+        ``clip``; ``rig`` or null; ``into``, an existing folder; ``series_file``, a netCDF file for the
+        series to the last bit, or null.
 
     Returns
     -------
     dict
-        What the index says of the clip, or the ``cause`` why there are no results, whether the ``call_is_wrong``, and
-        whether it is ``passing``: another time may be different.
+        The clip's figures for the index and how it is ``truncated``; or the ``cause`` of the failure, whether the
+        ``call_is_wrong``, and whether the failure is ``transient``: the next attempt may succeed.
     """
     clip, into = Path(request["clip"]), Path(request["into"])
     found: dict[str, Any] = {}
@@ -60,43 +61,43 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
         with blame(clip):
             try:
                 write_measurement(measurement, source.command, into)
-                if request["keep"]:
-                    write_netcdf(measurement.series, Path(request["keep"]))
+                if request["series_file"]:
+                    write_netcdf(measurement.series, Path(request["series_file"]))
             except OSError as problem:
-                return found | {"cause": cannot_write(problem), "call_is_wrong": False, "passing": True}
+                return found | {"cause": cannot_write(problem), "call_is_wrong": False, "transient": True}
     except AnglecamError as problem:
-        found |= {"cause": str(problem), "call_is_wrong": isinstance(problem, RigError), "passing": False}
+        found |= {"cause": str(problem), "call_is_wrong": isinstance(problem, RigError), "transient": False}
     return found
 
 
 def fit(request: dict[str, Any]) -> dict[str, Any]:
-    """Identify one session as `anglecam identify` does, or go the whole way as `anglecam close`.
+    """Identify one session as `anglecam identify` does, or close its loop as `anglecam close` does.
 
     Parameters
     ----------
     request : dict
-        ``session``; ``rig`` or null; ``into``, an existing folder; ``kept``, from a clip's file name to its series;
+        ``session``; ``rig`` or null; ``into``, an existing folder; ``series_files``, from a clip's name to its series;
         ``close``.
 
     Returns
     -------
     dict
-        ``verdict``, ``effects`` and ``problems``, or the ``cause`` why there is no model and whether the
-        ``call_is_wrong``.
+        ``verdict``, ``effects`` and ``problems``; or the ``cause`` of the failure and whether the ``call_is_wrong``.
     """
-    from anglecam.workflow.session import gather_session, loop_input  # a second of imports, which no clip needs
+    # these imports take a second, and clips do not need them
+    from anglecam.workflow.session import gather_session, loop_input
     from anglecam.workflow.session_results import write_closed, write_identified
 
     folder, into = Path(request["session"]), Path(request["into"])
-    kept: dict[str, str] = request["kept"]
+    cached: dict[str, str] = request["series_files"]
 
     def series_of(recording: Recording) -> tuple[AngleSeries, str | None]:
         if not recording.is_clip:  # tracks by another program
             tracked = measure_source(open_recording(recording.source, opened.rig, recording.command))
             return tracked.series, tracked.truncated
-        if recording.source.name not in kept:
+        if recording.source.name not in cached:
             raise InputError(f"{recording.source}: could not be measured")
-        return read_netcdf(Path(kept[recording.source.name])), None
+        return read_netcdf(Path(cached[recording.source.name])), None
 
     try:
         with blame(folder):
@@ -129,15 +130,15 @@ def _figures(measurement: Measurement | MeasuredTracks) -> dict[str, Any]:
 
 
 def _rounded(value: float | None) -> float | None:
-    """Keep what is worth reading: nine digits."""
+    """Round to nine significant digits."""
     return None if value is None else float(f"{value:.9g}")
 
 
 def main() -> None:
-    """Answer requests until there are no more."""
+    """Answer requests until standard input ends."""
     answers = os.fdopen(os.dup(1), "w", encoding="ascii")
-    os.dup2(2, 1)  # no library's chatter among the answers
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the starter's to answer
+    os.dup2(2, 1)  # messages of libraries must not mix with the answers
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the starter handles Ctrl-C
     cv2.setNumThreads(1)
     requests: queue.SimpleQueue[dict[str, Any]] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(requests,), daemon=True).start()
@@ -151,7 +152,7 @@ def main() -> None:
 
 
 def _listen(requests: queue.SimpleQueue[dict[str, Any]]) -> None:
-    """Take requests in; when the starter is gone, end at once, whatever is being measured."""
+    """Queue the requests; when the starter is gone, end the process at once, even while it measures."""
     for line in sys.stdin:
         requests.put(json.loads(line))
     os._exit(1)

@@ -1,4 +1,4 @@
-"""What a result depends on: the clip's content, and the content of everything that is declared beside it."""
+"""What a clip's results depend on: the content of the clip, and of rig file, calibration and command."""
 
 from __future__ import annotations
 
@@ -16,13 +16,15 @@ from anglecam.errors import InputError
 from anglecam.io.command_csv import COMMAND_ENDING
 
 _RACY_NS = 2_000_000_000
-"""A file touched so shortly before it was read may change again within one tick of its file system's clock."""
+"""A file that changed less than this time, in ns, before it was read may change again within one tick of the file
+system's clock.
+"""
 
 Stamp = dict[str, Any]
 
 
 def stamp(address: str) -> Stamp:
-    """Say which version of a file is there, without reading it.
+    """Return a stamp that identifies the current version of a file, without reading the file.
 
     Parameters
     ----------
@@ -32,12 +34,13 @@ def stamp(address: str) -> Stamp:
     Returns
     -------
     dict
-        ``size`` in bytes, and what changes whenever the file does: the times of its inode, or a store's own key.
+        ``size`` in bytes, and values that change whenever the file changes: the times of its inode, or the key by which
+        a remote store identifies a version.
 
     Raises
     ------
     InputError
-        Where there is no such file, or its store does not answer.
+        If there is no such file, or its store does not answer.
     """
     try:
         if is_remote(address):
@@ -46,30 +49,30 @@ def stamp(address: str) -> Stamp:
         found = Path(address).stat()
     except FileNotFoundError as problem:
         raise InputError(f"{address}: no such file") from problem
-    # the inode's own time cannot be set by hand, as the content's can
+    # a program can set the content's time (mtime) by hand, but not the inode's (ctime)
     return {"size": found.st_size, "content": found.st_mtime_ns, "inode": [found.st_ino, found.st_ctime_ns]}
 
 
-def is_settled(one: Stamp) -> bool:
-    """Tell whether a file cannot change from now on without its stamp changing."""
-    return "key" in one or max(one["content"], one["inode"][1]) < time.time_ns() - _RACY_NS
+def is_reliable(found: Stamp) -> bool:
+    """Return whether every later change of the file will change its stamp."""
+    return "key" in found or max(found["content"], found["inode"][1]) < time.time_ns() - _RACY_NS
 
 
 def content_hash(path: Path) -> str:
-    """Return the SHA-256 of a file's content."""
+    """Return the SHA-256 of a file's content, in hexadecimal."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def clip_configuration(address: str, rig: str | None) -> str:
-    """Return a hash of all that a clip's results depend on besides the clip and the version.
+    """Return a hash of everything that a clip's results depend on, except the clip and the version of anglecam.
 
     Parameters
     ----------
     address : str
         The clip.
     rig : str or None
-        The rig file for all clips; ``None``: the one beside the clip.
+        The rig file for all clips; ``None``: the rig file beside the clip.
 
     Returns
     -------
@@ -79,7 +82,7 @@ def clip_configuration(address: str, rig: str | None) -> str:
     file = rig or join(parent(address), "rig.yaml")
     declared = read_small(file)
     calibration = calibration_named(declared)
-    return combined(
+    return combined_hash(
         {
             "rig": declared,
             "calibration": None if calibration is None else read_small(_beside(file, calibration)),
@@ -89,7 +92,7 @@ def clip_configuration(address: str, rig: str | None) -> str:
 
 
 def calibration_named(rig: bytes | None) -> str | None:
-    """Return the calibration file that a rig file's content names, ``None`` where it names none or is no rig file."""
+    """Return the calibration file that a rig file names; ``None`` if there is none, or the content is no rig file."""
     if rig is None or b"calibration" not in rig:
         return None
     try:
@@ -99,8 +102,8 @@ def calibration_named(rig: bytes | None) -> str | None:
     return named if isinstance(named, str) else None
 
 
-def combined(parts: Mapping[str, bytes | str | None]) -> str:
-    """Return one SHA-256 of named parts, in which no two different sets of parts are alike."""
+def combined_hash(parts: Mapping[str, bytes | str | None]) -> str:
+    """Return the SHA-256 of a set of named parts; different sets have different hashes."""
     hashes = {
         key: None if part is None else hashlib.sha256(part if isinstance(part, bytes) else part.encode()).hexdigest()
         for key, part in parts.items()

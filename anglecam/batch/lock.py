@@ -1,9 +1,13 @@
-"""One batch at a time in an output folder; a batch that was killed leaves nothing that would have to be removed."""
+"""The lock that admits one batch at a time to an output folder. A killed batch leaves nothing that must be removed.
+
+The operating system releases the lock when the process that holds it ends, however it ends. A file system that
+implements no such lock is refused: `filelock` could fall back to a marker file there, but a killed batch would leave
+the marker, and someone would have to remove it.
+"""
 
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import secrets
 import socket
@@ -11,62 +15,89 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from filelock import FileLock, Timeout
+
+from anglecam.batch.output_folder import OutputFolder
 from anglecam.errors import RigError
 
 
 @contextmanager
-def locked(file: Path) -> Iterator[str]:
-    """Keep every other batch out of the folder of a file, until the block or the process ends.
+def locked(folder: OutputFolder) -> Iterator[str | None]:
+    """Keep every other batch out of an output folder until the block or the process ends.
 
     Parameters
     ----------
-    file : Path
-        The lock's file; it says who holds the lock.
+    folder : OutputFolder
+        The output folder.
 
     Yields
     ------
-    str
-        The name of this run.
+    str or None
+        The name of the last run, if it was killed or interrupted.
 
     Raises
     ------
     RigError
-        Where another batch is at work, or the folder cannot be written to.
+        If another batch is at work, if the folder cannot be written to, or if its file system has no locks.
     """
+    shown = f"--out {folder.path}"
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        stream = file.open("a+")
+        folder.lock_file.parent.mkdir(parents=True, exist_ok=True)
+        folder.lock_file.touch()
     except OSError as problem:
-        raise RigError(f"--out {file.parent.parent}: cannot be written to ({problem.strerror})") from problem
-    with stream:
-        try:
-            # the system lets go of it when the process ends, whatever ends it
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            stream.seek(0)
-            who = stream.read().partition("\n")[0] or "unknown"
-            raise RigError(f"--out {file.parent.parent}: another batch is at work there ({who})") from None
-        except OSError as problem:
-            raise RigError(f"--out {file.parent.parent}: cannot be locked ({problem.strerror})") from problem
-        run = secrets.token_hex(8)
-        try:
-            stream.seek(0)
-            stream.truncate()
-            stream.write(f"process {os.getpid()} on {socket.gethostname()}\n{run}\n")
-            stream.flush()
-        except OSError as problem:
-            raise RigError(f"--out {file.parent.parent}: cannot be written to ({problem.strerror})") from problem
-        try:
-            yield run
-        finally:
-            # a worker elsewhere that is still at it is not to put anything here any more
-            with contextlib.suppress(OSError):
-                stream.truncate(0)
-
-
-def is_current(file: Path, run: str) -> bool:
-    """Tell whether a run still has the folder: a worker elsewhere may outlive the batch that it works for."""
+        raise RigError(f"{shown}: cannot be written to ({problem.strerror})") from problem
     try:
-        return file.read_text().splitlines()[1:] == [run]
-    except OSError:
-        return False
+        lock = FileLock(folder.lock_file, fallback_to_soft=False).acquire(blocking=False)
+    except Timeout:
+        holder = (_lines(folder.run_file) or ["unknown"])[0]
+        raise RigError(f"{shown}: another batch is at work there ({holder})") from None
+    except OSError as problem:
+        raise RigError(f"{shown}: cannot be locked ({problem.strerror})") from problem
+    with lock:
+        interrupted = "".join(_lines(folder.run_file)[1:2])
+        # a batch that is killed before `start_run` leaves the interrupted run to the next
+        _write_run(folder, interrupted)
+        yield interrupted or None
+        # an exception skips this, so that the next batch finds the name of the run that was interrupted
+        with contextlib.suppress(OSError):
+            folder.run_file.unlink()
+
+
+def start_run(folder: OutputFolder) -> str:
+    """Start a run in a locked output folder, and end the last one.
+
+    Returns
+    -------
+    str
+        The name of the new run.
+
+    Raises
+    ------
+    RigError
+        If the folder cannot be written to.
+    """
+    run = secrets.token_hex(8)
+    _write_run(folder, run)
+    return run
+
+
+def is_current(folder: OutputFolder, run: str) -> bool:
+    """Return whether a run still has the folder: a worker on another machine may outlive the batch it works for."""
+    return _lines(folder.run_file)[1:] == [run]
+
+
+def _write_run(folder: OutputFolder, run: str) -> None:
+    """Write the run file: a line that names this process, and one that names a run."""
+    made = folder.run_file.with_name("run.unfinished")
+    try:
+        made.write_text(f"process {os.getpid()} on {socket.gethostname()}\n{run}\n")
+        made.replace(folder.run_file)
+    except OSError as problem:
+        raise RigError(f"--out {folder.path}: cannot be written to ({problem.strerror})") from problem
+
+
+def _lines(file: Path) -> list[str]:
+    try:
+        return file.read_text().splitlines()
+    except (OSError, UnicodeDecodeError):
+        return []

@@ -1,8 +1,9 @@
-"""Where each clip's results go, so that no two clips share a place and no place is outside the output folder.
+"""Output paths: where each clip's results go. No two clips share a path, and no path leads out of the output folder.
 
-A clip's results are named as `anglecam measure` names them, in the folder that it has below the folder that was asked
-for. Where two clips would share a place the first in the order of addresses keeps it; another has its folder's name
-in front, or its ending behind, or a part of its address's hash: names that do not depend on what else is there.
+A clip's results are named as `anglecam measure` names them, and lie in the folder that the clip has below the folder
+given in the call. If two clips would share a path, the first in the order of addresses keeps it. For the other, the
+name of the given folder is put in front, or the clip's ending or a part of its address's hash is appended. These names
+do not depend on the other clips.
 """
 
 from __future__ import annotations
@@ -18,23 +19,23 @@ from anglecam.batch.sources import Source
 Item = TypeVar("Item", bound=Hashable)
 
 
-def clip_places(sources: Sequence[Source], taken: Collection[str] = ()) -> dict[str, str]:
-    """Give every clip a place of its own.
+def assign_clip_paths(sources: Sequence[Source], taken: Collection[str] = ()) -> dict[str, str]:
+    """Assign an output path to every clip.
 
     Parameters
     ----------
     sources : sequence of Source
         In the order of their addresses.
     taken : collection of str
-        Places of clips of earlier calls.
+        Output paths that are not available, such as those of clips of earlier batches.
 
     Returns
     -------
     dict
-        From address to a path relative to the output folder, without an ending.
+        From address to output path, relative to the output folder and without an ending.
     """
 
-    def wishes(source: Source) -> list[str]:
+    def candidates(source: Source) -> list[str]:
         below, whole = source.below_root, name(source.address)
         root = name(source.root) or "root"
         return [
@@ -47,56 +48,56 @@ def clip_places(sources: Sequence[Source], taken: Collection[str] = ()) -> dict[
     def of_one_folder(source: Source, holder: Source | None) -> bool:
         return holder is not None and parent(source.address) == parent(holder.address)
 
-    return {s.address: place for s, place in _assign(sources, wishes, taken, of_one_folder).items()}
+    return {s.address: path for s, path in _assign(sources, candidates, taken, of_one_folder).items()}
 
 
-def session_places(folders: Sequence[tuple[str, str]]) -> dict[str, str]:
-    """Give every session's folder a place of its own.
+def assign_session_folders(folders: Sequence[tuple[str, str]]) -> dict[str, str]:
+    """Assign an output folder to every session.
 
     Parameters
     ----------
     folders : sequence of (str, str)
-        A session's folder and the folder that it was found under, in the order of addresses.
+        A session's folder and the folder that was searched to find it, in the order of addresses.
 
     Returns
     -------
     dict
-        From folder to a path relative to the output folder, ``""`` for that folder itself.
+        From folder to a path relative to the output folder; ``""`` is the output folder itself.
     """
 
-    def wishes(item: tuple[str, str]) -> list[str]:
+    def candidates(item: tuple[str, str]) -> list[str]:
         folder, root = item
         below = folder[len(root) :].strip("/")
         return [_path(below), _path(name(root) or "root", below), _path(below, f"session.{_digest(folder)}")]
 
-    return {item[0]: place for item, place in _assign(folders, wishes).items()}
+    return {item[0]: path for item, path in _assign(folders, candidates).items()}
 
 
 def _assign(
     items: Iterable[Item],
-    wishes: Callable[[Item], list[str]],
+    candidates: Callable[[Item], list[str]],
     taken: Collection[str] = (),
-    skip_second: Callable[[Item, Item | None], bool] = lambda item, holder: False,
+    skips_second: Callable[[Item, Item | None], bool] = lambda item, holder: False,
 ) -> dict[Item, str]:
-    """Grant every first wish that is free, then go down the lists of the others."""
+    """Assign every item its first candidate that is free; first candidates of all items go before second ones."""
     holders: dict[str, Item | None] = dict.fromkeys(taken)
-    granted: dict[Item, str] = {}
+    assigned: dict[Item, str] = {}
     others = []
     for item in items:
-        place = wishes(item)[0]
-        if place in holders:
+        path = candidates(item)[0]
+        if path in holders:
             others.append(item)
         else:
-            holders[place] = item
-            granted[item] = place
+            holders[path] = item
+            assigned[item] = path
     for item in others:
-        first, second, *rest = wishes(item)
-        # a folder's name in front would not part two clips of one folder
-        tried = rest if skip_second(item, holders[first]) else [second, *rest]
-        place = next(place for place in tried if place not in holders)
-        holders[place] = item
-        granted[item] = place
-    return granted
+        first, second, *rest = candidates(item)
+        # the second candidate, with the folder's name in front, does not distinguish two clips of one folder
+        tried = rest if skips_second(item, holders[first]) else [second, *rest]
+        path = next(path for path in tried if path not in holders)
+        holders[path] = item
+        assigned[item] = path
+    return assigned
 
 
 def _path(*parts: str) -> str:
@@ -104,7 +105,7 @@ def _path(*parts: str) -> str:
 
 
 def _safe(piece: str) -> str:
-    """Return a name that leads nowhere else: nearly always the name itself."""
+    """Return a name that leads to no other folder: almost always the name itself."""
     leads_elsewhere = piece in (".", "..", ".anglecam") or "\0" in piece
     return quote(piece, safe="").replace(".", "%2E") if leads_elsewhere else piece
 

@@ -1,4 +1,4 @@
-"""How far a batch is: a bar on a terminal, a plain line now and then elsewhere, and lines of JSON for programs."""
+"""The progress of a batch: a bar on a terminal, plain lines elsewhere, and a log of JSON lines for programs."""
 
 from __future__ import annotations
 
@@ -8,127 +8,134 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from anglecam.batch.records import Note, SessionNote
+from anglecam.batch.records import ClipRecord, SessionRecord
 from anglecam.batch.row import FAILED, OK
 from anglecam.errors import RigError
 from anglecam.terminal import errors
 
-_FEW = 20
-"""Clips of which each is worth a line."""
-_EVERY_S = 10.0
+_LINE_PER_CLIP_UP_TO = 20
+"""Number of clips up to which every clip has a plain line."""
+_LINE_EVERY_S = 10.0
 
 
-class Watch:
-    """Tells on standard error how many clips are done, at what rate, how many failed, and how long it will take."""
+class ProgressDisplay:
+    """Shows on standard error how many clips are done and have failed, the rate, and the time left."""
 
     def __init__(self, clips: int, sessions: int, bars: Progress, *, quiet: bool) -> None:
         self._clips = clips
         self._bars = bars
         self._plain = not quiet and not errors.is_terminal
-        self._done = self._failed = self._fresh = 0
-        self._began = self._told = time.monotonic()
-        self._bar = bars.add_task("clips", total=clips, said="")
-        self._sessions = bars.add_task("sessions", total=sessions, visible=sessions > 0, said="")
+        self._done = self._failed = 0
+        self._began = self._last_line = time.monotonic()
+        self._clip_bar = bars.add_task("clips", total=clips, rate="")
+        self._session_bar = bars.add_task("sessions", total=sessions, visible=sessions > 0, rate="")
 
-    def clip(self, note: Note) -> None:
-        """Count a clip."""
+    def add_clip(self, record: ClipRecord, *, unchanged: bool) -> None:
+        """Count a clip and show its outcome."""
         self._done += 1
-        self._failed += note.row.status == FAILED
-        self._fresh += not note.unchanged
+        self._failed += record.has_failed
         elapsed = time.monotonic() - self._began
         rate = self._done / elapsed if elapsed > 0.0 else 0.0
-        said = f"{rate:.3g}/s, {self._failed} failed"
-        self._bars.update(self._bar, advance=1, said=said)
+        figures = f"{rate:.3g}/s, {self._failed} failed"
+        self._bars.update(self._clip_bar, advance=1, rate=figures)
         if not self._plain:
             return
-        if self._clips <= _FEW:
-            errors.print(f"{self._done} of {self._clips}: {note.row.path}: {_became(note)}")
-        elif time.monotonic() - self._told > _EVERY_S or self._done == self._clips:
-            self._told = time.monotonic()
+        if self._clips <= _LINE_PER_CLIP_UP_TO:
+            outcome = _clip_outcome(record, unchanged=unchanged)
+            errors.print(f"{self._done} of {self._clips}: {record.row.path}: {outcome}")
+        elif time.monotonic() - self._last_line > _LINE_EVERY_S or self._done == self._clips:
+            self._last_line = time.monotonic()
             left = (self._clips - self._done) / rate
-            errors.print(f"{self._done} of {self._clips} clips, {said}, {left:.0f} s left")
+            errors.print(f"{self._done} of {self._clips} clips, {figures}, {left:.0f} s left")
 
-    def session(self, note: SessionNote) -> None:
-        """Count a session."""
-        self._bars.update(self._sessions, advance=1, said="")
-        if self._plain and self._clips <= _FEW:
-            errors.print(f"session {note.address}: {_concluded(note)}")
+    def add_session(self, record: SessionRecord, *, unchanged: bool) -> None:
+        """Count a session and show its outcome."""
+        self._bars.update(self._session_bar, advance=1, rate="")
+        if self._plain and self._clips <= _LINE_PER_CLIP_UP_TO:
+            errors.print(f"session {record.address}: {_session_outcome(record, unchanged=unchanged)}")
 
 
-def _concluded(note: SessionNote) -> str:
-    if note.cause:
+def _clip_outcome(record: ClipRecord, *, unchanged: bool) -> str:
+    status = record.row.status + (", as before" if unchanged else "")
+    cause = (record.row.cause or "").removeprefix(f"{record.row.status}: ")
+    return f"{status}: {cause}" if cause else status
+
+
+def _session_outcome(record: SessionRecord, *, unchanged: bool) -> str:
+    if record.has_failed:
         return "failed"
-    told = f"{note.verdict or 'identified'}{f' to {note.effects}' if note.effects else ''}"
-    return f"{told}, as before" if note.unchanged else told
+    outcome = f"{record.verdict or 'identified'}{f' to {record.effects}' if record.effects else ''}"
+    return f"{outcome}, as before" if unchanged else outcome
 
 
 @contextmanager
-def watch(clips: int, sessions: int, *, quiet: bool) -> Iterator[Watch]:
+def show_progress(clips: int, sessions: int, *, quiet: bool) -> Iterator[ProgressDisplay]:
     """Show progress while the block runs.
 
     Parameters
     ----------
     clips, sessions : int
-        How many there are.
+        Their numbers.
     quiet : bool
-        Show none.
+        Show nothing.
 
     Yields
     ------
-    Watch
-        To be told what is done.
+    ProgressDisplay
+        To which the outcomes are added.
     """
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("{task.fields[said]}"),
+        TextColumn("{task.fields[rate]}"),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
     with Progress(*columns, console=errors, disable=quiet or not errors.is_terminal) as bars:
-        yield Watch(clips, sessions, bars, quiet=quiet)
+        yield ProgressDisplay(clips, sessions, bars, quiet=quiet)
 
 
 class Log:
-    """A file to which a line of JSON is added for every clip and session."""
+    """A file with a line of JSON for every clip and session; without a stream, nothing is written."""
 
     def __init__(self, stream: IO[str] | None) -> None:
         self._stream = stream
 
-    def clip(self, note: Note) -> None:
-        """Tell what became of a clip."""
-        self._write({"clip": note.row.path, "status": note.row.status}, note, note.row.cause, note.row.wall_time_s)
+    def add_clip(self, record: ClipRecord, *, unchanged: bool) -> None:
+        """Write the outcome of a clip."""
+        row = record.row
+        self._write({"clip": row.path, "status": row.status}, row.cause, row.wall_time_s, unchanged=unchanged)
 
-    def session(self, note: SessionNote) -> None:
-        """Tell what became of a session."""
-        status = FAILED if note.cause else OK
-        self._write({"session": note.address, "status": status}, note, note.cause, note.wall_time_s)
+    def add_session(self, record: SessionRecord, *, unchanged: bool) -> None:
+        """Write the outcome of a session."""
+        what = {"session": record.address, "status": FAILED if record.has_failed else OK}
+        self._write(what, record.cause, record.wall_time_s, unchanged=unchanged)
 
-    def _write(self, what: dict[str, Any], note: Note | SessionNote, cause: str | None, wall: float | None) -> None:
+    def _write(self, what: dict[str, str], cause: str | None, wall_time_s: float | None, *, unchanged: bool) -> None:
         if self._stream is None:
             return
         now = datetime.now(UTC).isoformat(timespec="milliseconds")
-        line = {"time": now} | what | {"cause": cause, "wall_time_s": wall, "unchanged": note.unchanged}
+        line = {"time": now} | what | {"cause": cause, "wall_time_s": wall_time_s, "unchanged": unchanged}
         try:
             self._stream.write(json.dumps(line) + "\n")
         except OSError as problem:
-            errors.print(f"--log {self._stream.name}: cannot be written ({problem.strerror}); it ends here")
+            errors.print(f"--log {self._stream.name}: cannot be written ({problem.strerror}); the log ends here")
             self._stream = None
 
 
 @contextmanager
-def log_to(path: Path | None) -> Iterator[Log]:
-    """Open a log, or one that goes nowhere.
+def open_log(path: Path | None) -> Iterator[Log]:
+    """Open a log to append to; without a path, a log that writes nothing.
 
     Raises
     ------
     RigError
-        Where the file cannot be opened.
+        If the file cannot be opened.
     """
     if path is None:
         yield Log(None)
@@ -139,9 +146,3 @@ def log_to(path: Path | None) -> Iterator[Log]:
         raise RigError(f"--log {path}: cannot be written ({problem.strerror})") from problem
     with stream:
         yield Log(stream)
-
-
-def _became(note: Note) -> str:
-    status = note.row.status + (", as before" if note.unchanged else "")
-    cause = (note.row.cause or "").removeprefix(f"{note.row.status}: ")
-    return f"{status}: {cause}" if cause else status

@@ -1,206 +1,108 @@
-"""What a batch remembers between calls: a small file for each clip and session, below ``DIR/.anglecam``.
+"""Job records: the outcome of each clip and session, as the database keeps it between batches.
 
-A note is written after its results are in place and removed before they are replaced, so a note that is there speaks
-of results that are there. Everything is made in a folder of its own and then moved: under its final name a file is
-whole, and what a kill leaves behind lies in one place, which the next batch clears.
+A job record describes results that are in place. `anglecam.batch.publish` keeps it so: it deletes a record before it
+replaces the results, and saves the new record after the new results are in place.
 """
 
 from __future__ import annotations
 
 import hashlib
-import json
-import os
-import shutil
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 from anglecam.batch.identity import Stamp
-from anglecam.batch.row import Row
-from anglecam.io.files import json_text
+from anglecam.batch.row import FAILED, Row
 
 
 @dataclass(frozen=True)
-class Note:
-    """What became of one clip."""
+class ClipRecord:
+    """The outcome of one clip."""
 
+    address: str
     row: Row
-    address: str
-    place: str
-    """Where its results are, relative to the output folder, without an ending."""
+    output_path: str
+    """Path of the clip's results relative to the output folder, without an ending."""
     stamp: Stamp | None = None
-    """Which version of the clip was read."""
-    settled: bool = False
-    """Whether the clip could not have changed since without its stamp changing."""
+    """The version of the clip that was read; see `anglecam.batch.identity.stamp`."""
+    stamp_is_reliable: bool = False
+    """Whether every later change of the clip changes its stamp; see `anglecam.batch.identity.is_reliable`."""
     files: dict[str, int] = field(default_factory=dict)
-    """Results, relative to the output folder, with their sizes in bytes."""
+    """Paths of the results relative to the output folder, and their sizes in bytes."""
     call_is_wrong: bool = False
-    """Whether a rig file, not the clip, is to blame."""
-    passing: bool = False
-    """Whether another time may be different though nothing has changed: a full disk, a clip still being written."""
-    unchanged: bool = False
-    """Whether this is what an earlier call found."""
-    gone: bool = False
-    """Whether its folder, when it was last searched, held it no longer: the index then tells of it no more."""
+    """Whether the cause of the failure is a rig file, not the clip."""
+    transient: bool = False
+    """Whether the failure may disappear without any change of the inputs: a full disk, a clip still being written."""
+    removed: bool = False
+    """Whether the clip was missing when its folder was last searched. The index then leaves it out."""
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether there are no results."""
+        return self.row.status == FAILED
+
+    def failed(self, cause: str, *, call_is_wrong: bool = False, transient: bool = False) -> ClipRecord:
+        """Return the record of the same clip with a failure in place of results."""
+        row = replace(self.row, status=FAILED, cause=cause, series=None)
+        return replace(self, row=row, files={}, call_is_wrong=call_is_wrong, transient=transient)
 
 
 @dataclass(frozen=True)
-class SessionNote:
-    """What became of one session."""
+class SessionRecord:
+    """The outcome of one session."""
 
     address: str
+    """The session's folder."""
     configuration: str
-    """Hash of all that it depends on."""
-    place: str
-    """The folder of its results, relative to the output folder."""
+    """Hash of everything that the results depend on."""
+    output_path: str
+    """Folder of the results relative to the output folder."""
     model: str | None = None
+    """``model.json``, relative to the output folder."""
     verdict: str | None = None
     effects: str | None = None
-    """Ids of what the loop added, `` + `` between."""
+    """Ids of the effects that the loop added, separated by `` + ``."""
     cause: str | None = None
     """Why there is no model."""
     problems: tuple[str, ...] = ()
-    """What could not be used, one line each."""
+    """Recordings that could not be used, one line each."""
     files: dict[str, int] = field(default_factory=dict)
+    """Paths of the results relative to the output folder, and their sizes in bytes."""
     call_is_wrong: bool = False
+    """Whether the cause of the failure is a rig file, not a recording."""
     wall_time_s: float | None = None
     version: str | None = None
-    unchanged: bool = False
-
-
-@dataclass(frozen=True)
-class Store:
-    """An output folder and what lies in it."""
-
-    out: Path
+    """Version of anglecam that fitted the session."""
 
     @property
-    def lock(self) -> Path:
-        """The file that keeps a second batch out."""
-        return self.out / ".anglecam" / "lock"
+    def has_failed(self) -> bool:
+        """Whether there is no model."""
+        return self.cause is not None
 
-    def unfinished(self, run: str = "") -> Path:
-        """Return the folder in which results of a run are made; without a run, of all."""
-        return self.out / ".anglecam" / "unfinished" / run
+    def failed(self, cause: str, *, call_is_wrong: bool = False, transient: bool = False) -> SessionRecord:
+        """Return the record of the same session with a failure in place of results.
 
-    def kept(self, address: str) -> str:
-        """Return where a clip's series is kept for its session, relative to the output folder."""
-        return f".anglecam/series/{key(address)}.nc"
-
-    def clear(self) -> None:
-        """Remove what killed runs have left behind."""
-        shutil.rmtree(self.unfinished(), ignore_errors=True)
-
-    def read_clip(self, address: str) -> Note | None:
-        """Return what is remembered of a clip."""
-        return _note(self._note("clips", address))
-
-    def read_session(self, address: str) -> SessionNote | None:
-        """Return what is remembered of a session."""
-        found = _read(self._note("sessions", address))
-        try:
-            return None if found is None else SessionNote(**found | {"problems": tuple(found["problems"])})
-        except (TypeError, KeyError):
-            return None
-
-    def clips(self) -> Iterator[Note]:
-        """Yield what is remembered of every clip."""
-        for path in sorted((self.out / ".anglecam" / "clips").glob("*.json")):
-            note = _note(path)
-            if note is not None:
-                yield note
-
-    def forget_clip(self, address: str) -> None:
-        """Remove a clip's note."""
-        self._note("clips", address).unlink(missing_ok=True)
-
-    def has(self, files: dict[str, int]) -> bool:
-        """Tell whether results are all there, and whole."""
-        try:
-            return all((self.out / file).stat().st_size == size for file, size in files.items())
-        except OSError:
-            return False
-
-    def publish(self, note: Note | SessionNote, made: dict[str, Path], before: dict[str, int], run: str) -> Any:
-        """Move results to their places, remove those of before that are no longer, and write the note.
-
-        Parameters
-        ----------
-        note : Note or SessionNote
-            Without ``files``.
-        made : dict
-            From place, relative to the output folder, to the finished file.
-        before : dict
-            Results of before, which this clip or session alone had.
-        run : str
-            The run, in whose folder the note is made.
-
-        Returns
-        -------
-        Note or SessionNote
-            With ``files``.
-
-        Raises
-        ------
-        OSError
-            Where the output folder cannot be written to; there is no note then.
+        ``transient`` has no effect: a session that failed is fitted again by every batch with ``--retry-failed``.
         """
-        path = self._note("clips" if isinstance(note, Note) else "sessions", note.address)
-        path.unlink(missing_ok=True)
-        sizes = {}
-        for place, file in made.items():
-            target = self.out / place
-            target.parent.mkdir(parents=True, exist_ok=True)
-            sizes[place] = file.stat().st_size
-            file.replace(target)
-        for place in set(before) - set(made):
-            (self.out / place).unlink(missing_ok=True)
-        noted = replace(note, files=sizes)
-        move_in(json_text(asdict(noted)).encode(), path, self.unfinished(run))
-        return noted
+        return replace(self, model=None, verdict=None, effects=None, cause=cause, files={}, call_is_wrong=call_is_wrong)
 
-    def renew(self, note: Note, run: str) -> None:
-        """Write a clip's note anew, its results being as they were."""
-        move_in(json_text(asdict(note)).encode(), self._note("clips", note.address), self.unfinished(run))
 
-    def _note(self, kind: str, address: str) -> Path:
-        return self.out / ".anglecam" / kind / f"{key(address)}.json"
+Record = ClipRecord | SessionRecord
+AnyRecord = TypeVar("AnyRecord", bound=Record)
 
 
 def key(address: str) -> str:
-    """Return a name for a clip or session that any file system takes."""
+    """Return a file name for a clip or session that every file system accepts."""
     return hashlib.sha256(address.encode("utf-8", "surrogateescape")).hexdigest()[:32]
 
 
-def move_in(content: bytes, path: Path, unfinished: Path) -> None:
-    """Write a file elsewhere and move it to its place."""
-    unfinished.mkdir(parents=True, exist_ok=True)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    made = unfinished / f"{path.name}.{os.urandom(4).hex()}"
-    try:
-        made.write_bytes(content)
-        made.replace(path)
-    finally:
-        made.unlink(missing_ok=True)
+def record_from_dict(kind: type[AnyRecord], found: dict[str, Any]) -> AnyRecord:
+    """Return the record that `dataclasses.asdict` turned into a dictionary.
 
-
-def note_from_dict(found: dict[str, Any]) -> Note:
-    """Return a clip's note as `dataclasses.asdict` has written it."""
-    return Note(**found | {"row": Row(**found["row"])})
-
-
-def _note(path: Path) -> Note | None:
-    found = _read(path)
-    try:
-        return None if found is None else note_from_dict(found)
-    except (TypeError, KeyError):  # of another version
-        return None
-
-
-def _read(path: Path) -> dict[str, Any] | None:
-    try:
-        found = json.loads(path.read_bytes())
-    except (OSError, ValueError):
-        return None
-    return found if isinstance(found, dict) else None
+    Raises
+    ------
+    TypeError, KeyError
+        If the dictionary comes from another version of anglecam.
+    """
+    if kind is ClipRecord:
+        return kind(**found | {"row": Row(**found["row"])})
+    return kind(**found | {"problems": tuple(found["problems"])})

@@ -1,4 +1,4 @@
-"""What the index says about one clip."""
+"""One clip's row of the index."""
 
 from __future__ import annotations
 
@@ -12,29 +12,30 @@ class Row:
     """One clip's row in ``index.csv`` and ``index.parquet``; ``None`` is an empty cell."""
 
     path: str
-    """Absolute, or an address with its protocol."""
+    """Absolute path, or address with its protocol."""
     size_bytes: int | None = None
     sha256: str | None = None
-    """Of the clip's content."""
+    """Hash of the clip's content."""
     duration_s: float | None = None
-    """Frames over rate."""
+    """Number of frames divided by ``rate_hz``."""
     frames: int | None = None
     rate_hz: float | None = None
-    """Mean, from the frames' own time stamps."""
+    """Mean frame rate, from the frames' own time stamps."""
     width_px: int | None = None
     height_px: int | None = None
     codec: str | None = None
     share_measured: float | None = None
-    """Frames with an angle, of all frames."""
+    """Frames with an angle divided by all frames."""
     median_sigma_deg: float | None = None
     model: str | None = None
     """``model.json`` of the clip's session, relative to the output folder."""
     verdict: str | None = None
-    """Of the clip's session, where the loop was closed."""
+    """Verdict on the clip's session, if the loop was closed."""
     effects: str | None = None
-    """What the loop added to the model, `` + `` between."""
+    """Ids of the effects that the loop added to the model, separated by `` + ``."""
     wall_time_s: float | None = None
     version: str | None = None
+    """Version of anglecam that measured the clip."""
     configuration: str | None = None
     """SHA-256 of rig file, calibration and command."""
     status: str = FAILED
@@ -43,9 +44,11 @@ class Row:
     series: str | None = None
     """``NAME.angles.csv``, relative to the output folder."""
     notes: str | None = None
-    """What `anglecam measure` says beside the angles, ``; `` between: that only the mouth could be followed, say."""
+    """Remarks that `anglecam measure` prints beside the angles, separated by ``; ``: for example, that only the mark
+    could be followed.
+    """
 
 
 def cannot_write(problem: OSError) -> str:
-    """Say why results could not be written."""
+    """Return the cause of a failure to write results."""
     return f"the results cannot be written ({problem.strerror or problem})"

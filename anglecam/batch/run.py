@@ -1,14 +1,14 @@
-"""A batch from beginning to end: what is there, who does it, what became of it.
+"""One batch from beginning to end: find the clips, give out the jobs, publish their results, write the index.
 
-Clips are given out in order; a session is given out as soon as all its clips are done. The same loop drives a team on
-this machine and one of Dask workers, and holds rows only, never a series.
+Clips are given out in the order of their addresses. A session is given out as soon as all its clips are done. The same
+loop drives a worker pool on this machine and one of Dask workers. It holds rows, never a series.
 """
 
 from __future__ import annotations
 
 import contextlib
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,69 +16,74 @@ from pathlib import Path
 from typing import Protocol
 
 from anglecam.batch.address import is_of_one_process, join, normalised, stem
-from anglecam.batch.ledger import Ledger
-from anglecam.batch.lock import locked
-from anglecam.batch.output_paths import clip_places, session_places
-from anglecam.batch.process import MeasuringProcess
-from anglecam.batch.progress import Log, Watch, log_to, watch
-from anglecam.batch.records import Note, SessionNote, Store
+from anglecam.batch.clip_job import ClipJob, run_clip_job
+from anglecam.batch.database import RecordDatabase
+from anglecam.batch.local_pool import LocalPool
+from anglecam.batch.lock import locked, start_run
+from anglecam.batch.measuring_process import MeasuringProcess
+from anglecam.batch.output_folder import OutputFolder
+from anglecam.batch.output_paths import assign_clip_paths, assign_session_folders
+from anglecam.batch.progress import Log, ProgressDisplay, open_log, show_progress
+from anglecam.batch.publish import Finished, publish, recover
+from anglecam.batch.records import ClipRecord, SessionRecord
 from anglecam.batch.row import Row
-from anglecam.batch.sessions import SessionJob, do_session, find_sessions
+from anglecam.batch.session_job import SessionJob, find_sessions, run_session_job
 from anglecam.batch.sources import Source, find_sources
-from anglecam.batch.work import ClipJob, Settings, do_clip
-from anglecam.batch.worker_pool import LocalTeam
+from anglecam.batch.summary import Summary
+from anglecam.batch.worker import Settings
 from anglecam.errors import AnglecamError, RigError
 from anglecam.io.rig import read_rig
 from anglecam.io.session import CORRECTED
 from anglecam.terminal import make_folder
 
 Job = ClipJob | SessionJob
-Done = Note | SessionNote
 
 
 @dataclass(frozen=True)
 class Options:
-    """What a call asks for."""
+    """The options of a call."""
 
     jobs: int
-    """How many clips at a time."""
+    """Number of clips at a time."""
     dask: str | None = None
-    """A scheduler's address, or ``local``."""
+    """Address of a Dask scheduler, or ``local``."""
     close: bool = False
+    """Whether to close the loop for each session."""
     retry_failed: bool = False
     quiet: bool = False
     log: Path | None = None
     time_limit: float | None = None
-    """Seconds a clip; ``None``: by its size."""
+    """Time limit for one clip, in s; ``None``: by the clip's size."""
     rig: Path | None = None
+    """Rig file for all clips; ``None``: the rig file beside each clip."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a batch."""
+    """The outcome of a batch."""
 
     rows: tuple[Row, ...]
-    """As in the index, in the order of their paths."""
+    """The rows of the index, in the order of their paths."""
     problems: tuple[AnglecamError, ...]
-    """One for every clip and session that failed, and for whatever else could not be done."""
+    """One for every clip and session that failed, and for everything else that could not be done."""
 
 
-class Team(Protocol):
-    """Whoever does the jobs."""
+class WorkerPool(Protocol):
+    """Workers that do jobs: see `LocalPool` and `anglecam.batch.dask_pool.DaskPool`."""
 
     @property
-    def room(self) -> int:
-        """How many jobs to have under way."""
+    def capacity(self) -> int:
+        """Number of jobs to have under way so that no worker waits for its next job."""
 
     def start(self, job: Job) -> None:
-        """Give out a job."""
+        """Give a job to the workers."""
 
-    def next_done(self) -> Done:
-        """Wait for the next job that is done."""
+    def next_done(self) -> Finished:
+        """Wait for the next job to finish and return its outcome."""
 
 
 def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
-    """Measure every clip that is asked for and not done yet, identify its sessions, and write the index.
+    """Measure every clip that has not been measured yet, fit the sessions among them, and write the index.
 
     Parameters
     ----------
@@ -87,7 +92,7 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
     out : Path
         The output folder.
     options : Options
-        How.
+        The options of the call.
 
     Returns
     -------
@@ -97,109 +102,141 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
     Raises
     ------
     RigError
-        Where nothing can be done: the call or the rig file for all is wrong, or another batch is at work there.
+        If nothing can be done: the call or the rig file for all clips is wrong, or another batch uses the folder.
+    InputError
+        If the Dask scheduler is lost.
     """
     if options.rig is not None:
         read_rig(options.rig)
     make_folder(out)
-    out = out.resolve()
-    sources, problems = find_sources(asked, out)
+    folder = OutputFolder(out.resolve())
+    sources, problems = find_sources(asked, folder.path)
     if options.dask is not None:
         _require_shared(sources)
-    with log_to(options.log) as log, locked(Store(out).lock) as run:
-        Store(out).clear()
+    with (
+        open_log(options.log) as log,
+        locked(folder) as interrupted,
+        RecordDatabase(folder.database_file) as database,
+    ):
+        earlier = database.read_all(ClipRecord)  # before anything is written: what cannot be read must not be replaced
+        if interrupted is not None:
+            recover(interrupted, folder, database)
+            earlier = database.read_all(ClipRecord)
+        folder.clear_unfinished()
+        run = start_run(folder)
         settings = Settings(
-            out=str(out),
+            out=str(folder.path),
             run=run,
             rig=None if options.rig is None else str(options.rig.resolve()),
             retry_failed=options.retry_failed,
             time_limit=options.time_limit,
         )
-        plan = _plan(sources, asked, Store(out), options)
-        for note in plan.gone:
-            with contextlib.suppress(OSError):  # a disk that is full
-                Store(out).renew(replace(note, gone=True), run)
-        ledger = Ledger(settings, plan.earlier, plan.sessions)
-        with _team(settings, options) as team, watch(len(sources), len(plan.sessions), quiet=options.quiet) as shown:
+        plan = _plan(sources, asked, earlier, database.read_all(SessionRecord), options)
+        with contextlib.suppress(OSError):  # such as a full disk
+            database.save(*(replace(record, removed=True) for record in plan.removed))
+        summary = Summary(folder, run, plan.earlier, plan.earlier_sessions, plan.sessions)
+        with (
+            _worker_pool(settings, options) as pool,
+            show_progress(len(sources), len(plan.sessions), quiet=options.quiet) as display,
+        ):
             try:
-                _work(plan, team, ledger, shown, log)
+                _do_jobs(plan, pool, partial(publish, folder=folder, database=database), summary, display, log)
             finally:
-                ledger.write_index()
-        Store(out).clear()
-    return Result(ledger.rows(), (*problems, *ledger.problems()))
+                summary.write_index()
+        folder.clear_unfinished()
+    return Result(summary.rows(), (*problems, *summary.problems()))
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What there is to do."""
+    """The jobs of a batch, and what earlier batches have left."""
 
     clips: tuple[ClipJob, ...]
     sessions: tuple[SessionJob, ...]
-    earlier: tuple[Note, ...]
-    """What earlier calls did, here and in other folders."""
-    gone: tuple[Note, ...]
-    """Of clips that a folder of this call holds no longer."""
+    earlier: tuple[ClipRecord, ...]
+    """Records by earlier batches that the index shows, of the clips of this batch and of clips elsewhere."""
+    earlier_sessions: tuple[SessionRecord, ...]
+    removed: tuple[ClipRecord, ...]
+    """Records of clips that were in a folder of this batch and are no longer there."""
 
 
-def _plan(sources: Sequence[Source], asked: Sequence[str], store: Store, options: Options) -> Plan:
+def _plan(
+    sources: Sequence[Source],
+    asked: Sequence[str],
+    records: Sequence[ClipRecord],
+    session_records: Sequence[SessionRecord],
+    options: Options,
+) -> Plan:
     here = {source.address for source in sources}
     searched = tuple(join(normalised(one), "") for one in asked)
-    notes = list(store.clips())
-    lost = [n for n in notes if n.address not in here and n.address.startswith(searched)]
-    elsewhere = [n for n in notes if n.address not in here and not n.address.startswith(searched)]
-    earlier = (*(n for n in notes if n.address in here), *(n for n in elsewhere if not n.gone))
+    before = {record.address: record for record in records}
+    missing = [r for r in records if r.address not in here and r.address.startswith(searched)]
+    elsewhere = [r for r in records if r.address not in here and not r.address.startswith(searched)]
+    earlier = (*(r for r in records if r.address in here), *(r for r in elsewhere if not r.removed))
+    session_before = {record.address: record for record in session_records}
     found = find_sessions(sources)
-    places = session_places([(folder, root) for folder, root, _ in found])
-    sessions = tuple(SessionJob(folder, places[folder], clips, options.close) for folder, _, clips in found)
+    folders = assign_session_folders([(folder, root) for folder, root, _ in found])
+    sessions = tuple(
+        SessionJob(folder, folders[folder], clips, options.close, before=session_before.get(folder))
+        for folder, _, clips in found
+    )
     in_session = {clip for job in sessions for clip in job.clips}
-    taken = {note.place for note in elsewhere if note.row.series}
-    for job in sessions:  # where the loop writes series that are free of what the camera did
-        taken |= {"/".join(filter(None, (job.place, CORRECTED, stem(clip)))) for clip in job.clips}
-    clip_place = clip_places(sources, taken)
-    clips = tuple(ClipJob(s.address, clip_place[s.address], s.address in in_session) for s in sources)
-    return Plan(clips, sessions, earlier, tuple(n for n in lost if not n.gone))
+    taken = {record.output_path for record in elsewhere if record.row.series}
+    for job in sessions:  # the loop writes series there from which it has removed the camera's effects
+        taken |= {"/".join(filter(None, (job.output_path, CORRECTED, stem(clip)))) for clip in job.clips}
+    paths = assign_clip_paths(sources, taken)
+    clips = tuple(ClipJob(s.address, paths[s.address], s.address in in_session, before.get(s.address)) for s in sources)
+    return Plan(clips, sessions, earlier, tuple(session_records), tuple(r for r in missing if not r.removed))
 
 
-def _work(plan: Plan, team: Team, ledger: Ledger, shown: Watch, log: Log) -> None:
-    """Give out jobs and take in what became of them until all are done."""
+def _do_jobs(
+    plan: Plan,
+    pool: WorkerPool,
+    put_in_place: Callable[[Finished], Finished],
+    summary: Summary,
+    display: ProgressDisplay,
+    log: Log,
+) -> None:
+    """Give out all jobs, and publish and report the outcome of each."""
     waiting: deque[Job] = deque(plan.clips)
     session_of = {clip: job for job in plan.sessions for clip in job.clips}
     missing = {job.address: set(job.clips) for job in plan.sessions}
     under_way = 0
     while waiting or under_way:
-        while waiting and under_way < team.room:
-            team.start(waiting.popleft())
+        while waiting and under_way < pool.capacity:
+            pool.start(waiting.popleft())
             under_way += 1
-        done = team.next_done()
+        finished = put_in_place(pool.next_done())
         under_way -= 1
-        if isinstance(done, SessionNote):
-            ledger.add_session(done)
-            shown.session(done)
-            log.session(done)
+        record = finished.record
+        if isinstance(record, SessionRecord):
+            summary.add_session(record)
+            display.add_session(record, unchanged=finished.unchanged)
+            log.add_session(record, unchanged=finished.unchanged)
             continue
-        session = session_of.get(done.address)
-        ledger.add_clip(done, in_session=session is not None)
-        shown.clip(done)
-        log.clip(done)
+        session = session_of.get(record.address)
+        summary.add_clip(record, in_session=session is not None)
+        display.add_clip(record, unchanged=finished.unchanged)
+        log.add_clip(record, unchanged=finished.unchanged)
         if session is not None:
-            missing[session.address].discard(done.address)
+            missing[session.address].discard(record.address)
             if not missing[session.address]:
-                waiting.appendleft(session)
+                waiting.appendleft(replace(session, measured=summary.measured(session.clips)))
 
 
-def _team(settings: Settings, options: Options) -> AbstractContextManager[Team]:
-    work = partial(_do, settings=settings)
+def _worker_pool(settings: Settings, options: Options) -> AbstractContextManager[WorkerPool]:
+    work = partial(_run_job, settings=settings)
     if options.dask is None:
-        return LocalTeam(work, options.jobs)
-    from anglecam.batch.cluster import DaskTeam  # an extra
+        return LocalPool(work, options.jobs)
+    from anglecam.batch.dask_pool import DaskPool  # an optional dependency
 
-    return DaskTeam(work, options.dask, options.jobs)
+    return DaskPool(work, options.dask, options.jobs)
 
 
-def _do(job: Job, process: MeasuringProcess, *, settings: Settings) -> Done:
+def _run_job(job: Job, process: MeasuringProcess, *, settings: Settings) -> Finished:
     if isinstance(job, SessionJob):
-        return do_session(job, settings, process)
-    return do_clip(job, settings, process)
+        return run_session_job(job, settings, process)
+    return run_clip_job(job, settings, process)
 
 
 def _require_shared(sources: Sequence[Source]) -> None:

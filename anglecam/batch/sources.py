@@ -1,7 +1,7 @@
-"""From what was asked for to a list of clips, in the order of their addresses.
+"""Find the clips of a call, in the order of their addresses.
 
-A folder is searched to its depths, hidden files and folders apart (``._clip.avi`` is no clip); a glob means what
-matches it; ``@list.txt`` means the addresses in it, one a line; anything else is a clip.
+A folder is searched with all folders below it, except hidden files and folders (``._clip.avi`` is no clip). A glob
+stands for its matches, and ``@list.txt`` for the addresses in it, one per line. Everything else is a clip.
 """
 
 from __future__ import annotations
@@ -16,52 +16,52 @@ from anglecam.batch.address import asking, is_remote, join, name, normalised, pa
 from anglecam.errors import AnglecamError, InputError, RigError
 from anglecam.io.session import CLIP_ENDINGS
 
-_MAGIC = frozenset("*?[")
+_GLOB_CHARACTERS = frozenset("*?[")
 
 
 @dataclass(frozen=True, order=True)
 class Source:
-    """A clip and the folder that it was found under."""
+    """A clip and the folder that was searched to find it."""
 
     address: str
     """Absolute path, or address with its protocol."""
     root: str
-    """The folder that was asked for; a single clip's own folder."""
+    """The folder given in the call; for a single clip, the folder that contains it."""
 
     @property
     def below_root(self) -> str:
-        """The clip's folder relative to ``root``, ``""`` where that is the same."""
+        """The clip's folder relative to ``root``; ``""`` if they are the same."""
         return parent(self.address)[len(self.root) :].strip("/")
 
 
 def find_sources(asked: Sequence[str], out: Path) -> tuple[list[Source], list[AnglecamError]]:
-    """Find the clips that a call is about.
+    """Find the clips of a call.
 
     Parameters
     ----------
     asked : sequence of str
         Folders, clips, globs, ``@list.txt``, each local or remote.
     out : Path
-        The folder for results, which is not searched.
+        The output folder, which is not searched.
 
     Returns
     -------
     sources : list of Source
-        In the order of their addresses, each once.
+        In the order of their addresses, without repetition.
     problems : list of AnglecamError
-        Folders that cannot be searched or hold no clip, one line each.
+        Folders that cannot be searched or contain no clip, one line each.
 
     Raises
     ------
     RigError
-        Where a folder or list that was asked for does not exist.
+        If a folder or list given in the call does not exist.
     """
     problems: list[AnglecamError] = []
     found: dict[str, Source] = {}
     for given, listed in _unlisted(asked):
         try:
             if is_remote(given):
-                store(given)[0].invalidate_cache()  # what was listed before may no longer be so
+                store(given)[0].invalidate_cache()  # the store may have changed since it was last listed
             for source in _expand(given, out.resolve(), problems):
                 found.setdefault(source.address, source)
         except RigError as problem:
@@ -74,7 +74,7 @@ def find_sources(asked: Sequence[str], out: Path) -> tuple[list[Source], list[An
 
 
 def _unlisted(asked: Sequence[str]) -> Iterator[tuple[str, bool]]:
-    """Yield every address, and whether it stood in a list."""
+    """Yield every address, and whether it comes from a list."""
     for given in asked:
         if not given.startswith("@"):
             yield given, False
@@ -90,7 +90,7 @@ def _unlisted(asked: Sequence[str]) -> Iterator[tuple[str, bool]]:
 
 
 def _expand(given: str, out: Path, problems: list[AnglecamError]) -> Iterator[Source]:
-    """Yield what one address means."""
+    """Yield the clips that one address stands for."""
     address = normalised(given)
     folder, single = _kind(address)
     if folder:
@@ -98,12 +98,12 @@ def _expand(given: str, out: Path, problems: list[AnglecamError]) -> Iterator[So
         if not clips:
             problems.append(InputError(f"{given}: no clip in this folder"))
         yield from (Source(clip, address) for clip in clips)
-    elif single or not _MAGIC & set(address):
+    elif single or not _GLOB_CHARACTERS & set(address):
         if not single and not _is_clip(address):
             raise RigError(f"{given}: no such folder")
         yield Source(address, parent(address))
     else:
-        root = address[: min(address.index(c) for c in _MAGIC if c in address)].rpartition("/")[0] or "/"
+        root = address[: min(address.index(c) for c in _GLOB_CHARACTERS if c in address)].rpartition("/")[0] or "/"
         matches = _matches(address, root)
         clips = [m for m in matches if _is_clip(m)]
         for match in sorted(set(matches) - set(clips)):
@@ -115,7 +115,7 @@ def _expand(given: str, out: Path, problems: list[AnglecamError]) -> Iterator[So
 
 
 def _kind(address: str) -> tuple[bool, bool]:
-    """Tell whether there is a folder, or a file, at an address."""
+    """Return whether an address is a folder, and whether it is a file."""
     if not is_remote(address):
         return os.path.isdir(address), os.path.isfile(address)  # noqa: PTH112, PTH113
     with asking(address) as (fs, path):
@@ -130,13 +130,13 @@ def _matches(pattern: str, root: str) -> list[str]:
 
 
 def _below(root: str, paths: Iterable[str]) -> list[str]:
-    """Return the addresses of what a file system lists below ``root``."""
+    """Return the addresses of paths that a file system lists below ``root``."""
     start = store(root)[1].rstrip("/")
     return [join(root, path[len(start) :].lstrip("/")) for path in paths]
 
 
 def _search(folder: str, out: Path, problems: list[AnglecamError]) -> list[str]:
-    """List the clips in a folder and all below it."""
+    """Return the clips in a folder and all folders below it."""
     if is_remote(folder):
         with asking(folder) as (fs, path):
             found = _below(folder, fs.find(path))

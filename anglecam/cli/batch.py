@@ -1,4 +1,4 @@
-"""`anglecam batch`: folders of clips, measured once each, on one machine or many."""
+"""`anglecam batch`: measure folders of clips, each clip once, on one machine or several."""
 
 from __future__ import annotations
 
@@ -20,27 +20,30 @@ def batch(
     ],
     out: Annotated[Path, typer.Option("--out", help="Folder for results and index; made if missing.")],
     jobs: Annotated[
-        int | None, typer.Option("--jobs", min=1, metavar="N", help="Clips at a time, one core each; all cores.")
+        int | None,
+        typer.Option("--jobs", min=1, metavar="N", help="Clips at a time, one core each; default all cores."),
     ] = None,
     dask: Annotated[
-        str | None, typer.Option("--dask", metavar="ADDRESS", help="A Dask scheduler; local starts one here.")
+        str | None,
+        typer.Option("--dask", metavar="ADDRESS", help="A Dask scheduler; local starts one here."),
     ] = None,
     close: Annotated[bool, typer.Option("--close", help="Find what each session's model lacks.")] = False,
-    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Do again what failed.")] = False,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Measure again the clips that failed.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress.")] = False,
-    log: Annotated[Path | None, typer.Option("--log", help="Add a line of JSON for every clip to this file.")] = None,
+    log: Annotated[Path | None, typer.Option("--log", help="Append a line of JSON per clip to this file.")] = None,
     time_limit: Annotated[
-        float | None, typer.Option("--time-limit", min=0.001, metavar="S", help="For one clip; default by its size.")
+        float | None,
+        typer.Option("--time-limit", min=0.001, metavar="S", help="Time limit for a clip; default by its size."),
     ] = None,
     rig: Annotated[
         Path | None, typer.Option("--rig", help="Rig file for all clips; default: rig.yaml beside each clip.")
     ] = None,
 ) -> None:
-    """Measure folders of clips, each once: results, index.csv and index.parquet; identify the sessions among them."""
-    from anglecam.batch.run import Options, run_batch  # stores and tables, which no other verb needs
+    """Measure folders of clips, each clip once, identify the sessions among them, and write an index of all clips."""
+    from anglecam.batch.run import Options, run_batch  # imports fsspec and pyarrow, which no other command needs
 
     if dask is not None and dask != "local" and jobs is not None:
-        raise RigError("--jobs: a Dask scheduler's workers say how many clips are measured at a time; leave it out")
+        raise RigError("--jobs: with a Dask scheduler, its workers determine how many clips are measured at a time")
     try:
         result = run_batch(
             folders,
@@ -61,8 +64,8 @@ def batch(
         raise typer.Exit(130) from None
     if not quiet:
         counts = Counter(row.status for row in result.rows)
-        told = ", ".join(f"{counts[status]} {status}" for status in ("ok", "truncated", "failed") if counts[status])
-        screen.print(f"{len(result.rows)} clips{': ' if told else ''}{told}; {out / 'index.csv'}", soft_wrap=True)
+        summary = ", ".join(f"{counts[status]} {status}" for status in ("ok", "truncated", "failed") if counts[status])
+        screen.print(f"{len(result.rows)} clips{': ' if summary else ''}{summary}; {out / 'index.csv'}", soft_wrap=True)
     for problem in result.problems:
         errors.print(str(problem))
     if result.problems:

@@ -1,8 +1,8 @@
-"""Measuring processes that outlive a batch, for tests that are about something else.
+"""Measuring processes that several batches share, for tests in which processes do not matter.
 
-A measuring process takes as long to start as it takes to measure several tiny clips, and it remembers nothing of them:
-`anglecam.batch.child` answers one request after another. How processes start, die and are replaced is the matter of
-test_kill.py, test_trouble.py and test_dask.py, which have none of this, and of all tests that call the command line.
+Starting a measuring process takes as long as measuring several tiny clips, and `anglecam.batch.child` keeps nothing
+between requests. test_kill.py, test_trouble.py and test_dask.py test how processes start, die and are replaced, so they
+do not share processes; neither do tests that call the command line.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import Any, ClassVar
 
 import pytest
 
-from anglecam.batch.process import MeasuringProcess
+from anglecam.batch.measuring_process import MeasuringProcess
 
 
-class KeptProcess(MeasuringProcess):
-    """A measuring process that is handed on when its batch is at its end, unless it is in the middle of something."""
+class SharedProcess(MeasuringProcess):
+    """A measuring process that the next batch takes over, unless it is busy when its batch ends."""
 
     idle: ClassVar[list[subprocess.Popen[bytes]]] = []
 
@@ -41,12 +41,12 @@ class KeptProcess(MeasuringProcess):
 
 
 @pytest.fixture(scope="module")
-def kept_processes() -> Iterator[None]:
-    """Let the batches of this file that run in the tests' own process hand on their measuring processes."""
+def shared_processes() -> Iterator[None]:
+    """Let the batches of a test file that run in the test's process share their measuring processes."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("anglecam.batch.worker_pool.MeasuringProcess", KeptProcess)
+        patch.setattr("anglecam.batch.local_pool.MeasuringProcess", SharedProcess)
         yield
-    while KeptProcess.idle:
-        process = KeptProcess.idle.pop()
+    while SharedProcess.idle:
+        process = SharedProcess.idle.pop()
         process.kill()
         process.communicate()

@@ -1,4 +1,4 @@
-"""A folder of clips from beginning to end: what `measure` writes, an index, nothing done twice, nothing lost."""
+"""A folder of clips from beginning to end: results as `measure` writes them, the index, and what is measured again."""
 
 from __future__ import annotations
 
@@ -6,11 +6,15 @@ import csv
 import json
 import os
 import shutil
+from dataclasses import replace
 
 import duckdb
 import pandas as pd
 import pytest
 
+from anglecam.batch.database import RecordDatabase
+from anglecam.batch.output_folder import OutputFolder
+from anglecam.batch.records import ClipRecord
 from anglecam.batch.run import Options, run_batch
 from anglecam.errors import RigError
 from anglecam.io.rig import Rig
@@ -20,21 +24,21 @@ from anglecam.workflow.clip import write_measurement
 from support.tiny import FRAMES, SIZE, results, tiny_clip, tiny_lab
 from support.tiny import run_batch as run
 
-pytestmark = pytest.mark.usefixtures("kept_processes")
+pytestmark = pytest.mark.usefixtures("shared_processes")
 
 QUIET = Options(jobs=1, quiet=True)
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
-    """Return a lab's folder with two bad clips in it, and what one batch made of it."""
+    """Return a folder of clips, two of them unreadable, the output folder of a batch, and the finished process."""
     top = tmp_path_factory.mktemp("lab")
     lab = tiny_lab(top / "clips", ["b.avi", "mon/a.avi", "mon/a.mkv.avi", "tue/a.avi"])
     (lab / "mon" / "empty.mp4").touch()
     (lab / "tue" / "text.avi").write_text("not a film\n" * 50)
     (lab / "tue" / "rig.yaml").write_text("facing: left\n")
-    told = run(lab, "--out", top / "out", "--jobs", 2, "--log", top / "log.jsonl")
-    return lab, top / "out", told
+    call = run(lab, "--out", top / "out", "--jobs", 2, "--log", top / "log.jsonl")
+    return lab, top / "out", call
 
 
 def rows(out):
@@ -42,7 +46,7 @@ def rows(out):
         return {row["path"]: row for row in csv.DictReader(stream)}
 
 
-def test_each_clip_has_what_measure_writes_in_the_folder_it_has_below_the_one_asked_for(done, tmp_path):
+def test_each_clip_has_the_files_that_measure_writes_in_its_folder_below_the_given_one(done, tmp_path):
     lab, out, _ = done
     for name, rig in (("b.avi", Rig()), ("mon/a.avi", Rig()), ("tue/a.avi", Rig(facing="left"))):
         clip = lab / name
@@ -55,7 +59,7 @@ def test_each_clip_has_what_measure_writes_in_the_folder_it_has_below_the_one_as
         assert rows(out)[str(clip)]["notes"] == "; ".join(measured.notes)
 
 
-def test_the_index_has_a_row_a_clip_and_says_what_became_of_it(done):
+def test_the_index_has_a_row_per_clip_with_its_outcome(done):
     lab, out, _ = done
     index = rows(out)
     assert list(index) == sorted(str(p) for p in lab.rglob("*") if p.suffix in (".avi", ".mp4"))
@@ -73,7 +77,7 @@ def test_the_index_has_a_row_a_clip_and_says_what_became_of_it(done):
     assert index[f"{lab}/mon/empty.mp4"]["cause"] == "empty file"
 
 
-def test_the_index_can_be_asked_by_duckdb_and_pandas(done):
+def test_the_index_can_be_queried_by_duckdb_and_pandas(done):
     _, out, _ = done
     counted = duckdb.sql(f"SELECT status, count(*) FROM '{out}/index.parquet' GROUP BY 1 ORDER BY 1").fetchall()
     assert counted == [("failed", 2), ("ok", 4)]
@@ -83,15 +87,15 @@ def test_the_index_can_be_asked_by_duckdb_and_pandas(done):
     assert list(text.columns) == list(table.columns)
 
 
-def test_a_clip_that_fails_costs_itself_one_line_and_exit_status_1(done):
-    lab, _, told = done
-    assert told.returncode == 1
-    lines = [line for line in told.stderr.splitlines() if " of 6: " not in line]
+def test_a_clip_that_fails_gives_one_line_and_exit_status_1(done):
+    lab, _, call = done
+    assert call.returncode == 1
+    lines = [line for line in call.stderr.splitlines() if " of 6: " not in line]
     assert lines == [
         f"{lab}/mon/empty.mp4: empty file",
         f"{lab}/tue/text.avi: not a readable video file (Invalid data found when processing input)",
     ]
-    assert "6 clips: 4 ok, 2 failed" in told.stdout
+    assert "6 clips: 4 ok, 2 failed" in call.stdout
 
 
 def test_the_log_is_a_line_of_json_for_every_clip(done):
@@ -101,21 +105,21 @@ def test_the_log_is_a_line_of_json_for_every_clip(done):
     assert all(line.keys() >= {"time", "status", "cause", "wall_time_s"} for line in lines)
 
 
-def test_progress_is_plain_lines_where_there_is_no_terminal_and_quiet_is_quiet(done):
-    lab, out, told = done
-    assert sum(" of 6: " in line for line in told.stderr.splitlines()) == 6
+def test_progress_is_plain_lines_without_a_terminal_and_nothing_with_quiet(done):
+    lab, out, call = done
+    assert sum(" of 6: " in line for line in call.stderr.splitlines()) == 6
     quiet = run(lab / "mon" / "a.avi", lab / "b.avi", "--out", out.parent / "quiet", "--quiet")
     assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
 
 
-def test_nothing_is_done_twice_and_what_has_changed_is_done_again(done, tmp_path):
+def test_only_what_has_changed_is_measured_again(done, tmp_path):
     lab, out, _ = done
     lab, out = shutil.copytree(lab, tmp_path / "clips"), tmp_path / "out"
     run_batch([str(lab)], out, QUIET)
-    first, notes = results(out), notes_of(out)
+    first, records = results(out), records_of(out)
     again = run_batch([str(lab)], out, QUIET)
-    assert (results(out), notes_of(out)) == (first, notes)
-    assert len(again.problems) == 2  # what failed is told again, and not tried again
+    assert (results(out), records_of(out)) == (first, records)
+    assert len(again.problems) == 2  # failures are reported again, and not tried again
     tiny_clip(lab / "b.avi", seed=11)  # its content,
     (lab / "mon" / "rig.yaml").write_text("facing: left\n")  # its rig
     (lab / "tue" / "a.command.csv").write_text("time_s,command_deg\n0,0\n0.1,5\n")  # or its command
@@ -123,27 +127,20 @@ def test_nothing_is_done_twice_and_what_has_changed_is_done_again(done, tmp_path
     run_batch([str(lab)], out, QUIET)
     changed = {name for name, content in results(out).items() if first.get(name) != content}
     assert {"b.angles.csv", "mon/a.angles.csv", "mon/a.mkv.angles.csv"} <= changed
-    redone = {name for name in notes if notes_of(out)[name] != notes[name]}
+    redone = {address for address, record in records_of(out).items() if record != records[address]}
     assert len(redone) == 5  # b, two in mon and its empty one, tue/a
-    assert rows(out)[f"{lab}/tue/text.avi"]["wall_time_s"] == first_row(first, f"{lab}/tue/text.avi", notes)
+    first_time = records[f"{lab}/tue/text.avi"].row.wall_time_s
+    assert rows(out)[f"{lab}/tue/text.avi"]["wall_time_s"] == str(first_time)
 
 
-def first_row(first, path, notes):
-    found = [json.loads(note) for note in notes.values() if json.loads(note)["row"]["path"] == path]
-    return str(found[0]["row"]["wall_time_s"])
+def records_of(out):
+    """Return each clip's job record; its wall time changes only if the clip is measured again."""
+    with RecordDatabase(OutputFolder(out).database_file) as database:
+        found = database.read_all(ClipRecord)
+    return {record.address: replace(record, stamp_is_reliable=False) for record in found}
 
 
-def notes_of(out):
-    """Return what is remembered of each clip; a note is written anew only where something is done."""
-    found = {}
-    for path in (out / ".anglecam" / "clips").glob("*.json"):
-        note = json.loads(path.read_text())
-        note.pop("settled")
-        found[path.name] = json.dumps(note)
-    return found
-
-
-def test_a_clip_that_was_merely_touched_is_not_measured_again(tmp_path):
+def test_a_clip_with_new_times_and_the_same_content_is_not_measured_again(tmp_path):
     clip = tiny_clip(tmp_path / "clips" / "a.avi")
     run_batch([str(clip)], tmp_path / "out", QUIET)
     before = (tmp_path / "out" / "a.angles.csv").stat().st_mtime_ns
@@ -152,7 +149,7 @@ def test_a_clip_that_was_merely_touched_is_not_measured_again(tmp_path):
     assert (tmp_path / "out" / "a.angles.csv").stat().st_mtime_ns == before
 
 
-def test_what_failed_is_tried_again_when_asked_or_changed_and_its_old_results_are_gone(tmp_path):
+def test_a_failed_clip_is_measured_again_on_request_or_after_a_change_and_has_no_old_results(tmp_path):
     clip, out = tiny_clip(tmp_path / "clips" / "a.avi"), tmp_path / "out"
     assert not run_batch([str(clip)], out, QUIET).problems
     whole = clip.read_bytes()
@@ -166,16 +163,16 @@ def test_what_failed_is_tried_again_when_asked_or_changed_and_its_old_results_ar
     assert run_batch([str(clip)], out, Options(jobs=1, quiet=True, retry_failed=True)).rows[0].status == "ok"
 
 
-def test_a_wrong_rig_file_costs_its_own_folder_and_is_exit_status_2_at_the_end(tmp_path):
+def test_a_wrong_rig_file_affects_its_folder_only_and_gives_exit_status_2(tmp_path):
     lab = tiny_lab(tmp_path / "clips", ["good/a.avi", "wrong/b.avi"])
     (lab / "wrong" / "rig.yaml").write_text("pivott: {}\n")
-    told = run(lab, "--out", tmp_path / "out", "--quiet")
-    assert told.returncode == 2
-    assert told.stderr.splitlines() == [f"{lab}/wrong/b.avi: {lab}/wrong/rig.yaml: unknown key pivott"]
+    call = run(lab, "--out", tmp_path / "out", "--quiet")
+    assert call.returncode == 2
+    assert call.stderr.splitlines() == [f"{lab}/wrong/b.avi: {lab}/wrong/rig.yaml: unknown key pivott"]
     assert (tmp_path / "out" / "good" / "a.angles.csv").exists()
 
 
-def test_the_index_goes_on_telling_of_other_folders_and_forgets_what_is_no_longer_there(tmp_path):
+def test_the_index_keeps_other_folders_and_drops_clips_that_are_gone(tmp_path):
     out = tmp_path / "out"
     mon, tue = tiny_lab(tmp_path / "mon", ["a.avi", "b.avi"]), tiny_lab(tmp_path / "tue", ["a.avi"])
     run_batch([str(mon)], out, QUIET)
@@ -189,7 +186,7 @@ def test_the_index_goes_on_telling_of_other_folders_and_forgets_what_is_no_longe
     run_batch([str(mon)], out, QUIET)
     assert list(rows(out)) == [f"{mon}/a.avi", f"{tue}/a.avi"]
     run_batch([str(tue)], out, QUIET)
-    assert list(rows(out)) == [f"{mon}/a.avi", f"{tue}/a.avi"]  # whatever is asked for next
+    assert list(rows(out)) == [f"{mon}/a.avi", f"{tue}/a.avi"]  # also after a batch of another folder
     (tue / "b.avi").write_bytes((tue / "a.avi").read_bytes())
     run_batch([str(tue)], out, QUIET)
     (mon / "b.avi").write_bytes((mon / "a.avi").read_bytes())
@@ -197,16 +194,16 @@ def test_the_index_goes_on_telling_of_other_folders_and_forgets_what_is_no_longe
     run_batch([str(tue)], out, QUIET)
     found = [row["series"] for row in rows(out).values()]
     assert found == ["a.angles.csv", "b.angles.csv", "tue/a.angles.csv", "tue/b.angles.csv"]
-    assert all((out / series).exists() for series in found)  # what is gone keeps its results' place
+    assert all((out / series).exists() for series in found)  # the output path of a removed clip stays taken
 
 
 def test_wrong_calls_are_exit_status_2_and_do_nothing(tmp_path):
     lab = tiny_lab(tmp_path / "clips", ["a.avi"])
     (tmp_path / "rig.yaml").write_text("facing: up\n")
     (tmp_path / "file").touch()
-    told = run(lab, "--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out")
-    assert told.returncode == 2
-    assert told.stderr.splitlines() == [f"{tmp_path}/rig.yaml: facing: input should be 'right' or 'left' (got up)"]
+    call = run(lab, "--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out")
+    assert call.returncode == 2
+    assert call.stderr.splitlines() == [f"{tmp_path}/rig.yaml: facing: input should be 'right' or 'left' (got up)"]
     for out, options, says in (
         (tmp_path / "file", QUIET, "is a file"),
         (tmp_path / "out", Options(jobs=1, log=tmp_path), "--log"),

@@ -1,4 +1,4 @@
-"""The same jobs on Dask workers: real processes, one of which is killed."""
+"""The same jobs on Dask workers, in real processes; one of them is killed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 
 from anglecam.batch.run import Options, run_batch
 from anglecam.errors import RigError
-from support.tiny import children, is_alive, results, tiny_lab
+from support.tiny import batch_command, children, is_alive, results, tiny_lab
 
 pytest.importorskip("distributed")
 
@@ -43,7 +43,7 @@ def cluster(tmp_path):
         process.wait(30)
 
 
-def test_a_worker_killed_in_the_middle_loses_nothing(cluster, tmp_path):
+def test_a_worker_that_is_killed_loses_no_clip(cluster, tmp_path):
     address, workers = cluster
     lab, out = tiny_lab(tmp_path / "lab", [f"{k}.avi" for k in range(12)]), tmp_path / "out"
     killed = []
@@ -69,7 +69,29 @@ def test_a_worker_killed_in_the_middle_loses_nothing(cluster, tmp_path):
     assert results(out) == results(tmp_path / "here")
 
 
-def test_what_is_no_address_is_told_at_once(tmp_path):
+def test_what_workers_finish_while_the_batch_is_killed_is_not_measured_again(cluster, tmp_path):
+    address, _ = cluster
+    lab, out = tiny_lab(tmp_path / "lab", [f"{k}.avi" for k in range(4)]), tmp_path / "out"
+    batch = subprocess.Popen(batch_command(lab, "--out", out, "--dask", address, "--quiet"))
+    until = time.monotonic() + 120.0
+    unfinished = out / ".anglecam" / "unfinished"
+    while not list(unfinished.glob("*/*/out")):  # a worker is measuring
+        assert time.monotonic() < until
+        time.sleep(0.005)
+    batch.send_signal(signal.SIGSTOP)
+    while not (left := list(unfinished.glob("*/*/result.json"))):
+        assert time.monotonic() < until
+        time.sleep(0.005)
+    batch.kill()
+    batch.wait()
+    made = {path.name: path.stat().st_mtime_ns for path in (left[0].parent / "out").iterdir()}
+    assert not run_batch([str(lab)], out, Options(jobs=2, quiet=True)).problems
+    assert made == {name: (out / name).stat().st_mtime_ns for name in made}
+    run_batch([str(lab)], tmp_path / "here", Options(jobs=2, quiet=True))
+    assert results(out) == results(tmp_path / "here")
+
+
+def test_an_invalid_scheduler_address_is_refused_at_once(tmp_path):
     lab = tiny_lab(tmp_path / "lab", ["a.avi"])
     with pytest.raises(
         RigError, match=r"^--dask nonsense: neither local nor an address with a port, as tcp://HOST:8786$"
@@ -77,8 +99,8 @@ def test_what_is_no_address_is_told_at_once(tmp_path):
         run_batch([str(lab)], tmp_path / "out", Options(jobs=1, quiet=True, dask="nonsense"))
 
 
-def test_a_scheduler_that_is_not_there_is_told_in_one_line(tmp_path, monkeypatch):
-    monkeypatch.setattr("anglecam.batch.cluster._WAIT_S", 1.0)
+def test_a_missing_scheduler_is_reported_in_one_line(tmp_path, monkeypatch):
+    monkeypatch.setattr("anglecam.batch.dask_pool._WAIT_S", 1.0)
     lab = tiny_lab(tmp_path / "lab", ["a.avi"])
     with pytest.raises(RigError, match=r"^--dask tcp://127\.0\.0\.1:9: no scheduler with a worker there \(.*\)$"):
         run_batch([str(lab)], tmp_path / "out", Options(jobs=1, quiet=True, dask="tcp://127.0.0.1:9"))

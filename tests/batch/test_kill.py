@@ -1,4 +1,4 @@
-"""Killed at any instant, a batch leaves nothing half done, and the next goes on to the same end."""
+"""A batch that is killed at any instant leaves no partial results, and the next batch completes it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from anglecam.batch.process import Lost, MeasuringProcess
+from anglecam.batch.measuring_process import MeasuringProcess, ProcessLost
 from anglecam.batch.run import Options
 from anglecam.batch.run import run_batch as run_here
 from anglecam.errors import RigError
@@ -37,7 +37,7 @@ def wait_until(true, timeout=60.0):
 
 
 def end_of(process):
-    """Bury a killed batch and wait until its workers have seen that it is gone."""
+    """Reap a killed batch."""
     process.wait()
     process.stdout.close()
     process.stderr.close()
@@ -55,7 +55,7 @@ def unbroken(lab, tmp_path_factory):
     return results(out)
 
 
-def test_killed_and_resumed_it_ends_as_if_it_had_never_been_killed(lab, unbroken, tmp_path):
+def test_a_batch_that_is_killed_and_resumed_gives_the_files_of_one_that_is_not_killed(lab, unbroken, tmp_path):
     out = tmp_path / "out"
     for done in (1, 3):
         batch = start(lab, "--out", out, "--jobs", 2, "--quiet")
@@ -64,7 +64,7 @@ def test_killed_and_resumed_it_ends_as_if_it_had_never_been_killed(lab, unbroken
         assert workers
         batch.kill()
         end_of(batch)
-        wait_until(lambda workers=workers: not any(map(is_alive, workers)))  # nobody measures for nobody
+        wait_until(lambda workers=workers: not any(map(is_alive, workers)))  # measuring processes end with their batch
         whole = {n: c for n, c in unbroken.items() if n.endswith((".csv", ".png")) and n != "index.csv"}
         for path in out.rglob("*"):
             name = str(path.relative_to(out))
@@ -76,28 +76,28 @@ def test_killed_and_resumed_it_ends_as_if_it_had_never_been_killed(lab, unbroken
 
 
 @pytest.mark.parametrize("sent", [signal.SIGSEGV, signal.SIGKILL])
-def test_a_measuring_process_that_dies_costs_its_clip_alone(lab, unbroken, tmp_path, sent):
+def test_a_measuring_process_that_dies_fails_its_clip_only(lab, unbroken, tmp_path, sent):
     out = tmp_path / "out"
     batch = start(lab / "mon", "--out", out, "--jobs", 1, "--quiet")
     wait_until(lambda: children(batch.pid))
     os.kill(children(batch.pid)[0], sent)
-    _, told = batch.communicate(timeout=120)
+    _, stderr = batch.communicate(timeout=120)
     assert batch.returncode == 1
     cause = f"the process that measured it died of signal {int(sent)} ({sent.name})"
-    assert told.splitlines() == [f"{lab}/mon/0.avi: {cause}"]
+    assert stderr.splitlines() == [f"{lab}/mon/0.avi: {cause}"]
     assert sorted(p.name for p in out.glob("*.angles.csv")) == ["1.angles.csv", "2.angles.csv"]
 
 
-def test_a_clip_that_takes_too_long_is_ended_and_the_next_is_measured(tmp_path):
+def test_a_clip_that_takes_too_long_is_given_up_and_the_next_is_measured(tmp_path):
     process, clip = MeasuringProcess(), tiny_clip(tmp_path / "a.avi")
-    request = {"clip": str(clip), "rig": None, "into": str(tmp_path), "keep": None}
-    with pytest.raises(Lost, match=r"took longer than its time limit of 0\.05 s"):
+    request = {"clip": str(clip), "rig": None, "into": str(tmp_path), "series_file": None}
+    with pytest.raises(ProcessLost, match=r"took longer than its time limit of 0\.05 s"):
         process.ask(request, 0.05)
     assert process.ask(request, 60.0)["frames"] == 8
     process.close()
 
 
-def test_a_second_batch_on_the_same_folder_is_told_so_and_a_killed_one_is_in_nobodys_way(lab, tmp_path):
+def test_a_second_batch_on_the_same_folder_is_refused_and_a_killed_one_does_not_block_the_next(lab, tmp_path):
     out = tmp_path / "out"
     first = start(lab, "--out", out, "--quiet")
     wait_until(lambda: first.poll() is not None or children(first.pid))
@@ -108,14 +108,14 @@ def test_a_second_batch_on_the_same_folder_is_told_so_and_a_killed_one_is_in_nob
     assert not run_here([str(lab / "tue" / "2.avi")], out, Options(jobs=1, quiet=True)).problems
 
 
-def test_interrupted_it_ends_at_once_and_nothing_in_flight_counts_as_failed(lab, unbroken, tmp_path):
+def test_an_interrupted_batch_ends_at_once_and_unfinished_clips_do_not_count_as_failed(lab, unbroken, tmp_path):
     out = tmp_path / "out"
     batch = start(lab, "--out", out, "--jobs", 1, "--quiet")
     wait_until(lambda: list(out.glob("*/*.angles.csv")))
     batch.send_signal(signal.SIGINT)
-    _, told = batch.communicate(timeout=30)
+    _, stderr = batch.communicate(timeout=30)
     assert batch.returncode not in (0, 2)
-    assert told.splitlines()[-1] == "stopped; the same call goes on from here"
-    assert "Traceback" not in told
+    assert stderr.splitlines()[-1] == "stopped; the same call goes on from here"
+    assert "Traceback" not in stderr
     assert not run_here([str(lab)], out, TWO).problems
     assert results(out) == unbroken

@@ -1,4 +1,4 @@
-"""Folders with commands are sessions: identified, or the whole way, as by the commands for one session."""
+"""Folders with commands are sessions: the batch fits them as `identify` and `close` do."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from anglecam.batch.run import Options, run_batch
-from anglecam.batch.sessions import SessionJob, _configuration
-from anglecam.batch.work import Settings
+from anglecam.batch.session_job import SessionJob, _configuration
+from anglecam.batch.worker import Settings
 from anglecam.data.series import AngleSeries
 from anglecam.io.series_csv import write_series
 from anglecam.io.session import read_session
@@ -22,20 +22,20 @@ from support.motion import Plant
 from support.series import session as make_records
 from support.tiny import tiny_clip, tiny_lab
 
-pytestmark = pytest.mark.usefixtures("kept_processes")
+pytestmark = pytest.mark.usefixtures("shared_processes")
 
 QUIET = Options(jobs=2, quiet=True)
 
 
 @pytest.fixture
 def lab(made_once, tmp_path):
-    """Return a copy of the lab that may be changed."""
+    """Return a copy of the lab that a test may change."""
     return shutil.copytree(made_once, tmp_path / "lab")
 
 
 @pytest.fixture(scope="module")
 def made_once(tmp_path_factory):
-    """Return a lab with one session of four series and a clip, and a folder beside it that is none."""
+    """Return a folder with one session of four series and a clip, and with a folder that is no session."""
     folder = tiny_lab(tmp_path_factory.mktemp("made"), ["plain/a.avi", "neck/nod.avi"])
     (folder / "neck" / "nod.command.csv").write_text("time_s,command_deg\n0,0\n0.1,5\n")
     for record in make_records(Plant(dead_time_s=0.04), 4):
@@ -49,17 +49,17 @@ def made_once(tmp_path_factory):
     return folder
 
 
-def test_a_session_is_identified_as_alone_and_done_again_only_if_something_has_changed(lab, tmp_path):
+def test_a_session_is_identified_as_by_identify_and_again_only_after_a_change(lab, tmp_path):
     out = tmp_path / "out"
     result = run_batch([str(lab)], out, QUIET)
-    told = [str(problem) for problem in result.problems]
+    found = [str(problem) for problem in result.problems]
     opened = read_session(lab / "neck")
     measured = measure_session(opened)
     write_identified(measured, tmp_path / "alone")
     model = (out / "neck" / "model.json").read_bytes()
     assert model == (tmp_path / "alone" / "model.json").read_bytes()
     assert [row.model for row in result.rows] == ["neck/model.json", None]
-    assert told == [f"{lab}/neck: {problem}" for problem in measured.problems]
+    assert found == [f"{lab}/neck: {problem}" for problem in measured.problems]
     written = (out / "neck" / "model.json").stat().st_mtime_ns
     assert run_batch([str(lab)], out, QUIET).rows == result.rows
     assert (out / "neck" / "model.json").stat().st_mtime_ns == written
@@ -68,7 +68,7 @@ def test_a_session_is_identified_as_alone_and_done_again_only_if_something_has_c
     assert (out / "neck" / "model.json").read_bytes() != model
 
 
-def test_close_goes_the_whole_way_and_the_index_tells_the_verdict(lab, tmp_path):
+def test_close_closes_the_loop_and_the_index_states_the_verdict(lab, tmp_path):
     out = tmp_path / "out"
     run_batch([str(lab)], out, Options(jobs=2, quiet=True, close=True))
     loop = json.loads((out / "neck" / "loop.json").read_text())
@@ -76,15 +76,15 @@ def test_close_goes_the_whole_way_and_the_index_tells_the_verdict(lab, tmp_path)
     assert [effect["id"] for effect in loop["effects"]] == ["dead_time"]
     assert (out / "neck" / "report.html").exists()
     rows = list(csv.DictReader((out / "index.csv").open()))
-    told = [(row["verdict"], row["effects"], row["model"]) for row in rows]
-    assert told == [("attributed", "dead_time", "neck/model.json"), ("", "", "")]
-    # who then asks for less keeps what was found
+    found = [(row["verdict"], row["effects"], row["model"]) for row in rows]
+    assert found == [("attributed", "dead_time", "neck/model.json"), ("", "", "")]
+    # a later batch without --close keeps the verdict
     again = run_batch([str(lab)], out, QUIET)
     assert (out / "neck" / "report.html").exists()
     assert again.rows[0].verdict == "attributed"
 
 
-def test_a_session_that_cannot_be_fitted_is_told_once_and_its_clips_are_measured(tmp_path):
+def test_a_session_that_cannot_be_fitted_is_reported_once_and_its_clips_are_measured(tmp_path):
     folder = tiny_lab(tmp_path / "lab", ["a.avi", "b.avi"])
     (folder / "a.command.csv").write_text("time_s,command_deg\n0,0\n0.1,5\n")
     (folder / "rig.yaml").write_text("held_out: [a, b]\n")
@@ -98,7 +98,7 @@ def test_a_session_that_cannot_be_fitted_is_told_once_and_its_clips_are_measured
         assert (out / "a.angles.csv").exists()
 
 
-def test_where_no_clip_of_a_session_can_be_measured_nothing_more_is_said_than_that(tmp_path):
+def test_a_session_none_of_whose_clips_can_be_measured_adds_no_problem_of_its_own(tmp_path):
     lab = tmp_path / "lab"
     tiny_clip(lab / "a.avi").write_bytes(b"")
     (lab / "a.command.csv").write_text("time_s,command_deg\n0,0\n0.1,5\n")
@@ -106,11 +106,11 @@ def test_where_no_clip_of_a_session_can_be_measured_nothing_more_is_said_than_th
     assert [str(p) for p in result.problems] == [f"{lab}/a.avi: empty file"]
 
 
-def test_a_session_depends_on_tracks_that_stand_in_a_clips_place(tmp_path):
+def test_a_session_depends_on_tracks_that_replace_a_clip(tmp_path):
     job, settings = SessionJob(str(tmp_path), "", (), close=False), Settings(out=str(tmp_path / "out"), run="one")
     tracks = tmp_path / "nodDLC_resnet50_headshuffle1_500.csv"
     found = []
     for x in (10.0, 11.0):
         tracks.write_text(f"scorer,a,a,a\nbodyparts,nose,nose,nose\ncoords,x,y,likelihood\n0,{x},20.0,0.9\n")
-        found.append(_configuration(job, settings, []))
+        found.append(_configuration(job, settings))
     assert found[0] != found[1]

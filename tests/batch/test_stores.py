@@ -11,14 +11,14 @@ from anglecam.camera.calibration import Calibration, write_calibration
 from anglecam.errors import RigError
 from support.tiny import results, tiny_lab
 
-pytestmark = pytest.mark.usefixtures("kept_processes")
+pytestmark = pytest.mark.usefixtures("shared_processes")
 
 QUIET = Options(jobs=2, quiet=True)
 
 
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory):
-    """Three clips, of which one has a rig file with a calibration beside it and a command."""
+    """Return three clips, one of them with a rig file, a calibration and a command."""
     folder = tiny_lab(tmp_path_factory.mktemp("lab"), ["a.avi", "mon/b.avi", "tue/c.avi"])
     (folder / "tue" / "rig.yaml").write_text("facing: left\ncamera: {calibration: lens/camera.yaml}\n")
     (folder / "tue" / "lens").mkdir()
@@ -38,13 +38,13 @@ def from_folder(lab, tmp_path_factory):
 
 
 def same_but_for_addresses(found, folder, address, expected):
-    """Compare results, the index with its paths rewritten."""
+    """Compare results; the paths in the index are rewritten first."""
     assert found.keys() == expected.keys()
-    told = found["index.csv"].replace(address.encode(), str(folder).encode())
-    assert found | {"index.csv": told} == expected
+    index = found["index.csv"].replace(address.encode(), str(folder).encode())
+    assert found | {"index.csv": index} == expected
 
 
-def test_clips_in_memory_give_what_clips_in_a_folder_give(lab, from_folder, tmp_path):
+def test_clips_in_memory_give_the_same_results_as_clips_in_a_folder(lab, from_folder, tmp_path):
     fsspec.filesystem("memory").put(str(lab), "/lab", recursive=True)
     result = run_batch(["memory://lab"], tmp_path, QUIET)
     assert [str(p) for p in result.problems] == ["memory://lab/mon/empty.mp4: empty file"]
@@ -53,7 +53,9 @@ def test_clips_in_memory_give_what_clips_in_a_folder_give(lab, from_folder, tmp_
         run_batch(["memory://lab"], tmp_path, Options(jobs=1, quiet=True, dask="local"))
 
 
-def test_clips_in_s3_give_what_clips_in_a_folder_give_and_are_fetched_once(lab, from_folder, tmp_path, monkeypatch):
+def test_clips_in_s3_give_the_results_of_clips_in_a_folder_and_are_fetched_once(
+    lab, from_folder, tmp_path, monkeypatch
+):
     pytest.importorskip("s3fs")
     server = pytest.importorskip("moto.server").ThreadedMotoServer("127.0.0.1", port=0, verbose=False)
     server.start()
@@ -69,15 +71,15 @@ def test_clips_in_s3_give_what_clips_in_a_folder_give_and_are_fetched_once(lab, 
         assert [str(p) for p in result.problems] == ["s3://lab/day/mon/empty.mp4: empty file"]
         same_but_for_addresses(results(tmp_path), lab, "s3://lab/day", from_folder)
         fetched = []
-        monkeypatch.setattr("anglecam.batch.work.fetch", lambda address, to: fetched.append(address))
+        monkeypatch.setattr("anglecam.batch.clip_job.fetch", lambda address, to: fetched.append(address))
         run_batch(["s3://lab/day"], tmp_path, QUIET)
-        assert fetched == []  # the store says that nothing has changed
+        assert fetched == []  # by the store, no clip has changed
         monkeypatch.undo()
     finally:
         server.stop()
 
 
-def test_a_store_that_does_not_answer_costs_no_clip_its_place(tmp_path, monkeypatch):
+def test_a_clip_whose_store_does_not_answer_is_measured_by_the_next_batch(tmp_path, monkeypatch):
     tiny_lab(tmp_path / "lab", ["a.avi", "b.avi"])
     kind = type(fsspec.filesystem("memory"))
     fsspec.filesystem("memory").put(str(tmp_path / "lab"), "/moody", recursive=True)

@@ -19,7 +19,7 @@ import yaml
 
 from .look import SIZE, Look
 from .motion import Plant, Recording, command_rows, move
-from .room import Scene
+from .scene import Scene
 
 __all__ = [
     "Look",

@@ -10,7 +10,7 @@ from support.drawn import Look, Plant, Recording, draw_frames, draw_session
 from support.head import Head
 from support.look import SIZE
 from support.motion import UPDATE_S, command_rows, move
-from support.room import red_object_centre
+from support.scene import red_object_centre
 
 
 def _centre_angles(images, look):

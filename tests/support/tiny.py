@@ -1,4 +1,4 @@
-"""Clips of a few hundred milliseconds of work each, for tests that are about many clips and not about angles."""
+"""Clips that take a few hundred milliseconds to measure, for tests of many clips, in which the angles do not matter."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ FRAMES = 8
 
 
 def tiny_clip(path: Path, seed: int = 0) -> Path:
-    """Write eight frames of a nodding head, a quarter of the usual size; another seed gives another clip."""
+    """Write eight frames of a moving body, a quarter of the usual size; every seed gives a different clip."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    plain = path.with_name("plain.avi")  # OpenCV takes no odd names
+    plain = path.with_name("plain.avi")  # OpenCV does not accept every name
     writer = cv2.VideoWriter(str(plain), cv2.VideoWriter_fourcc(*"MJPG"), RATE_HZ, SIZE)
     for frame in _frames(seed % 5):
         shade = np.full_like(frame, seed // 5)
@@ -33,7 +33,7 @@ def tiny_clip(path: Path, seed: int = 0) -> Path:
 
 
 def tiny_lab(folder: Path, names: Sequence[str]) -> Path:
-    """Write tiny clips, each with its own content."""
+    """Write tiny clips, each with different content."""
     for seed, name in enumerate(names):
         tiny_clip(folder / name, seed)
     return folder
@@ -52,14 +52,14 @@ def batch_command(*arguments: object) -> list[str]:
 
 
 def run_batch(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
-    """Run a batch as a user does, to its end."""
+    """Run a batch as a user does, and wait for its end."""
     return subprocess.run(
         batch_command(*arguments), capture_output=True, text=True, timeout=300, check=False, **options
     )
 
 
 def results(out: Path) -> dict[str, bytes]:
-    """Return every file that a batch has left for the user, without the index's wall times."""
+    """Return every file that a batch has written for the user, by its path; the index without its wall times."""
     found = {}
     for path in sorted(out.rglob("*")):
         inside = path.relative_to(out)
@@ -70,18 +70,18 @@ def results(out: Path) -> dict[str, bytes]:
 
 
 def unfinished(out: Path) -> list[str]:
-    """List what a killed batch has left that is not whole."""
+    """Return the names of unfinished files that a batch has left behind."""
     return [p.name for p in out.rglob("*") if p.is_file() and ("unfinished" in p.parts or p.name.startswith("."))]
 
 
 def children(pid: int) -> list[int]:
-    """List the processes that a process has started."""
+    """Return the ids of the processes that a process has started."""
     listed = Path(f"/proc/{pid}/task")
     return [int(c) for task in listed.iterdir() for c in (task / "children").read_text().split()]
 
 
 def command_line(pid: int) -> str:
-    """Return what a process was called with; nothing if it is gone."""
+    """Return a process's command line; an empty string if the process is gone."""
     try:
         return Path(f"/proc/{pid}/cmdline").read_text()
     except (ProcessLookupError, FileNotFoundError):
@@ -89,7 +89,7 @@ def command_line(pid: int) -> str:
 
 
 def is_alive(pid: int) -> bool:
-    """Tell whether a process is there and not merely waiting to be buried."""
+    """Return whether a process exists and is not a zombie."""
     try:
         os.kill(pid, 0)
         return ") Z " not in Path(f"/proc/{pid}/stat").read_text()

@@ -1,7 +1,7 @@
-"""A team of Dask workers, on this machine or many: the same jobs, done by the same function.
+"""A worker pool of Dask workers, on this machine or several: they do the same jobs with the same function.
 
-A worker does each job in a measuring process of its own, as here: what crashes a decoder does not cost the worker. A
-job whose worker is lost is done by another.
+Like a worker on this machine, a Dask worker measures in a separate process, so that a decoder that crashes does not end
+the worker. A job whose worker is lost is done by another worker.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError
 from typing import Any, Generic, TypeVar
 
-from anglecam.batch.process import MeasuringProcess
+from anglecam.batch.measuring_process import MeasuringProcess
 from anglecam.errors import InputError, RigError
 
 try:
@@ -27,23 +27,23 @@ Job = TypeVar("Job")
 Done = TypeVar("Done")
 
 _WAIT_S = 60.0
-"""For the scheduler, and for a first worker."""
+"""Time limit for reaching the scheduler, and for its first worker to be there, in s."""
 
 _idle: list[MeasuringProcess] = []
 _lock = threading.Lock()
 
 
-class DaskTeam(Generic[Job, Done]):
-    """Jobs handed to a Dask scheduler; use it in a ``with`` block.
+class DaskPool(Generic[Job, Done]):
+    """Jobs submitted to a Dask scheduler; use it in a ``with`` block.
 
     Parameters
     ----------
     work : callable
-        From a job and a process to what became of it; raises nothing; a function that workers can import.
+        Does a job with a measuring process and returns the outcome; it raises nothing, and workers can import it.
     address : str
-        The scheduler's, or ``local`` to start one with workers on this machine.
+        The scheduler's address, or ``local`` to start a scheduler and workers on this machine.
     size : int
-        How many workers ``local`` starts.
+        Number of workers that ``local`` starts.
     """
 
     def __init__(self, work: Callable[[Job, MeasuringProcess], Done], address: str, size: int) -> None:
@@ -51,11 +51,11 @@ class DaskTeam(Generic[Job, Done]):
         self._address = address
         self._size = size
 
-    def __enter__(self) -> DaskTeam[Job, Done]:
+    def __enter__(self) -> DaskPool[Job, Done]:
         if self._address != "local" and not re.search(r":\d+/?$", self._address):
             raise RigError(f"--dask {self._address}: neither local nor an address with a port, as tcp://HOST:8786")
         for logger in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
-            logging.getLogger(logger).setLevel(logging.CRITICAL + 1)  # what is wrong is said here, in one line
+            logging.getLogger(logger).setLevel(logging.CRITICAL + 1)  # failures are reported here, in one line
         self._cluster = None
         try:
             if self._address == "local":
@@ -76,23 +76,23 @@ class DaskTeam(Generic[Job, Done]):
             self._cluster.close()
 
     @property
-    def room(self) -> int:
-        """How many jobs to have under way, so that nobody waits for the next."""
+    def capacity(self) -> int:
+        """Number of jobs to have under way so that no worker waits for its next job."""
         return 2 * max(1, sum(self._client.nthreads().values()))
 
     def start(self, job: Job) -> None:
-        """Give a job to the scheduler."""
+        """Submit a job to the scheduler."""
         future = self._client.submit(_do, self._work, job, pure=False)
         self._started[future.key] = job
         self._done.add(future)
 
     def next_done(self) -> Done:
-        """Wait for the next job that is done.
+        """Wait for the next job to finish and return its outcome.
 
         Raises
         ------
         InputError
-            Where the scheduler is gone.
+            If the scheduler is lost.
         """
         while True:
             future = next(self._done)
@@ -100,17 +100,19 @@ class DaskTeam(Generic[Job, Done]):
             try:
                 done: Done = future.result()
             except distributed.scheduler.KilledWorker:
-                self.start(job)  # several workers were lost over it; no job can end a worker, so it is not to blame
+                self.start(
+                    job
+                )  # several workers were lost with it; a job cannot end its worker, so the cause lies elsewhere
                 continue
             except (CancelledError, FutureCancelledError, CommClosedError) as fault:
                 raise InputError(
-                    f"--dask {self._address}: the scheduler is gone ({_line(fault)}); the same call goes on from here"
+                    f"--dask {self._address}: the scheduler is lost ({_line(fault)}); the same call goes on from here"
                 ) from fault
             return done
 
 
 def _do(work: Callable[[Job, MeasuringProcess], Done], job: Job) -> Done:
-    """Do a job on a worker, with a process that is kept for the next."""
+    """Do a job on a Dask worker, with a measuring process that is kept for the next job."""
     with _lock:
         process = _idle.pop() if _idle else MeasuringProcess()
     try:

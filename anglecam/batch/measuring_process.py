@@ -1,8 +1,8 @@
-"""A process that measures for another: if it dies or takes too long, that costs what it was given and nothing else.
+"""A separate process that measures for a worker: if it crashes or takes too long, only its current job fails.
 
-It is a program of its own, spoken to in lines of JSON through its own two pipes. Pools of `multiprocessing` share locks
-among their workers, and a worker killed while it holds one stops them all; and Dask's workers may have no child of
-`multiprocessing`. This serves both, and nothing is ever unpickled.
+It is a separate program that exchanges lines of JSON over its standard input and output. `multiprocessing` would not
+do: its pools share locks among their workers, so that a worker killed while it holds a lock stops all others. Also,
+Dask's workers may not start `multiprocessing` children. Nothing is unpickled.
 """
 
 from __future__ import annotations
@@ -16,43 +16,44 @@ import sys
 import time
 from typing import Any
 
-_SINGLE = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMBA")
+_THREADED_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMBA")
+"""Libraries that are limited to one thread, by the prefixes of their environment variables."""
 
 
-class Lost(Exception):  # noqa: N818  (what happened, not an error of ours)
-    """The process ended before it answered; the text says how."""
+class ProcessLost(Exception):  # noqa: N818  (an event, not a fault of this program)
+    """The process ended before it answered; the message says how."""
 
 
 class Abandoned(BaseException):
-    """The batch has been given up, and with it what the process was asked for."""
+    """The batch has ended, and the process with it."""
 
 
 class MeasuringProcess:
-    """A process that is started when it is first needed, and anew after it was lost."""
+    """A process that is started when it is first needed, and again after it was lost."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
         self._closed = False
 
     def ask(self, request: dict[str, Any], time_limit: float) -> dict[str, Any]:
-        """Have something measured or fitted.
+        """Have a clip measured or a session fitted.
 
         Parameters
         ----------
         request : dict
-            What `anglecam.batch.child` takes.
+            As `anglecam.batch.child` expects it.
         time_limit : float
-            Seconds until the process is ended.
+            Time after which the process is ended, in s.
 
         Returns
         -------
         dict
-            Its answer.
+            The process's answer.
 
         Raises
         ------
-        Lost
-            Where it died or took too long.
+        ProcessLost
+            If the process died or took too long.
         Abandoned
             After `close`.
         """
@@ -64,20 +65,20 @@ class MeasuringProcess:
             process.stdin.write(json.dumps(request | {"time_limit": time_limit}).encode() + b"\n")
             process.stdin.flush()
         except OSError:
-            raise Lost(self._ended()) from None
+            raise ProcessLost(self._ended()) from None
         with selectors.DefaultSelector() as ready:
             ready.register(process.stdout, selectors.EVENT_READ)
             if not ready.select(max(until - time.monotonic(), 0.0)):
                 self._end()
-                raise Lost(f"took longer than its time limit of {time_limit:g} s")
+                raise ProcessLost(f"took longer than its time limit of {time_limit:g} s")
         line = process.stdout.readline()
         if not line.endswith(b"\n"):
-            raise Lost(self._ended())
+            raise ProcessLost(self._ended())
         answer: dict[str, Any] = json.loads(line)
         return answer
 
     def close(self) -> None:
-        """End the process for good; whoever waits for an answer gets `Abandoned`."""
+        """End the process for good; a thread that waits for its answer gets `Abandoned`."""
         self._closed = True
         process = self._process
         if process is not None:
@@ -93,14 +94,14 @@ class MeasuringProcess:
         if self._closed:
             raise Abandoned
         if self._process is not None and self._process.poll() is not None:
-            self._end()  # it died while it had nothing to do
+            self._end()  # it died between two requests
         if self._process is None:
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "anglecam.batch.child"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,  # decoders complain there of what the index says once
-                env=os.environ | {f"{library}_NUM_THREADS": "1" for library in _SINGLE},
+                stderr=subprocess.DEVNULL,  # decoders write messages there that the index reports once
+                env=os.environ | {f"{library}_NUM_THREADS": "1" for library in _THREADED_LIBRARIES},
             )
         return self._process
 

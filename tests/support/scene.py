@@ -1,4 +1,4 @@
-"""The whole picture: a room with a second red thing in it, and the head on its shaft in front."""
+"""The whole picture: a still background with a second red object, and in front of it the moving body on its shaft."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.special import erfc
 from .head import Head
 from .look import BLUR_PX, SIZE, Look, relief
 
-ROOM_FINE = 2
+OVERSAMPLING = 2
 MARKERS = {
     "ring": ((238, 238, 236), (22, 22, 24)),
     "ring_white": ((20, 20, 22), (236, 236, 234)),
@@ -19,11 +19,11 @@ MARKERS = {
     "disc_bright": ((242, 242, 240), None),
     "none": (None, None),
 }
-"""Disc and ring, rgb; the ring stands between 0.45 and 0.72 of the disc's radius."""
+"""RGB of disc and ring; the ring lies between 0.45 and 0.72 of the disc's radius."""
 
 
 def _spot(centre: np.ndarray, radius: float) -> tuple[slice, slice, np.ndarray]:
-    """Draw a blurred disc: the window it fills and its coverage there."""
+    """Return the rows and columns that a blurred disc covers, and its coverage there."""
     reach = radius + 5 * BLUR_PX
     low = np.maximum(np.floor(np.asarray(centre) - reach).astype(int), 0)
     high = np.minimum(np.ceil(np.asarray(centre) + reach).astype(int) + 1, SIZE)
@@ -38,23 +38,23 @@ def _paint(scene: np.ndarray, cover: np.ndarray, rgb: tuple[int, int, int]) -> N
 
 
 def _fill(scene: np.ndarray, points: np.ndarray, rgb: tuple[float, ...]) -> None:
-    """Fill a polygon given in image pixels on a canvas at 2×."""
-    fixed = np.round((np.asarray(points) * ROOM_FINE + (ROOM_FINE - 1) / 2) * 256).astype(np.int32)
+    """Fill a polygon, given in image pixels, on an oversampled canvas."""
+    fixed = np.round((np.asarray(points) * OVERSAMPLING + (OVERSAMPLING - 1) / 2) * 256).astype(np.int32)
     cv2.fillPoly(scene, [fixed], [float(c) for c in rgb[::-1]], shift=8)
 
 
 def red_object_centre(look: Look) -> np.ndarray:
-    """Return the middle of the red object, px."""
+    """Return the centre of the red object, in px."""
     if look.red_place == "near":
         return look.mouth([0.0])[0] + [look.sign * (0.25 * look.lever_px + 46), -4]
     return np.array([319.5 + look.sign * 250, 405])
 
 
 def background(look: Look) -> np.ndarray:
-    """Draw everything that never moves and is never in front of the head, float BGR."""
+    """Return everything that stands still behind the moving body, as float BGR."""
     rng = np.random.default_rng(look.texture_seed + 1)
-    width, height = SIZE[0] * ROOM_FINE, SIZE[1] * ROOM_FINE
-    y, x = np.mgrid[0:height, 0:width].astype(np.float32) / ROOM_FINE
+    width, height = SIZE[0] * OVERSAMPLING, SIZE[1] * OVERSAMPLING
+    y, x = np.mgrid[0:height, 0:width].astype(np.float32) / OVERSAMPLING
     if look.background == "wallpaper":
         leaf = np.sin(x / 9 + 2.2 * np.sin(y / 23)) * np.sin(y / 12)
         level = 150 + 14 * np.sign(np.sin(x / 21)) + 16 * (leaf > 0.45)
@@ -84,7 +84,7 @@ def background(look: Look) -> np.ndarray:
         corners = np.array([[-36, -50], [36, -50], [36, 50], [-36, 50]]) @ [[0.985, 0.17], [-0.17, 0.985]]
         _fill(scene, centre + corners, red)
         _fill(scene, centre + (corners * [0.6, 0.08] - [0, 22]), (214, 190, 120))
-    scene = cv2.GaussianBlur(scene, (0, 0), BLUR_PX * ROOM_FINE)
+    scene = cv2.GaussianBlur(scene, (0, 0), BLUR_PX * OVERSAMPLING)
     return cv2.resize(scene, SIZE, interpolation=cv2.INTER_LINEAR)
 
 
@@ -94,7 +94,7 @@ def _prepared(look: Look) -> tuple[Head, np.ndarray]:
 
 
 class Scene:
-    """The whole picture of a look, at any angle and time, before the sensor's noise."""
+    """The whole picture at any angle and time, before the sensor's noise."""
 
     def __init__(self, look: Look) -> None:
         self.look = look
@@ -107,7 +107,7 @@ class Scene:
         self._marker = [(*_spot(look.pivot, share * look.marker_radius_px), colour) for share, colour in discs]
 
     def at(self, angle_deg: float, time_s: float = 0.0) -> np.ndarray:
-        """Draw one picture, float BGR."""
+        """Return one picture as float BGR."""
         scene = self._still.copy()
         self._distract(scene, time_s)
         (x, y), (width, height) = self._corner, self._size

@@ -1,4 +1,4 @@
-"""A team on this machine: as many measuring processes as there are jobs at a time, each on one core."""
+"""A worker pool on this machine: one measuring process for each job under way, each on one core."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ import threading
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from anglecam.batch.process import Abandoned, MeasuringProcess
+from anglecam.batch.measuring_process import Abandoned, MeasuringProcess
 
 Job = TypeVar("Job")
 Done = TypeVar("Done")
 
 
-class LocalTeam(Generic[Job, Done]):
-    """Threads that hand jobs to a process each; use it in a ``with`` block.
+class LocalPool(Generic[Job, Done]):
+    """Threads, each with a measuring process; use it in a ``with`` block.
 
     Parameters
     ----------
     work : callable
-        From a job and a process to what became of it; raises nothing.
+        Does a job with a measuring process and returns the outcome; it raises nothing.
     size : int
-        How many jobs at a time.
+        Number of jobs at a time.
     """
 
     def __init__(self, work: Callable[[Job, MeasuringProcess], Done], size: int) -> None:
@@ -31,7 +31,7 @@ class LocalTeam(Generic[Job, Done]):
         self._done: queue.SimpleQueue[Done | Exception] = queue.SimpleQueue()
         self._processes = [MeasuringProcess() for _ in range(size)]
 
-    def __enter__(self) -> LocalTeam[Job, Done]:
+    def __enter__(self) -> LocalPool[Job, Done]:
         for process in self._processes:
             threading.Thread(target=self._serve, args=(process,), daemon=True).start()
         return self
@@ -42,16 +42,16 @@ class LocalTeam(Generic[Job, Done]):
             self._jobs.put(None)
 
     @property
-    def room(self) -> int:
-        """How many jobs to have under way, so that nobody waits for the next."""
+    def capacity(self) -> int:
+        """Number of jobs to have under way so that no worker waits for its next job."""
         return 2 * len(self._processes)
 
     def start(self, job: Job) -> None:
-        """Give a job to whoever is free next."""
+        """Queue a job for the next free worker."""
         self._jobs.put(job)
 
     def next_done(self) -> Done:
-        """Wait for the next job that is done."""
+        """Wait for the next job to finish and return its outcome."""
         done = self._done.get()
         if isinstance(done, Exception):
             raise done
@@ -62,5 +62,5 @@ class LocalTeam(Generic[Job, Done]):
             while (job := self._jobs.get()) is not None:
                 try:
                     self._done.put(self._work(job, process))
-                except Exception as fault:  # noqa: BLE001  (raised again where the batch waits)
+                except Exception as fault:  # noqa: BLE001  (raised again by next_done)
                     self._done.put(fault)

@@ -1,0 +1,153 @@
+"""The job for one clip, the same on every worker: identify it, fetch it if it is remote, and have it measured."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from anglecam import __version__
+from anglecam.batch.address import TransientError, fetch, is_remote, name, stem
+from anglecam.batch.identity import clip_configuration, content_hash, is_reliable, stamp
+from anglecam.batch.lock import is_current
+from anglecam.batch.measuring_process import MeasuringProcess, ProcessLost
+from anglecam.batch.publish import Finished, finish, workspace
+from anglecam.batch.records import ClipRecord
+from anglecam.batch.row import OK, TRUNCATED, Row, cannot_write
+from anglecam.batch.worker import Settings, clip_time_limit, fetch_beside, message_of, require_same_batch
+from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
+from anglecam.io.command_csv import COMMAND_ENDING
+
+
+@dataclass(frozen=True)
+class ClipJob:
+    """A clip to be measured."""
+
+    address: str
+    output_path: str
+    """Path of its results relative to the output folder, without an ending."""
+    in_session: bool
+    """Whether its series is to be cached for the fit of a session."""
+    before: ClipRecord | None = None
+    """Its record by an earlier batch."""
+
+
+def run_clip_job(job: ClipJob, settings: Settings, process: MeasuringProcess) -> Finished:
+    """Measure a clip, unless an earlier batch has done so; raise nothing.
+
+    Parameters
+    ----------
+    job : ClipJob
+        The clip.
+    settings : Settings
+        The settings of the batch.
+    process : MeasuringProcess
+        The process that measures.
+
+    Returns
+    -------
+    Finished
+        The clip's record and its finished files, or the record of an earlier batch if nothing has changed.
+    """
+    began = time.monotonic()
+    record = ClipRecord(job.address, Row(printable(job.address), version=__version__), job.output_path)
+    made: dict[str, Path] = {}
+    with workspace(settings.folder, settings.run) as work:
+        try:
+            with blame(Path(job.address)):
+                require_same_batch(settings)
+                record = _identified(record, settings)
+                if job.before is not None and _is_done(job.before, record, job, settings):
+                    return _unchanged(job.before, record)
+                clip = _fetched(job.address, work) if is_remote(job.address) else Path(job.address)
+                record = replace(record, row=replace(record.row, sha256=content_hash(clip)))
+                if job.before is not None and _is_done(job.before, record, job, settings):
+                    return _unchanged(job.before, record)
+                record, made = _measured(record, job, settings, process, clip, work)
+        except AnglecamError as problem:
+            record = record.failed(
+                message_of(problem, job.address, work),
+                call_is_wrong=isinstance(problem, RigError),
+                transient=isinstance(problem, TransientError),
+            )
+        record = replace(record, row=replace(record.row, wall_time_s=round(time.monotonic() - began, 3)))
+        if not is_current(settings.folder, settings.run):
+            late = record.failed("the batch had ended before the clip was finished", transient=True)
+            return Finished(late, to_publish=False)
+        return finish(record, made, job.before, work, settings.folder)
+
+
+def _identified(record: ClipRecord, settings: Settings) -> ClipRecord:
+    """Add which version of the clip this is, and the hash of what is declared for it."""
+    found = stamp(record.address)
+    configuration = clip_configuration(record.address, settings.rig)
+    row = replace(record.row, size_bytes=found["size"], configuration=configuration)
+    return replace(record, row=row, stamp=found, stamp_is_reliable=is_reliable(found))
+
+
+def _is_done(before: ClipRecord, record: ClipRecord, job: ClipJob, settings: Settings) -> bool:
+    """Return whether this batch would obtain the results of an earlier one."""
+    sha256 = record.row.sha256
+    same_stamp = before.stamp_is_reliable and before.stamp == record.stamp
+    same_content = before.row.sha256 == sha256 if sha256 else same_stamp  # without a hash the clip is not read yet
+    return (
+        same_content
+        and before.row.sha256 is not None
+        and (before.row.configuration, before.row.version) == (record.row.configuration, record.row.version)
+        and before.output_path == job.output_path
+        and not before.transient
+        and not (before.has_failed and settings.retry_failed)
+        and (not job.in_session or before.has_failed or settings.folder.cached_series(job.address) in before.files)
+        and settings.folder.has(before.files)
+    )
+
+
+def _unchanged(before: ClipRecord, record: ClipRecord) -> Finished:
+    """Keep the results of an earlier batch; with the new stamp, the next batch need not read the clip."""
+    renewed = replace(before, stamp=record.stamp, stamp_is_reliable=record.stamp_is_reliable, removed=False)
+    return Finished(renewed, unchanged=True, to_publish=renewed != before)
+
+
+def _fetched(address: str, work: Path) -> Path:
+    """Fetch a remote clip and the files beside it that its measurement depends on; return the local clip."""
+    here = fetch_beside(address, work, frozenset({"rig.yaml", stem(address) + COMMAND_ENDING}))
+    fetch(address, here / name(address))
+    return here / name(address)
+
+
+def _measured(
+    record: ClipRecord, job: ClipJob, settings: Settings, process: MeasuringProcess, clip: Path, work: Path
+) -> tuple[ClipRecord, dict[str, Path]]:
+    """Have a clip measured; return its record, and its finished files by their output paths."""
+    into, cached = work / "out", work / "series.nc"
+    try:
+        into.mkdir(parents=True)
+    except OSError as problem:
+        return record.failed(cannot_write(problem), transient=True), {}
+    request = {
+        "clip": str(clip),
+        "rig": settings.rig,
+        "into": str(into),
+        "series_file": str(cached) if job.in_session else None,
+    }
+    try:
+        answer = process.ask(request, clip_time_limit(record.row.size_bytes or 0, settings))
+    except ProcessLost as loss:
+        raise InputError(f"{job.address}: {loss}") from loss
+    figures = {name: value for name, value in answer.items() if name in Row.__dataclass_fields__ and name != "cause"}
+    record = replace(record, row=replace(record.row, **figures))
+    if "cause" in answer:
+        cause = message_of(answer["cause"], job.address, work)
+        return record.failed(cause, call_is_wrong=answer["call_is_wrong"], transient=answer["transient"]), {}
+    if not is_remote(record.address) and stamp(record.address) != record.stamp:
+        return record.failed("it changed while it was being measured", transient=True), {}
+    made = {job.output_path + file.name[len(clip.stem) :]: file for file in sorted(into.iterdir())}
+    if job.in_session:
+        made[settings.folder.cached_series(job.address)] = cached
+    row = replace(
+        record.row,
+        status=TRUNCATED if answer["truncated"] else OK,
+        cause=answer["truncated"],
+        series=printable(f"{job.output_path}.angles.csv"),
+    )
+    return replace(record, row=row), made
