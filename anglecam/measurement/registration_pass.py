@@ -39,8 +39,8 @@ _FEWEST = 12
 """A body seen in fewer frames is not learnt."""
 _FEWEST_TILES = 3
 _YIELDING = 0.5
-"""Of `BodyAppearance.absorbed_share`: 0.05 to 0.1 in clips of steps and swings, 0.8 in a swing of 70° with six frames on
-the way."""
+"""Of `BodyAppearance.absorbed_share`: 0.05 to 0.1 in clips of steps and swings, 0.8 in a swing of 70° with six frames
+on the way."""
 _DOUBT_PX = 10.0
 """Largest error of a guessed rotation, px at the mark."""
 _AGREE = 4.0

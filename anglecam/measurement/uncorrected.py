@@ -118,7 +118,7 @@ def _differs(measured: AngleSeries, plain: AngleSeries, angle: Floats, clearly: 
 
 
 def _slanted(series: AngleSeries) -> bool:
-    """Return whether the mark's outline rotates significantly more or less than the line, as no wrong pivot explains."""
+    """Return whether the mark's outline rotates significantly more or less than the line; no wrong pivot does that."""
     if series.evidence.outline_turn is None:
         return False
     share, sigma = series.evidence.outline_turn

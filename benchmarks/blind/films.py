@@ -85,7 +85,7 @@ def film(case: Case, kept: Path) -> None:
         if measured.problems:
             raise measured.problems[0]
     kept.mkdir(parents=True, exist_ok=True)
-    (kept / MEASURED).write_bytes(pickle.dumps((session, measured)))
+    (kept / MEASURED).write_bytes(pickle.dumps(measured))
 
 
 def close(case: Case, kept: Path) -> Line:
@@ -96,7 +96,7 @@ def close(case: Case, kept: Path) -> Line:
     dict
         The result of `benchmarks.blind.judged.judge`, with ``right`` and ``wrong``, the list of deviations.
     """
-    session, measured = pickle.loads((kept / MEASURED).read_bytes())
+    measured = pickle.loads((kept / MEASURED).read_bytes())
     records = loop_input(measured).records
     start = time.perf_counter()
     verdict = close_records(records, held_out=case.spec.declare["held_out"])
