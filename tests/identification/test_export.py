@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import io, signal
 
-from anglecam.cli import app as cli
+from anglecam.cli.app import main
 from anglecam.data.command import Command
 from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError
@@ -172,7 +172,7 @@ def test_identify_writes_the_model_for_matlab_and_as_json(tmp_path, monkeypatch)
         (tmp_path / f"{record.name}.command.csv").write_text(f"time_s,command_deg\n{rows}\n")
     monkeypatch.setattr(sys, "argv", ["anglecam", "identify", str(tmp_path), "--out", str(tmp_path / "out")])
     with pytest.raises(SystemExit) as ended:
-        cli.main()
+        main()
     assert not ended.value.code
     told = json.loads((tmp_path / "out" / "model.json").read_text())
     struct = io.loadmat(tmp_path / "out" / "model.mat")["model"][0, 0]
