@@ -115,8 +115,8 @@ def smallest_first_effect(task: Task, first: Assessment, best: Fit) -> float:
 def rank_candidates(task: Task, now: Assessment) -> list[Candidate]:
     """Fit the forecast effects, each in addition to those of the model, and rank them by evidence.
 
-    In a film, of effects whose predictions differ from the best one's by less than the angle's uncertainty and whose
-    evidence is nearly as strong, the one with the fewest parameters comes first.
+    In a film several effects may be equivalent: their predictions differ from the best one's by less than the angle's
+    uncertainty, and their evidence is nearly as strong. The one with the fewest parameters then comes first.
     """
     found = fit_candidates(
         now.fit, now.cross_validated, task.fitted, task.predicted, now.forecasts, task.camera, task.policy
