@@ -181,7 +181,7 @@ def _significant(task: Task, now: Assessment, best: Candidate, least: float) -> 
     return any(
         after is not None
         and before.rmse**2 - after.rmse**2 > least**2
-        and compare(before, after, task.rng, task.policy).significant
+        and compare(before, after, task.rng, task.policy).lower_bound > 0.0
         for before, after in pairs[0 if task.predicted else 1 :]
     )
 
@@ -195,7 +195,8 @@ def _add(task: Task, best: Candidate) -> Assessment:
             break
         reduced = refit_without(fit, effect, task.fitted)
         _, fewer = predict_held_out(reduced, task.fitted, task.predicted, task.policy)
-        if not compare(fewer, cross_validated, task.rng, task.policy).significant:
+        # a diverging prediction has no bound (NaN), and is no reason to remove an effect
+        if compare(fewer, cross_validated, task.rng, task.policy).lower_bound <= 0.0:
             fit, cross_validated = reduced, fewer
     return assess(task, fit)
 
