@@ -66,8 +66,8 @@ class Gain:
     interval_95: tuple[float, float]
     """Bootstrap interval of ``ratio``."""
     lower_bound: float
-    """Quantile of the bootstrapped ``ratio`` at the policy's ``false_gain_rate``: the prediction is significantly better
-    if it is above zero. NaN if a prediction diverges."""
+    """Quantile of the bootstrapped ``ratio`` at the policy's ``false_gain_rate``; above zero the prediction is
+    significantly better. NaN if a prediction diverges."""
 
 
 def robust_sigma(residuals: Sequence[Floats]) -> float:
