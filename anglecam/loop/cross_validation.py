@@ -66,12 +66,8 @@ class Gain:
     interval_95: tuple[float, float]
     """Bootstrap interval of ``ratio``."""
     lower_bound: float
-    """Quantile of the bootstrapped ``ratio`` at the policy's ``false_gain_rate``."""
-
-    @property
-    def significant(self) -> bool:
-        """Whether the prediction is better by more than the policy's ``false_gain_rate`` allows for chance."""
-        return self.lower_bound > 0.0
+    """Quantile of the bootstrapped ``ratio`` at the policy's ``false_gain_rate``; above zero the prediction is
+    significantly better. NaN if a prediction diverges."""
 
 
 def robust_sigma(residuals: Sequence[Floats]) -> float:

@@ -115,8 +115,8 @@ def smallest_first_effect(task: Task, first: Assessment, best: Fit) -> float:
 def rank_candidates(task: Task, now: Assessment) -> list[Candidate]:
     """Fit the forecast effects, each in addition to those of the model, and rank them by evidence.
 
-    In a film, of effects whose predictions differ from the best one's by less than the angle's uncertainty and whose
-    evidence is nearly as strong, the one with the fewest parameters comes first.
+    In a film several effects may be equivalent: their predictions differ from the best one's by less than the angle's
+    uncertainty, and their evidence is nearly as strong. The one with the fewest parameters then comes first.
     """
     found = fit_candidates(
         now.fit, now.cross_validated, task.fitted, task.predicted, now.forecasts, task.camera, task.policy
@@ -181,7 +181,7 @@ def _significant(task: Task, now: Assessment, best: Candidate, least: float) -> 
     return any(
         after is not None
         and before.rmse**2 - after.rmse**2 > least**2
-        and compare(before, after, task.rng, task.policy).significant
+        and compare(before, after, task.rng, task.policy).lower_bound > 0.0
         for before, after in pairs[0 if task.predicted else 1 :]
     )
 
@@ -195,7 +195,8 @@ def _add(task: Task, best: Candidate) -> Assessment:
             break
         reduced = refit_without(fit, effect, task.fitted)
         _, fewer = predict_held_out(reduced, task.fitted, task.predicted, task.policy)
-        if not compare(fewer, cross_validated, task.rng, task.policy).significant:
+        # a diverging prediction has no bound (NaN), and is no reason to remove an effect
+        if compare(fewer, cross_validated, task.rng, task.policy).lower_bound <= 0.0:
             fit, cross_validated = reduced, fewer
     return assess(task, fit)
 

@@ -26,7 +26,7 @@ def sentence(verdict: Verdict) -> str:
     if verdict.verdict == "unexplained":
         return (
             f"Something is missing: the error of the model on data that it was not fitted to is {before}, and none of "
-            f"the effects that anglecam knows explains it beyond doubt."
+            f"the effects that anglecam knows explains it with sufficient evidence."
         )
     first, *others = [_cause(a.effect, a.alias_set[1:]) for a in verdict.accepted]
     causes = "; ".join([first, *(cause[0].lower() + cause[1:] for cause in others)])
