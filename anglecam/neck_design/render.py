@@ -77,7 +77,7 @@ def as_json(result: Any) -> Any:
     dict, list or plain value
         Floats rounded to 12 significant digits.
     """
-    if is_dataclass(result):
+    if is_dataclass(result) and not isinstance(result, type):
         return {key: item for name, hints in _annotations(type(result)) for key, item in _items(result, name, hints)}
     if isinstance(result, Mapping):
         return {key: as_json(item) for key, item in result.items()}

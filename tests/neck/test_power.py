@@ -57,7 +57,7 @@ def test_nods_are_found_in_noise_and_short_pauses_are_inside_one():
         np.testing.assert_allclose(found, NODS, atol=0.006)
 
 
-def test_use_of_a_made_log_is_what_was_made():
+def test_energy_and_power_of_a_made_log_are_the_true_ones():
     use = power_use(made(noise_v=0.02, noise_a=0.005), NODS)
     driven, idle = 3.5 * 0.6, 0.02 * (V0 - R * 0.02)
     for nod, (start, end) in zip(use.nods, NODS, strict=True):
