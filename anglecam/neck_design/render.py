@@ -1,7 +1,7 @@
 """The one renderer of ``anglecam neck``: any verb's result as a JSON object and as tables in the terminal.
 
-It reads the annotations of `anglecam.neck_design.units`. A result says in `Result.tables` which of its parts stand in
-which table; headings, units and digits of rows stand with the fields.
+It reads the annotations of `anglecam.neck_design.units`. `Result.tables` assigns the parts of a result to tables;
+headings, units and digits of rows are declared with the fields.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ Layout = Facts | Lines | Rows
 
 
 class Result(Protocol):
-    """What a verb of ``anglecam neck`` has worked out: a frozen dataclass with annotated fields."""
+    """The result of a verb of ``anglecam neck``: a frozen dataclass with annotated fields."""
 
     def tables(self) -> Sequence[Layout]:
         """Return the tables to print, in their order."""
