@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from anglecam.cli.app import app as cli
+from anglecam.cli import app as cli
 from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.data.series import AngleSeries

@@ -167,5 +167,5 @@ def test_derived_quantities_stay_correlated():
     assert difference["rest"].sigma == pytest.approx(0.0, abs=1e-12)
     assert pair["sum"].sigma == pytest.approx(np.hypot(0.1, 0.2), rel=1e-12)
     assert isinstance(pair, CorrelatedQuantities)
-    with pytest.raises(ValueError, match="both sides"):
+    with pytest.raises(ValueError, match="both sets"):
         _ = pair + pair
