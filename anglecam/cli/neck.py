@@ -47,7 +47,7 @@ def kinematics(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Work out four-bar and turning mechanism: Table 3, limits, commands of wanted nods."""
+    """Compute four-bar and turning mechanism: Table 3, limits, commands of wanted nods."""
     from anglecam.io.neck_file import read_neck
     from anglecam.neck_design.figures.mechanism import linkage_figure, turning_figure
     from anglecam.neck_design.results.kinematics import kinematics_of
@@ -301,5 +301,5 @@ def _span(text: str) -> tuple[float, float]:
     try:
         start, end = (float(part) for part in text.split(":"))
     except ValueError:
-        raise RigError(f"--nod {text}: say when it began and ended, such as 1.0:1.6") from None
+        raise RigError(f"--nod {text}: give start and end in seconds, such as 1.0:1.6") from None
     return start, end

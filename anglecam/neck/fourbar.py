@@ -4,7 +4,7 @@ The servo turns the crank AC about A, the coupler CD pulls the rocker BD, and th
 the shaft B. θ_s is the angle of the crank at A, from the line A→B; θ_f the angle of the rocker at B, from the line
 B→A. With B to the right of A both joints C and D lie above that line.
 
-Eqs. (1)-(2) as printed take L3 for the ground link and then give 80°, 57° and 26° where Table 3 and Fig. 4 say 70°,
+Eqs. (1)-(2) as printed use L3 as the ground link and then give 80°, 57° and 26° where Table 3 and Fig. 4 have 70°,
 45° and 20°. The ground link L5 = 55 mm and the coupler L3 = 41 mm give the table, and are used here.
 
 For a given crank angle the links close in two ways, which mirror each other in the diagonal BC; for a given rocker

@@ -287,7 +287,7 @@ def holding_voltage(neck: LargeAngleNeck, delta: ArrayLike) -> Floats:
 
 
 def linearise(neck: LargeAngleNeck, delta: float = 0.0) -> Linearised:
-    """Linearise the neck about an equilibrium, Eq. (33).
+    """Linearise the neck at an equilibrium, Eq. (33).
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ class HeadParameters:
     """The head as a body on the nodding shaft, Fig. 6 (c)."""
 
     mass: float = 2.31
-    """M_h, kg. Table 4 and the text say 2.31, Table 5 says 2.319."""
+    """M_h, kg. Table 4 and the text print 2.31, Table 5 prints 2.319."""
     centre_of_mass: float = 0.05
     """L, from the pivot, m."""
     own_inertia: float = 0.075e-3

@@ -1,7 +1,7 @@
 """The one renderer of ``anglecam neck``: any verb's result as a JSON object and as tables in the terminal.
 
-It reads the annotations of `anglecam.neck_design.units`. A result says in `Result.tables` which of its parts stand in
-which table; headings, units and digits of rows stand with the fields.
+It reads the annotations of `anglecam.neck_design.units`. `Result.tables` assigns the parts of a result to tables;
+headings, units and digits of rows are declared with the fields.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any, Protocol, get_args, get_type_hints
 from rich.table import Table
 
 from anglecam.neck_design.text import cell, rounded
-from anglecam.neck_design.units import INLINE, INTERNAL, OPTIONAL, Column, Unit, UnitsByName, WithUnit
+from anglecam.neck_design.units import INLINE, INTERNAL, ONE, OPTIONAL, Column, Unit, UnitsByName, WithUnit
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ Layout = Facts | Lines | Rows
 
 
 class Result(Protocol):
-    """What a verb of ``anglecam neck`` has worked out: a frozen dataclass with annotated fields."""
+    """The result of a verb of ``anglecam neck``: a frozen dataclass with annotated fields."""
 
     def tables(self) -> Sequence[Layout]:
         """Return the tables to print, in their order."""
@@ -76,6 +76,12 @@ def as_json(result: Any) -> Any:
     -------
     dict, list or plain value
         Floats rounded to 12 significant digits.
+
+    Examples
+    --------
+    >>> from anglecam.neck_design.results.step import Step
+    >>> as_json(Step(rise_time=0.1, overshoot=0.25, settling_time=0.5))
+    {'rise_time_s': 0.1, 'overshoot': 0.25, 'overshoot_percent': 25.0, 'settling_time_s': 0.5}
     """
     if is_dataclass(result) and not isinstance(result, type):
         return {key: item for name, hints in _annotations(type(result)) for key, item in _items(result, name, hints)}
@@ -105,14 +111,12 @@ def _annotations(kind: Any) -> tuple[tuple[str, tuple[Any, ...]], ...]:
 
 def _metadata(hint: Any) -> Iterator[Any]:
     """Yield the metadata of an annotation, also where it stands inside ``X | None``."""
-    yield from getattr(hint, "__metadata__", ())
-    inner = get_args(hint)[:1] if hasattr(hint, "__metadata__") else get_args(hint) if _is_union(hint) else ()
-    for part in inner:
-        yield from _metadata(part)
-
-
-def _is_union(hint: Any) -> bool:
-    return type(None) in get_args(hint)
+    if hasattr(hint, "__metadata__"):
+        yield from hint.__metadata__
+        yield from _metadata(hint.__origin__)
+    elif type(None) in get_args(hint):
+        for part in get_args(hint):
+            yield from _metadata(part)
 
 
 def _items(result: Any, name: str, hints: tuple[Any, ...]) -> Iterator[tuple[str, Any]]:
@@ -130,17 +134,19 @@ def _items(result: Any, name: str, hints: tuple[Any, ...]) -> Iterator[tuple[str
     if named is not None:
         yield name, {key(item, named.units[item]): as_json(value[item]) for item in value}
         return
-    for unit in [hint for hint in hints if isinstance(hint, Unit)] or [Unit("", convert=lambda x: x)]:
+    for unit in [hint for hint in hints if isinstance(hint, Unit)] or [ONE]:
         yield key(name, unit), as_json(_converted(value, unit))
 
 
 def _converted(value: Any, unit: Unit) -> Any:
+    """Return a float or a sequence of floats in a unit; anything else unchanged."""
     if isinstance(value, list | tuple):
         return [_converted(item, unit) for item in value]
-    return value if value is None or is_dataclass(value) or not isinstance(value, float) else unit.convert(value)
+    return unit.convert(value) if isinstance(value, float) else value
 
 
 def _table(layout: Layout) -> Table:
+    """Return a layout as a table of the terminal."""
     if isinstance(layout, Facts):
         made = Table(layout.title, "")
         for fact in layout.facts:
@@ -179,12 +185,14 @@ def _columns(kind: type, rows: Sequence[Any], at: _Path = ()) -> Iterator[_Cell]
 
 
 def _get(row: Any, path: _Path) -> Any:
+    """Follow attributes from a row to a value."""
     for name in path:
         row = getattr(row, name)
     return row
 
 
 def _cells(row: Any, columns: Sequence[_Cell]) -> list[str]:
+    """Return the text of each cell of a row."""
     cells = []
     for column, path, hints in columns:
         if callable(column.cell):

@@ -110,7 +110,7 @@ def _large_angle_figures(neck: LargeAngleNeck, height: float) -> StepFigures:
 
 @dataclass(frozen=True)
 class SideBySide:
-    """Models driven by one command; arrays of length n."""
+    """Responses of models to the same command; arrays of length n."""
 
     time: Floats
     """s."""
@@ -118,11 +118,11 @@ class SideBySide:
     """rad."""
     systems: tuple[ComparedModel, ...]
     angles: tuple[Floats, ...]
-    """Of each system, rad."""
+    """Angle of each model, rad."""
     measured: Floats | None
     """rad."""
     rmse: dict[str, float]
-    """Of measured minus each system's angle, rad, by its name; empty without a measurement."""
+    """RMS of measured minus simulated angle, rad, by the name of the model; empty without a measurement."""
 
 
 def paper_systems(neck: LargeAngleNeck) -> tuple[ComparedModel, ...]:
@@ -131,7 +131,7 @@ def paper_systems(neck: LargeAngleNeck) -> tuple[ComparedModel, ...]:
     Parameters
     ----------
     neck : LargeAngleNeck
-        Of Eqs. (28) and (31).
+        The neck of both equations.
 
     Returns
     -------
@@ -255,5 +255,5 @@ def first_step(path: Path) -> tuple[Floats, Floats]:
     found = responses(series.time, series.angle, series.sigma)
     start, zero = (found[0].start.value, found[0].from_angle.value) if found else (float(series.time[0]), 0.0)
     end = found[1].start.value if len(found) > 1 else np.inf
-    seen = series.ok & (series.time < end)
-    return series.time[seen] - start, series.angle[seen] - zero
+    used = series.ok & (series.time < end)
+    return series.time[used] - start, series.angle[used] - zero

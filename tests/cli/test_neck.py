@@ -67,8 +67,8 @@ def model_file(tmp_path):
     sigmas = np.sqrt(np.diag(covariance))
     parameters = {n: {"value": v, "sigma": s} for n, v, s in zip(names, values, sigmas, strict=True)}
     path = tmp_path / "model.json"
-    told = {"estimator": "oe2", "parameters": parameters, "covariance": {"names": names, "matrix": covariance}}
-    write_json(path, told)
+    result = {"estimator": "oe2", "parameters": parameters, "covariance": {"names": names, "matrix": covariance}}
+    write_json(path, result)
     return path
 
 
@@ -84,36 +84,36 @@ def test_each_verb_prints_tables_and_writes_numbers_and_figures(run, tmp_path, v
 
 
 def test_kinematics_has_table_3_and_the_line_of_fig_4(numbers):
-    told = numbers("kinematics", "--angle", "10", "--angle", "-20")
-    up, neutral, down = told["table_3"]
+    result = numbers("kinematics", "--angle", "10", "--angle", "-20")
+    up, neutral, down = result["table_3"]
     assert [row["theta_f_deg"] for row in (down, neutral, up)] == pytest.approx([70.5, 46.8, 20.9], abs=0.05)
     assert [row["theta_s_deg"] for row in (up, neutral, down)] == pytest.approx([216.0, 135.0, 62.0])
     assert [row["theta_a_deg"] for row in (up, neutral, down)] == pytest.approx([81.0, 0.0, -73.0])
     assert [row["command"] for row in (up, neutral, down)] == [254, 127, 2]
-    assert told["line"]["slope"] == pytest.approx(-0.357, abs=5e-4)
-    assert told["line"]["intercept_deg"] == pytest.approx(95.2, abs=0.05)
-    assert told["line"]["r_squared"] == pytest.approx(0.9937, abs=1e-4)
-    assert told["bearing"]["torque_kgf_cm"] == pytest.approx(1.47e-3, abs=5e-6)
-    for wanted, row in zip((10.0, -20.0), told["wanted"], strict=True):
+    assert result["line"]["slope"] == pytest.approx(-0.357, abs=5e-4)
+    assert result["line"]["intercept_deg"] == pytest.approx(95.2, abs=0.05)
+    assert result["line"]["r_squared"] == pytest.approx(0.9937, abs=1e-4)
+    assert result["bearing"]["torque_kgf_cm"] == pytest.approx(1.47e-3, abs=5e-6)
+    for wanted, row in zip((10.0, -20.0), result["wanted"], strict=True):
         assert row["nod_deg"] == pytest.approx(wanted)
-        assert abs(row["error_deg"]) < 0.5 * max(r["resolution_deg_per_count"] for r in told["table_3"])
+        assert abs(row["error_deg"]) < 0.5 * max(r["resolution_deg_per_count"] for r in result["table_3"])
 
 
 def test_statics_balances_the_head(numbers):
-    told = numbers("statics", "--pretension", "36")
-    assert told["spring"]["stiffness_N_m"] == pytest.approx(5.318, abs=5e-4)
-    assert told["neutral_deg"] == pytest.approx(0.0, abs=1e-9)
-    assert told["film"]["damping_N_m_s"] == pytest.approx(0.0530, abs=5e-5)
-    assert told["film"]["damping_of_SAE_20_N_m_s"] == pytest.approx(5.3e-5, abs=5e-8)
-    assert told["servo"]["stall_torque_N_m"] == pytest.approx(0.475, abs=5e-4)
+    result = numbers("statics", "--pretension", "36")
+    assert result["spring"]["stiffness_N_m"] == pytest.approx(5.318, abs=5e-4)
+    assert result["neutral_deg"] == pytest.approx(0.0, abs=1e-9)
+    assert result["film"]["damping_N_m_s"] == pytest.approx(0.0530, abs=5e-5)
+    assert result["film"]["damping_of_SAE_20_N_m_s"] == pytest.approx(5.3e-5, abs=5e-8)
+    assert result["servo"]["stall_torque_N_m"] == pytest.approx(0.475, abs=5e-4)
     # spring that is tighter by 0.37° turns the head back by about K·L2·L6 over the stiffness times that
-    expected = -(told["pretension_angle_deg"] - 36.0) * 5.318 / told["stiffness_of_spring_and_weight_N_m"]
-    assert told["wanted"]["neutral_deg"] == pytest.approx(expected, rel=0.01)
+    expected = -(result["pretension_angle_deg"] - 36.0) * 5.318 / result["stiffness_of_spring_and_weight_N_m"]
+    assert result["wanted"]["neutral_deg"] == pytest.approx(expected, rel=0.01)
 
 
 def test_response_has_the_papers_overshoots(numbers):
-    told = numbers("response")
-    models = {m["name"]: m for m in told["models"]}
+    result = numbers("response")
+    models = {m["name"]: m for m in result["models"]}
     assert models["SYS1"]["overshoot_percent"] == pytest.approx(11.5, abs=0.05)
     assert models["SYS1"]["rise_time_s"] == pytest.approx(0.078, abs=5e-4)
     assert models["SYS1"]["settling_time_s"] == pytest.approx(0.26, abs=5e-3)
@@ -124,7 +124,7 @@ def test_response_has_the_papers_overshoots(numbers):
     assert models["large angles"]["steady_state_deg"] > models["small angles"]["steady_state_deg"] + 2.0
 
 
-def test_a_fitted_model_and_a_measurement_stand_beside_them(numbers, run, model_file, tmp_path):
+def test_response_compares_a_fitted_model_with_a_measurement(numbers, run, model_file, tmp_path):
     record = session(Plant(), 4)[1]
     n = len(record.time)
     series = AngleSeries(record.name, record.time, record.angle, np.full(n, np.radians(0.05)), ("ok",) * n)
@@ -163,9 +163,9 @@ def test_an_uncertainty_of_rounding_size_counts_as_exact():
     assert with_sigma(UncertainValue(6.0, 0.01)) == "6.000 ± 0.010"
 
 
-def test_design_has_the_papers_constants_and_says_what_contradicts(numbers, run):
-    told = numbers("design")
-    first, second, _ = told["routes"]
+def test_design_has_the_papers_constants_and_prints_contradictions(numbers, run):
+    result = numbers("design")
+    first, second, _ = result["routes"]
     assert first["found"]["torque_gain_N_m_per_V"]["value"] == pytest.approx(2.944, abs=5e-4)
     assert first["found"]["sensor_gain_V_per_rad"]["value"] == pytest.approx(1.393, abs=5e-4)
     assert first["found"]["sensor_gain_bound_V_per_rad"]["value"] == pytest.approx(4.259, abs=5e-4)
@@ -173,14 +173,14 @@ def test_design_has_the_papers_constants_and_says_what_contradicts(numbers, run)
     assert second["found"]["damping_N_m_s"]["value"] == pytest.approx(0.152, abs=5e-4)
     assert "cannot be negative" in first["contradictions"][0]
     assert second["contradictions"] == []
-    assert told["step"]["overshoot_percent"] == pytest.approx(11.5, abs=0.05)
-    assert told["explained_neck"]["C"]["value"] == pytest.approx(0.152, abs=5e-4)
+    assert result["step"]["overshoot_percent"] == pytest.approx(11.5, abs=0.05)
+    assert result["explained_neck"]["C"]["value"] == pytest.approx(0.152, abs=5e-4)
     assert "c4 = −0.0922 V·s/rad cannot be negative" in run("design")[1]
 
 
 def test_design_carries_a_models_correlations(numbers, model_file):
-    told = numbers("design", "--model", model_file)
-    h = told["routes"][0]["found"]["sensor_gain_V_per_rad"]
+    result = numbers("design", "--model", model_file)
+    h = result["routes"][0]["found"]["sensor_gain_V_per_rad"]
     a, b, c = 25.9786, 523.7292, 507.5597
     passive = 5.31793 - 0.80431
     slope = np.array([0.0, 1.0 / c, -b / c**2 + passive / (0.0058 * c**2)]) / -0.36
@@ -194,8 +194,8 @@ def test_design_carries_a_models_correlations(numbers, model_file):
 
 def test_a_command_gain_takes_c_per_volt(numbers, tmp_path):
     (tmp_path / "neck.yaml").write_text("servo: {command_gain_V_per_rad: 2.0}\n")
-    told = numbers("design", "--neck", tmp_path / "neck.yaml")
-    assert told["identified"]["c_rad_per_s2_V"]["value"] == pytest.approx(507.5597 / 2.0)
+    result = numbers("design", "--neck", tmp_path / "neck.yaml")
+    assert result["identified"]["c_rad_per_s2_V"]["value"] == pytest.approx(507.5597 / 2.0)
     models = {m["name"]: m for m in numbers("response", "--neck", tmp_path / "neck.yaml")["models"]}
     assert models["small angles"]["gain"] == pytest.approx(2.0 * 0.964, abs=2e-3)
 
@@ -219,59 +219,59 @@ def test_a_wish_makes_a_neck(numbers, tmp_path, run):
 
 
 def test_pd_is_fig_16_and_tunes_to_the_adult(numbers):
-    told = numbers("pd", "--tune")
-    loops = {(loop["proportional"], loop["derivative_s"]): loop for loop in told["loops"]}
+    result = numbers("pd", "--tune")
+    loops = {(loop["proportional"], loop["derivative_s"]): loop for loop in result["loops"]}
     assert len(loops) == 16
     for K_d in (0.005, 0.01):
         assert loops[0.0, K_d]["overshoot_percent"] == 0.0
         assert loops[0.0, K_d]["steady_state_deg"] == pytest.approx(23.58, abs=5e-3)
     assert loops[0.01, 0.0]["loss_percent"] == pytest.approx(19.1, abs=0.05)
     assert loops[0.0, 0.0]["overshoot_percent"] == pytest.approx(10.04, abs=5e-3)
-    assert told["tuned"]["feasible"]
-    assert told["tuned"]["rise_time_s"] == pytest.approx(0.3, rel=0.021)
-    assert told["tuned"]["overshoot_percent"] <= 0.5
-    assert {"phase_margin_deg", "gain_margin_dB", "modulus_margin", "sensitivity"} <= told["tuned"].keys()
+    assert result["tuned"]["feasible"]
+    assert result["tuned"]["rise_time_s"] == pytest.approx(0.3, rel=0.021)
+    assert result["tuned"]["overshoot_percent"] <= 0.5
+    assert {"phase_margin_deg", "gain_margin_dB", "modulus_margin", "sensitivity"} <= result["tuned"].keys()
 
 
 def test_pd_tunes_a_neck_like_a_measured_nod_and_tries_it_at_large_angles(numbers, tmp_path):
     nod = {"rise_time_s": {"value": 0.2, "sigma": 0.001}, "overshoot": {"value": 0.02, "sigma": 0.001}}
     write_json(tmp_path / "adult.responses.json", [nod])
     (tmp_path / "neck.yaml").write_text("linkage_slope: exact\nspring: {common_stretch_m: 0.03}\n")
-    told = numbers("pd", "--neck", tmp_path / "neck.yaml", "--like", tmp_path / "adult.responses.json")
-    assert told["tuned"]["wanted"] == {"rise_time_s": 0.2, "overshoot": 0.02, "overshoot_percent": 2.0}
-    assert told["tuned"]["rise_time_s"] == pytest.approx(0.2, rel=0.021)
-    assert told["large_angles"]["rise_time_s"] == pytest.approx(0.2, rel=0.5)
-    assert 10.0 < told["large_angles"]["steady_state_deg"] < 30.0
+    result = numbers("pd", "--neck", tmp_path / "neck.yaml", "--like", tmp_path / "adult.responses.json")
+    assert result["tuned"]["wanted"] == {"rise_time_s": 0.2, "overshoot": 0.02, "overshoot_percent": 2.0}
+    assert result["tuned"]["rise_time_s"] == pytest.approx(0.2, rel=0.021)
+    assert result["large_angles"]["rise_time_s"] == pytest.approx(0.2, rel=0.5)
+    assert 10.0 < result["large_angles"]["steady_state_deg"] < 30.0
 
 
-def test_pd_of_a_fitted_model_keeps_what_fig_16_loses(numbers, model_file):
-    told = numbers("pd", "--model", model_file)
-    largest = max(loop["proportional"] for loop in told["loops"])
-    lost = next(loop for loop in told["loops"] if loop["proportional"] == largest and loop["derivative_s"] == 0.0)
+def test_default_gains_of_a_fitted_model_lose_as_much_as_those_of_fig_16(numbers, model_file):
+    result = numbers("pd", "--model", model_file)
+    largest = max(loop["proportional"] for loop in result["loops"])
+    lost = next(loop for loop in result["loops"] if loop["proportional"] == largest and loop["derivative_s"] == 0.0)
     assert lost["loss_percent"] == pytest.approx(19.1, abs=0.05)  # the same K_p·G(0)
 
 
 def test_sensitivity_has_a_row_for_each_quantity_and_five_panels(numbers):
-    told = numbers("sensitivity")
-    rows = {row["symbol"]: row for row in told["sensitivities"]}
+    result = numbers("sensitivity")
+    rows = {row["symbol"]: row for row in result["sensitivities"]}
     assert rows["C"]["steady_state_percent_per_percent"] == pytest.approx(0.0, abs=1e-6)
     # a gain c3/(c3·h·γ + passive) grows with h as −h·γ·c3 over the stiffness
     assert rows["h"]["steady_state_percent_per_percent"] == pytest.approx(0.486, abs=1e-3)
-    assert [panel["symbol"] for panel in told["figure_9"]] == ["h", "K_m", "G_a", "R_a", "L_6"]
-    unstable = [c for c in told["figure_9"][2]["curves"] if not c["stable"]]
+    assert [panel["symbol"] for panel in result["figure_9"]] == ["h", "K_m", "G_a", "R_a", "L_6"]
+    unstable = [c for c in result["figure_9"][2]["curves"] if not c["stable"]]
     assert [(c["value"], c["rise_time_s"]) for c in unstable] == [(1000.0, None)]
 
 
-def test_power_of_a_log_is_what_was_made(numbers, run, tmp_path):
+def test_power_of_a_made_log_is_the_true_power(numbers, run, tmp_path):
     time = np.arange(0.0, 4.0, 0.005)
     current = np.where((time >= 1.0) & (time <= 2.0), 0.6, 0.0)
     log = tmp_path / "log.csv"
     table = np.column_stack([time, 6.0 - 2.5 / 0.6 * current, current])
     np.savetxt(log, table, delimiter=",", header="time_s,voltage_v,current_a", comments="")
-    told = numbers("power", log, "--nod", "1.0:2.0")
-    assert told["nods"][0]["mean_power_W"] == pytest.approx(2.1, rel=1e-6)
-    assert told["all_servos_W"] == pytest.approx(33.6, rel=1e-6)
-    assert told["source"]["resistance_ohm"]["value"] == pytest.approx(4.1667, abs=1e-4)
+    result = numbers("power", log, "--nod", "1.0:2.0")
+    assert result["nods"][0]["mean_power_W"] == pytest.approx(2.1, rel=1e-6)
+    assert result["all_servos_W"] == pytest.approx(33.6, rel=1e-6)
+    assert result["source"]["resistance_ohm"]["value"] == pytest.approx(4.1667, abs=1e-4)
     status, out, err = run("power", log, "--out", tmp_path / "out")
     assert (status, err) == (0, "")
     assert "33." in out
@@ -323,23 +323,23 @@ def test_only_an_unstable_neck_lacks_step_figures(numbers, tmp_path):
 
 
 def test_a_weak_and_a_saturated_servo_are_reported(numbers, run):
-    told = numbers("statics")
-    demand = told["demand"]
+    result = numbers("statics")
+    demand = result["demand"]
     assert demand["torque_at_shaft_N_m"] == pytest.approx(0.36 * 1.814, abs=1e-3)
     assert demand["stall_torque_N_m"] == pytest.approx(0.475, abs=5e-4)
     # Eq. (12): c3·e = T, and the motor has G_a·e
     assert demand["motor_voltage_V"] == pytest.approx(37.0 * 1.814 / 2.9304, rel=1e-3)
-    assert "stall torque is exceeded" in told["notes"][0]
-    assert "saturates" in told["notes"][1]
+    assert "stall torque is exceeded" in result["notes"][0]
+    assert "saturates" in result["notes"][1]
     assert "stall torque is exceeded" in run("design")[1]
     assert "asks 14.2 V of 6 V" in numbers("response")["notes"][0]
     assert numbers("response", "--step", "5")["notes"] == []
 
 
 def test_gains_are_printed_with_units_and_meaning(numbers, run, model_file, tmp_path):
-    told = numbers("pd")
-    assert told["gain_units"] == {"proportional": "1/°", "derivative_s": "s/°"}
-    assert "1 stands for a command of 22°, so K_p = 0.01 is 0.22°/°" in told["gains_of"]
+    result = numbers("pd")
+    assert result["gain_units"] == {"proportional": "1/°", "derivative_s": "s/°"}
+    assert "1 stands for a command of 22°, so K_p = 0.01 is 0.22°/°" in result["gains_of"]
     (tmp_path / "neck.yaml").write_text("damping_N_m_s: 0.15\n")
     assert "V·s/rad" in run("pd", "--neck", tmp_path / "neck.yaml")[1]
     assert "steady state, °/°" in " ".join(run("pd", "--model", model_file)[1].split())

@@ -18,14 +18,14 @@ from anglecam.neck.variation import nod_slope
 SHIPPED = Path(__file__).parents[2] / "configs" / "necks" / "paper.yaml"
 
 
-def told(folder, text):
+def read_text_as_neck(folder, text):
     path = folder / "neck.yaml"
     path.write_text(text)
     return read_neck(path)
 
 
-def test_the_paper_is_what_is_not_declared(tmp_path):
-    for neck in (read_neck(None), told(tmp_path, "")):
+def test_defaults_are_the_papers_neck(tmp_path):
+    for neck in (read_neck(None), read_text_as_neck(tmp_path, "")):
         assert neck.parameters == PAPER
         assert neck.large_angle == LargeAngleNeck()
         assert (neck.scale, neck.turning) == (TABLE_3, TurningMechanism())
@@ -53,7 +53,7 @@ def test_the_shipped_file_names_every_key_and_is_the_paper():
 
 
 def test_declared_keys_are_taken_in_their_units(tmp_path):
-    neck = told(
+    neck = read_text_as_neck(
         tmp_path,
         "head: {mass_kg: 1.5, neutral_deg: 30}\nspring: {rate_N_per_m: 900, common_stretch_m: 0.02}\n"
         "linkage_slope: exact\nsigma: {mass_kg: 0.01, neutral_deg: 2}\ndamping_N_m_s: 0.2\n",
@@ -70,11 +70,11 @@ def test_declared_keys_are_taken_in_their_units(tmp_path):
     assert weight.sigma == pytest.approx(math.hypot(*slopes))
 
 
-def test_other_links_bring_their_own_slope(tmp_path):
-    neck = told(tmp_path, "linkage: {rocker_m: 0.056}\n")
+def test_declared_links_set_the_slope(tmp_path):
+    neck = read_text_as_neck(tmp_path, "linkage: {rocker_m: 0.056}\n")
     assert neck.parameters.gamma == nod_slope(neck.parameters.linkage)
     assert neck.parameters.gamma != PAPER.gamma
-    assert told(tmp_path, "linkage: {rocker_m: 0.056}\ngamma: -0.4\n").parameters.gamma == -0.4
+    assert read_text_as_neck(tmp_path, "linkage: {rocker_m: 0.056}\ngamma: -0.4\n").parameters.gamma == -0.4
 
 
 @pytest.mark.parametrize(
@@ -88,9 +88,9 @@ def test_other_links_bring_their_own_slope(tmp_path):
         ("a: [1\n", "neck.yaml: not YAML"),
     ],
 )
-def test_what_is_wrong_is_named_with_the_file(tmp_path, text, says):
+def test_an_error_names_the_file_and_the_key(tmp_path, text, says):
     with pytest.raises(RigError) as fault:
-        told(tmp_path, text)
+        read_text_as_neck(tmp_path, text)
     assert says in str(fault.value)
     assert "\n" not in str(fault.value)
 

@@ -57,31 +57,31 @@ def test_sys1_overshoots_by_11_5_per_cent():
     assert figures.steady_state == pytest.approx(0.969, abs=5e-4)
 
 
-def test_contradiction_names_the_constant_the_cause_and_what_it_takes():
+def test_a_contradiction_names_constant_cause_and_remedy():
     uncertain = identified(25.9786, 523.7292, 507.5597, (0.5, 5.0, 5.0))
-    (told,) = by_inertia(uncertain, KNOWN).contradictions
-    assert told == (
+    (result,) = by_inertia(uncertain, KNOWN).contradictions
+    assert result == (
         "c4 = −0.0920 ± 0.0029 V·s/rad cannot be negative: C = 0.0532 N·m·s is too small to explain "
         "a = 25.98 ± 0.50 1/s; it takes at least 0.1507 ± 0.0029 N·m·s"
     )
     enough = KNOWN.replaced(damping=UncertainValue(0.1507 + 0.01))
     assert by_inertia(uncertain, enough).contradictions == ()
     nearly = KNOWN.replaced(damping=UncertainValue(0.150, 0.001))
-    (told,) = by_inertia(uncertain, nearly).contradictions
-    assert "zero lies within two standard uncertainties" in told
+    (result,) = by_inertia(uncertain, nearly).contradictions
+    assert "zero lies within two standard uncertainties" in result
 
 
-def test_other_impossible_constants_are_told_too():
+def test_every_impossible_constant_is_reported():
     slack = KNOWN.replaced(spring=UncertainValue(1.0), damping=UncertainValue(0.2))
-    (told,) = by_inertia(SYS1, slack).contradictions
-    assert told.startswith("h = ")
-    assert "K·L2·L6 = 1 N·m is too small" in told
+    (result,) = by_inertia(SYS1, slack).contradictions
+    assert result.startswith("h = ")
+    assert "K·L2·L6 = 1 N·m is too small" in result
     (falls,) = by_inertia(identified(25.0, -3.0, 500.0), KNOWN.replaced(damping=UncertainValue(0.2))).contradictions
     assert "Eq. (35) does not hold" in falls
     sure = KNOWN.replaced(inertia=UncertainValue(0.007, 1e-5))
     (gap,) = by_inertia_and_motor(identified(25.9786, 523.7292, 507.5597, (0.1, 1.0, 1.0)), sure).contradictions
     assert "inertia or motor is not as stated" in gap
-    with pytest.raises(ValueError, match="turn the sign"):
+    with pytest.raises(ValueError, match="reverse the sign"):
         identified(26.0, 524.0, -508.0)
     with pytest.raises(ValueError, match="positive semidefinite"):
         identified(26.0, 524.0, 508.0, [[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -90,16 +90,16 @@ def test_other_impossible_constants_are_told_too():
 
 
 @pytest.mark.parametrize("route", [by_inertia, by_inertia_and_motor, by_motor])
-def test_carried_uncertainty_is_what_drawing_gives(route):
+def test_propagated_uncertainty_agrees_with_monte_carlo(route):
     # a, b and c of a fit are correlated; mass and arm are in inertia and weight alike
     sigma, correlation = np.array([0.3, 4.0, 5.0]), np.array([[1.0, 0.5, 0.7], [0.5, 1.0, 0.9], [0.7, 0.9, 1.0]])
     found = identified(26.0, 524.0, 508.0, correlation * np.outer(sigma, sigma))
     sigmas = {"M_h": 0.02, "L": 4e-4, "K": 15.0, "gamma": 0.004, "C": 0.002, "K_m": 3e-5, "R_a": 0.005, "h": 0.01}
-    beforehand = known(PAPER, sigmas)
-    told = route(found, beforehand)
+    known_before = known(PAPER, sigmas)
+    result = route(found, known_before)
 
     rng = np.random.default_rng(5)
-    draws, drawn = 4000, {name: [] for name in told.found}
+    draws, drawn = 4000, {name: [] for name in result.found}
     abc = rng.multivariate_normal(found.values, found.covariance, draws)
     for i in range(draws):
         error = {s: rng.normal(0.0, u) for s, u in sigmas.items()}
@@ -124,8 +124,8 @@ def test_carried_uncertainty_is_what_drawing_gives(route):
         for name in drawn:
             drawn[name].append(once[name].value)
     for name, values in drawn.items():
-        assert told[name].sigma == pytest.approx(np.std(values), rel=0.05, abs=1e-12), name
-        assert told[name].value == pytest.approx(np.mean(values), abs=0.1 * np.std(values) + 1e-12), name
+        assert result[name].sigma == pytest.approx(np.std(values), rel=0.05, abs=1e-12), name
+        assert result[name].value == pytest.approx(np.mean(values), abs=0.1 * np.std(values) + 1e-12), name
 
 
 def test_shared_mass_correlates_inertia_and_weight():
@@ -138,12 +138,12 @@ def test_shared_mass_correlates_inertia_and_weight():
 @pytest.mark.parametrize("route", [by_inertia_and_motor, by_motor])
 def test_relations_undo_equation_28(route):
     linear = linear_neck(PAPER)
-    told = route(identified(linear.a, linear.b, linear.c), known(PAPER))
-    assert told["damping"].value == pytest.approx(PAPER.damping, rel=1e-12)
-    assert told["torque_gain"].value == pytest.approx(PAPER.servo.torque_gain, rel=1e-12)
-    assert told["spring"].value == pytest.approx(1877.8 * 0.048 * 0.059, rel=1e-12)
-    assert told["sensor_gain"].value == pytest.approx(1.4, rel=1e-12)
-    assert told["sensor_gain_bound"].value == pytest.approx(sensor_gain_bound(PAPER), rel=1e-12)
+    result = route(identified(linear.a, linear.b, linear.c), known(PAPER))
+    assert result["damping"].value == pytest.approx(PAPER.damping, rel=1e-12)
+    assert result["torque_gain"].value == pytest.approx(PAPER.servo.torque_gain, rel=1e-12)
+    assert result["spring"].value == pytest.approx(1877.8 * 0.048 * 0.059, rel=1e-12)
+    assert result["sensor_gain"].value == pytest.approx(1.4, rel=1e-12)
+    assert result["sensor_gain_bound"].value == pytest.approx(sensor_gain_bound(PAPER), rel=1e-12)
 
 
 def test_at_the_bound_of_equation_35_the_stiffness_is_zero():
@@ -153,19 +153,19 @@ def test_at_the_bound_of_equation_35_the_stiffness_is_zero():
 
 @pytest.mark.parametrize("route", [by_inertia_and_motor, by_motor])
 def test_the_explained_neck_moves_as_identified(route):
-    beforehand = known(PAPER)
-    neck = explained_neck(route(identified(27.0, 531.0, 505.0), beforehand))
+    known_before = known(PAPER)
+    neck = explained_neck(route(identified(27.0, 531.0, 505.0), known_before))
     linear = linear_neck(neck)
     assert (linear.a, linear.b, linear.c) == pytest.approx((27.0, 531.0, 505.0), rel=1e-12)
     with pytest.raises(ValueError, match="cannot be negative"):
         explained_neck(by_inertia(SYS1, KNOWN))
 
 
-def test_joint_keeps_what_quantities_share():
+def test_derived_quantities_stay_correlated():
     pair = correlated({"x": 2.0, "y": 3.0}, (0.1, 0.2)).derived(lambda q: {"sum": q["x"] + q["y"]})
     difference = pair.derived(lambda q: {"rest": q["sum"] - q["x"] - q["y"]})
     assert difference["rest"].sigma == pytest.approx(0.0, abs=1e-12)
     assert pair["sum"].sigma == pytest.approx(np.hypot(0.1, 0.2), rel=1e-12)
     assert isinstance(pair, CorrelatedQuantities)
-    with pytest.raises(ValueError, match="both sides"):
+    with pytest.raises(ValueError, match="both sets"):
         _ = pair + pair

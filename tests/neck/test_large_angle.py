@@ -65,7 +65,7 @@ def test_the_feedback_of_equation_33_has_the_sign_of_equation_31():
 
 
 @each
-def test_the_balance_vanishes_at_its_own_acceleration(neck):
+def test_the_torque_balance_is_zero_at_the_solved_acceleration(neck):
     delta, omega = np.radians([-20.0, -3.0, 12.0, 29.0]), np.array([3.0, -8.0, 1.0, 0.0])
     alpha = acceleration(neck, delta, omega, 0.2)
     np.testing.assert_allclose(torque_balance(neck, alpha, omega, delta, 0.2), 0.0, atol=1e-14)

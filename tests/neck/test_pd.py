@@ -141,9 +141,9 @@ def test_the_large_angle_neck_starts_out_as_the_linear_one_and_rests_elsewhere()
     assert abs(large.steady_state / (0.4 * loop.steady_state) - 1.0) > 0.02
 
 
-def test_a_head_that_leaves_its_linkage_is_told():
+def test_a_head_that_leaves_the_reach_of_its_linkage_is_an_error():
     neck = LargeAngleNeck(gamma="exact")
-    with pytest.raises(ValueError, match="the head leaves what it can reach"):
+    with pytest.raises(ValueError, match="the head leaves its linkage's reach"):
         simulate_pd(lambda q, w, u: acceleration(neck, q, w, u), PdGains(), 3.0, 1.0)
 
 
@@ -175,12 +175,12 @@ def test_tuning_speeds_a_slow_neck_up_where_the_loss_is_allowed():
     assert tuned.loop.figures.steady_state * tuned.loop.reference_gain == pytest.approx(1.0, rel=1e-6)
 
 
-def test_what_cannot_be_met_is_named_with_how_near_it_comes():
+def test_an_unmet_constraint_is_named_with_the_nearest_value():
     slow = control.tf([20.0], [1.0, 9.0, 20.0])
     tuned = tune_pd(slow, NodTarget(0.2, 0.0), largest_loss=0.01)
     assert not tuned.feasible
     assert any(line.startswith("rise time ≤ 0.204 s") for line in tuned.unmet)
-    with pytest.raises(ValueError, match="comes to rest"):
+    with pytest.raises(ValueError, match="only for a stable plant"):
         tune_pd(control.tf([1.0], [1.0, 1.0, 0.0]))
 
 

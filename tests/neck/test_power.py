@@ -57,7 +57,7 @@ def test_nods_are_found_in_noise_and_short_pauses_are_inside_one():
         np.testing.assert_allclose(found, NODS, atol=0.006)
 
 
-def test_use_of_a_made_log_is_what_was_made():
+def test_energy_and_power_of_a_made_log_are_the_true_ones():
     use = power_use(made(noise_v=0.02, noise_a=0.005), NODS)
     driven, idle = 3.5 * 0.6, 0.02 * (V0 - R * 0.02)
     for nod, (start, end) in zip(use.nods, NODS, strict=True):
@@ -105,7 +105,7 @@ def test_logs_are_read_and_their_faults_name_file_and_cause(tmp_path):
             read_power_log(path)
 
 
-def test_logs_that_tell_nothing_are_refused():
+def test_logs_without_a_nod_or_without_varying_current_are_refused():
     time = np.linspace(0.0, 1.0, 101)
     still = PowerLog("still.csv", time, np.full(101, 6.0), np.full(101, 0.1))
     with pytest.raises(InputError, match=r"still\.csv: the current stays at 0\.1 A"):
@@ -114,7 +114,7 @@ def test_logs_that_tell_nothing_are_refused():
         find_nods(still)
     with pytest.raises(InputError, match=r"still\.csv: no nod from 0\.5 s to 1\.5 s in a log from 0 s to 1 s"):
         nod_power(still, 0.5, 1.5)
-    with pytest.raises(InputError, match=r"still\.csv: no nod: "):
+    with pytest.raises(InputError, match=r"still\.csv: no nod found, so"):
         power_use(still, ())
     noise = PowerLog("noise.csv", time, np.full(101, 6.0), np.random.default_rng(0).normal(0.1, 0.01, 101))
     with pytest.raises(InputError, match="no nod found"):

@@ -75,30 +75,30 @@ def test_panel_f_is_the_four_bar():
 
 def test_gain_sensitivities_are_those_of_the_formula():
     linear = linear_neck(PAPER)
-    told = {s.symbol: s.steady_state for s in sensitivities()}
+    result = {s.symbol: s.steady_state for s in sensitivities()}
     active = PAPER.gamma * linear.gain * 1.4 / linear.stiffness
-    assert told["h"] == pytest.approx(-active, rel=1e-6)
-    assert told["G_a"] == pytest.approx(1.0 - active, rel=1e-6)
-    assert told["R_a"] == pytest.approx(-1.0 + active, rel=1e-6)
-    assert told["K"] == pytest.approx(-PAPER.spring.rate * 0.048 * 0.059 / linear.stiffness, rel=1e-6)
-    assert told["C"] == pytest.approx(0.0, abs=1e-9)
-    assert set(told) == set(PARAMETERS)
+    assert result["h"] == pytest.approx(-active, rel=1e-6)
+    assert result["G_a"] == pytest.approx(1.0 - active, rel=1e-6)
+    assert result["R_a"] == pytest.approx(-1.0 + active, rel=1e-6)
+    assert result["K"] == pytest.approx(-PAPER.spring.rate * 0.048 * 0.059 / linear.stiffness, rel=1e-6)
+    assert result["C"] == pytest.approx(0.0, abs=1e-9)
+    assert set(result) == set(PARAMETERS)
 
 
 def test_overshoot_sensitivity_is_that_of_the_damping_ratio():
     linear = linear_neck(PAPER)
     zeta = linear.a / 2.0 / np.sqrt(linear.b)
     by_zeta = -np.pi * zeta / (1.0 - zeta**2) ** 1.5
-    told = {s.symbol: s for s in sensitivities(PAPER, ("C", "K"))}
-    assert told["C"].overshoot == pytest.approx(by_zeta * 0.15 / linear.damping, rel=1e-6)
+    result = {s.symbol: s for s in sensitivities(PAPER, ("C", "K"))}
+    assert result["C"].overshoot == pytest.approx(by_zeta * 0.15 / linear.damping, rel=1e-6)
     share = PAPER.spring.rate * 0.048 * 0.059 / linear.stiffness
-    assert told["K"].overshoot == pytest.approx(-0.5 * by_zeta * share, rel=1e-6)
+    assert result["K"].overshoot == pytest.approx(-0.5 * by_zeta * share, rel=1e-6)
 
 
 def test_rise_time_sensitivity_predicts_a_five_per_cent_change():
-    (told,) = sensitivities(PAPER, ("C",))
+    (result,) = sensitivities(PAPER, ("C",))
     low, high = (vary(PAPER, "C", (0.15 * f,), [0.0]).curves[0].figures.rise_time for f in (0.975, 1.025))
-    assert np.log(high / low) / np.log(1.025 / 0.975) == pytest.approx(told.rise_time, rel=2e-3)
+    assert np.log(high / low) / np.log(1.025 / 0.975) == pytest.approx(result.rise_time, rel=2e-3)
 
 
 def test_where_there_is_no_sensitivity_there_is_none():

@@ -28,7 +28,7 @@ def test_figures_of_a_double_pole_and_of_a_first_order_lag():
     assert lag.overshoot == 0.0
 
 
-def test_a_fast_pole_beside_a_slow_one_is_resolved():
+def test_a_fast_and_a_slow_pole_are_both_resolved():
     figures = linear_step_figures([1e4], np.polymul([1.0, 1e4], [1.0, 1.0]))
     assert figures.rise_time == pytest.approx(np.log(9.0), abs=1e-6)
 

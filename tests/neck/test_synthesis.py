@@ -93,7 +93,7 @@ def test_the_papers_servo_cannot_hold_its_head_at_25_degrees():
     assert made.constraints[-1].active
 
 
-def test_the_torque_at_the_shaft_is_told_where_no_limit_is_asked():
+def test_the_torque_at_the_shaft_is_reported_without_a_limit():
     row = design_constraints(Wish(NodTarget()), PAPER, PdGains())[-1]
     assert row.name == "servo torque at the end (shaft)"
     assert row.value == pytest.approx(0.71, abs=5e-3)
@@ -108,7 +108,7 @@ def test_the_papers_links_reach_less_than_25_degrees_down():
     assert math.degrees(rows["pretension angle, Eq. (24)"].value) == pytest.approx(36.4, abs=0.1)
 
 
-def test_what_may_be_free_is_checked():
+def test_names_of_free_quantities_and_bounds_are_checked():
     with pytest.raises(ValueError, match="Q cannot be free"):
         synthesise(Wish(NodTarget()), free=("Q",))
     with pytest.raises(ValueError, match="nothing is free"):

@@ -1,1 +1,1 @@
-"""What each verb of ``anglecam neck`` works out: one frozen dataclass a verb, in SI and radians."""
+"""The results of ``anglecam neck``: one frozen dataclass a verb, in SI and radians."""

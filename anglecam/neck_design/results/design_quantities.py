@@ -58,9 +58,9 @@ Quantities = Annotated[Mapping[str, UncertainValue], UnitsByName(UNITS)]
 """Values with standard uncertainties by the names of `anglecam.neck.design`."""
 
 
-def quantities(joint: CorrelatedQuantities, names: Sequence[str]) -> dict[str, UncertainValue]:
+def quantities(every: CorrelatedQuantities, names: Sequence[str]) -> dict[str, UncertainValue]:
     """Return some of the quantities by name."""
-    return {name: joint[name] for name in names}
+    return {name: every[name] for name in names}
 
 
 def fact(name: str, value: UncertainValue) -> tuple[str, str]:

@@ -183,7 +183,7 @@ class Kinematics:
 
 
 def kinematics_of(neck: DeclaredNeck, wanted: Sequence[float] = ()) -> Kinematics:
-    """Work out Table 3, the line of Fig. 4, limits, transmission angle, resolution and the turning mechanism.
+    """Compute Table 3, the line of Fig. 4, limits, transmission angle, resolution and the turning mechanism.
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ class Power:
 
 
 def power_of(log: PowerLog, use: PowerUse) -> Power:
-    """Return what a log shows.
+    """Return the nods and the source of a log for the renderer.
 
     Parameters
     ----------

@@ -86,7 +86,7 @@ class Sensitivities:
 
 
 def sensitivities_of(rows: Sequence[Sensitivity], figure: Figure9) -> Sensitivities:
-    """Return the result of what `anglecam.neck.sensitivity` worked out.
+    """Return the results of `anglecam.neck.sensitivity` for the renderer.
 
     Parameters
     ----------

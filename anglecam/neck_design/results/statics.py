@@ -172,7 +172,7 @@ class Statics:
 
 
 def statics_of(neck: DeclaredNeck, theta_p: float | None = None) -> Statics:
-    """Work out what carries the head: balance, pretension, spring against weight, and what the servo has to add.
+    """Compute the static balance: pretension, spring against weight, and the torque left to the servo.
 
     Parameters
     ----------
