@@ -50,7 +50,7 @@ def test_more_of_an_effect_is_more(name):
 
 
 @pytest.mark.parametrize("name", ["torque_saturation", "lens_distortion", "rolling_shutter", "clock_scale"])
-def test_the_number_told_is_the_one_that_leaves_nothing_when_the_effect_is_fitted(name):
+def test_a_fit_of_the_true_effect_recovers_the_reported_number(name):
     effects = draw(name, SEED)
     records = session(effects, seed=SEED, sigma_deg=0.0)
     spec, entry = spec_of(effects, seed=SEED), effect(name)
