@@ -17,7 +17,7 @@ class TorqueSaturation(Effect):
     limit: Positive
     """rad/s²."""
     share: Share = 1.0
-    """Share of b that is the servo's position feedback; ignored by a neck, whose servo has feedback of its own."""
+    """Share of b that is the servo's position feedback; ignored by a neck, whose servo has separate feedback."""
 
 
 EFFECT = TorqueSaturation

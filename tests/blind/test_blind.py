@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.blind.films import close, film, read_case
-from benchmarks.blind.judged import told
+from benchmarks.blind.judged import true_values
 
 CASES = sorted(path.parent for path in Path(__file__).parent.glob("*/spec.yaml"))
 SMALL = ("0029",)
@@ -25,7 +25,7 @@ def test_a_small_film_gets_the_expected_verdict(name, tmp_path):
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.name)
 def test_expectations_agree_with_the_truth_of_the_spec(path):
     case = read_case(path)
-    values = told(case.spec, case.true)
+    values = true_values(case.spec, case.true)
     assert case.effects == tuple(values)
     assert [p["value"] for p in case.parameters] == pytest.approx(list(values.values()), rel=1e-5)
     assert case.verdict == ("attributed" if values else "unexplained" if case.true else "nothing_missing")

@@ -1,1 +1,1 @@
-"""Films and bad inputs made to order; nothing here knows how anglecam measures."""
+"""Test films, sessions and bad inputs; independent of anglecam's measuring code."""

@@ -1,9 +1,9 @@
-"""Sessions filmed by a second, independent film-maker: flat, textured, with a second red thing in the picture.
+"""Sessions drawn by a second, independent renderer: flat, textured, with a second red object in the picture.
 
     truth = draw_session(folder, look=Look(marker="ring"), recordings=standard_recordings(), seed=3)
 
-writes clips, commands and rig.yaml into the folder, and returns what is true about them. It shares no code with
-the film-maker of the demo nor with the code that measures.
+writes clips, commands and rig.yaml into the folder, and returns their truth. It shares no code with `synth` or with the
+code that measures.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ RATE_HZ = 30
 
 @dataclass(frozen=True)
 class Truth:
-    """What is true in every frame of one clip."""
+    """The truth of one clip, frame by frame."""
 
     clip: Path
     time_s: np.ndarray
-    """On the clip's own clock, which is exact: the true time is the same."""
+    """On the clip's clock, which is exact and equals the true time."""
     angle_deg: np.ndarray
     """From neutral, up positive."""
     mark_px: np.ndarray
@@ -50,11 +50,11 @@ class Truth:
     pivot_px: np.ndarray
     """Centre of rotation, shape (2,)."""
     command: np.ndarray | None
-    """Rows (time_s, command_deg) of the command file; None where there is none."""
+    """Rows (time_s, command_deg) of the command file; None without a command."""
 
 
 def standard_recordings() -> list[Recording]:
-    """Five clips that excite what a plant may hide; the random steps are held out."""
+    """Return five recordings that excite all effects of a plant; the random steps are held out."""
     return [
         Recording("steps", "steps"),
         Recording("stairs", "stairs", amplitude_deg=15.0),
@@ -76,26 +76,26 @@ def draw_session(
     hint_error_px: float | None = 8.0,
     rig: dict | None = None,
 ) -> dict[str, Truth]:
-    """Film a session and say what is true in it.
+    """Film a session and return its truth.
 
     Parameters
     ----------
     directory : path
-        Where clips, command files and rig.yaml go; made if missing.
+        Folder for clips, command files and rig.yaml; created if missing.
     look, plant : Look, Plant
-        The picture and the mechanism; their defaults where not given.
+        The picture and the mechanism.
     recordings : list of Recording
-        `standard_recordings()` where not given.
+        `standard_recordings()` by default.
     seed : int
-        Of the noise, the random commands and the error of the pivot hint.
+        Seed of the noise, the random commands and the error of the pivot hint.
     codec : str
-        ``MJPG``, or ``FFV1`` for clips without loss.
+        ``MJPG``, or ``FFV1`` for lossless clips.
     mouth : str
-        ``auto``, or ``declared``: the rig file gives the lips' own colour.
+        ``auto``, or ``declared``: the rig file states the lips' colour.
     hint_error_px : float or None
-        The pivot's hint lies up to this far off the pivot; None gives no hint.
+        Largest error of the pivot hint; None for no hint.
     rig : dict
-        Further keys of rig.yaml, or others in place of those written.
+        Keys of rig.yaml to add or to replace.
 
     Returns
     -------
@@ -141,11 +141,11 @@ def _rig(
 def draw_frames(
     look: Look, angles_deg: np.ndarray, times_s: np.ndarray | None = None, seed: int = 0
 ) -> Iterator[np.ndarray]:
-    """Frames as the sensor gives them: 8-bit BGR with noise."""
+    """Yield the sensor's frames: 8-bit BGR with noise."""
     scene = Scene(look)
     times = np.arange(len(angles_deg)) / RATE_HZ if times_s is None else times_s
     noise = np.empty((SIZE[1], SIZE[0], 3), np.float32)
-    cv2.setRNGSeed(seed)  # cv2's generator is twice as fast as numpy's, and noise is half of a frame's cost
+    cv2.setRNGSeed(seed)  # cv2's generator is twice as fast as numpy's, and noise is half of a frame's time
     for angle, time in zip(angles_deg, times, strict=True):
         image = scene.at(float(angle), float(time))
         cv2.randn(noise, (0, 0, 0), (look.noise,) * 3)
@@ -154,7 +154,7 @@ def draw_frames(
 
 
 def write_clip(path: Path, frames: Iterator[np.ndarray], codec: str = "MJPG") -> None:
-    """Encode while the next frame is being drawn."""
+    """Encode frames while the next frame is being drawn."""
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), RATE_HZ, SIZE)
     if not writer.isOpened():
         raise OSError(f"{path}: cannot be written as {codec}")
@@ -168,7 +168,7 @@ def write_clip(path: Path, frames: Iterator[np.ndarray], codec: str = "MJPG") ->
 
 
 def write_truth(path: Path, truth: Truth) -> None:
-    """Save the truth as a table, a row a frame."""
+    """Save the truth as a table with one row per frame."""
     n = len(truth.time_s)
     table = np.column_stack(
         [

@@ -1,4 +1,4 @@
-"""Six sessions to look at and to measure by hand, each with a difficulty of its own.
+"""Six sessions to view and to measure by hand, each with a different difficulty.
 
 To draw them: PYTHONPATH=tests python -m support.examples FOLDER TRUTH_FOLDER
 """
@@ -39,7 +39,7 @@ EXAMPLES: dict[str, dict] = {
 
 
 def draw_examples(folder: str | Path, truth_folder: str | Path) -> None:
-    """Film every example into its own session, and its truth apart from it."""
+    """Film every example into a separate session, and write its truth to another folder."""
     for seed, (name, session) in enumerate(EXAMPLES.items()):
         session = {"recordings": standard_recordings(), "seed": seed} | session
         for clip, truth in draw_session(Path(folder) / name, **session).items():

@@ -1,9 +1,9 @@
-"""A profile face as one layer, to be sampled at any angle.
+"""A face in profile as one layer that can be sampled at any angle.
 
-The layer is drawn at 8×, reduced to 4× by area, and blurred by the camera's point spread (a round Gaussian in
-which the pixel's own aperture is included), so that one sample a pixel is the picture itself: to turn the head
-is to sample its layer on a turned grid, and the drawn angle is exact. Head points are complex numbers in units
-of the lever arm, pivot at 0, forward positive, up imaginary.
+The layer is drawn at 8×, reduced to 4× by area, and blurred by the camera's point spread function (a round Gaussian
+that includes the pixel's aperture), so that one sample per pixel gives the picture. The head is turned by sampling the
+layer on a rotated grid, so the drawn angle is exact. Head points are complex numbers in units of the lever arm, with
+the pivot at 0, forward positive, up imaginary.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SKIN = {"pale": ((232, 196, 172), (98, 66, 44)), "dark": ((112, 76, 56), (26, 22
 
 
 def _smooth(points: list[tuple[float, float]]) -> np.ndarray:
-    """Draw a closed cubic spline through the points."""
+    """Return a closed cubic spline through the points."""
     z = np.array([complex(*p) for p in [*points, points[0]]])
     along = np.append(0.0, np.cumsum(np.sqrt(np.abs(np.diff(z)))))  # centripetal: no loops between near points
     return CubicSpline(along, z, bc_type="periodic")(np.linspace(0, along[-1], 600)[:-1])
@@ -52,7 +52,7 @@ class Head:
 
     def __init__(self, look: Look) -> None:
         self.look = look
-        # Turn and stretch the drawing about its pivot until the lips' centroid lies where the look says.
+        # Rotate and scale the drawing about its pivot so that the lips' centroid has the specified position.
         target = look.lever_px * np.exp(1j * np.radians(look.neutral_deg))
         self._unit = target / _centroid(_smooth(LIPS))
         self.reach = float(np.abs(np.concatenate([_smooth(FACE), _smooth(HAIR)]) * self._unit).max()) + 4
@@ -61,17 +61,17 @@ class Head:
 
     @cached_property
     def layer(self) -> np.ndarray:
-        """Premultiplied BGR and alpha at 4×."""
+        """Return premultiplied BGR and alpha at 4×."""
         return self._blurred(self._draw())
 
     def lips_layer(self) -> np.ndarray:
-        """Draw the lips alone, one channel of alpha, through the same steps as the head: for checks."""
+        """Return the lips alone, one channel of alpha, drawn with the same steps as the head, for checks."""
         return self._blurred(self._mask(LIPS))
 
     def sample(self, layer: np.ndarray, angle_deg: float, corner: tuple[int, int], size: tuple[int, int]) -> np.ndarray:
-        """Show the layer as a window of the image sees it with the head at that angle."""
+        """Return a window of the image of the layer with the head at that angle."""
         turn, sign, at = np.radians(angle_deg), self.look.sign, self.look.pivot
-        # Image (x, y) from the pivot → upright forward/up → turned back by the angle → layer sample.
+        # Image (x, y) from the pivot → forward/up → rotated back by the angle → layer sample.
         flip = np.array([[sign, 0.0], [0.0, -1.0]])
         back = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
         linear = FINE * np.array([[1.0, 0.0], [0.0, -1.0]]) @ back @ flip

@@ -1,4 +1,4 @@
-"""What a film looks like, and the camera's constants."""
+"""The appearance of a film, and the camera's constants."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ import numpy as np
 
 SIZE = (640, 480)
 BLUR_PX = 0.55
-"""Standard deviation of the camera's point spread, the pixel's own aperture included."""
+"""Standard deviation of the camera's point spread function, including the pixel's aperture."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """What the film looks like; nothing of it moves the truth."""
+    """Appearance of the film; it does not affect the true angle."""
 
     facing: str = "right"
     lever_px: float = 170.0
-    """From the pivot to the centroid of the lips' area, 120 to 220."""
+    """Distance from the pivot to the centroid of the lips' area, 120 to 220."""
     pivot_px: tuple[float, float] | None = None
-    """None: a place at which the whole head stays in the picture."""
+    """None: a position at which the whole head stays in the picture."""
     neutral_deg: float = 8.0
     """Direction pivot→mouth at angle zero, up positive."""
     lips_rgb: tuple[int, int, int] = (190, 35, 40)
@@ -36,19 +36,19 @@ class Look:
     red_place: str = "far"
     """far | near: the lower corner in front of the face, or just outside the nose's circle at lip height."""
     distractor: str | None = None
-    """pendulum | led | None: a small red thing that moves on its own, behind the head."""
+    """pendulum | led | None: a small red object that moves independently, behind the head."""
     noise: float = 2.0
     """Standard deviation of the sensor noise, grey levels."""
     texture_seed: int = 7
 
     @property
     def sign(self) -> int:
-        """Forward in the image: 1 to the right, −1 to the left."""
+        """Return the forward direction in the image: 1 to the right, −1 to the left."""
         return {"right": 1, "left": -1}[self.facing]
 
     @property
     def pivot(self) -> np.ndarray:
-        """Centre of rotation, px."""
+        """Return the centre of rotation, px."""
         if self.pivot_px is not None:
             return np.array(self.pivot_px)
         x = 319.5 + self.sign * (-0.62 * self.lever_px + 0.37)
@@ -61,7 +61,7 @@ class Look:
 
 
 def relief(rng: np.random.Generator, shape: tuple[int, int], grain: float) -> np.ndarray:
-    """Make a random relief of unit standard deviation whose bumps are `grain` samples wide."""
+    """Return a random relief of unit standard deviation whose bumps are `grain` samples wide."""
     coarse = rng.standard_normal((int(shape[0] / grain) + 3, int(shape[1] / grain) + 3)).astype(np.float32)
     bumps = cv2.resize(coarse, shape[::-1], interpolation=cv2.INTER_CUBIC)
     return bumps / bumps.std()

@@ -1,4 +1,4 @@
-"""Motions to test the laboratory with: a spec in a line, and all effects of drive and load as strong as shows."""
+"""Motions for testing `synth`: short specs, and all effects of actuator and load with clearly visible sizes."""
 
 from __future__ import annotations
 
@@ -45,19 +45,19 @@ NOT_OF_A_NECK = ("dead_zone", "gravity_geometry", "linkage_geometry")
 
 
 def spec_of(effects: dict, command: dict | None = None, plant: dict | None = None, **sections) -> Spec:
-    """Validate a spec of one recording."""
+    """Return a validated spec with one recording."""
     recording = {"name": "x", "duration_s": 3.0, "command": command or {"kind": "step"}}
     return Spec.model_validate({"plant": plant or PLANT, "effects": effects, "recordings": [recording], **sections})
 
 
 def moved(effects: dict, rows: np.ndarray | None = STEP, until: float = 3.0, **spec) -> Motion:
-    """Move by given command rows, whatever the command of the spec."""
+    """Return the motion for given command rows, whatever the command of the spec."""
     whole = spec_of(effects, **spec)
     return move(whole, whole.recordings[0], rows, until)
 
 
 def performed(effects: dict, kind: str, until: float = 3.0, **spec) -> Motion:
-    """Move by one of the commands."""
+    """Return the motion for one of the commands."""
     whole = spec_of(effects, {"kind": kind, **COMMANDS[kind]}, **spec)
     recording = whole.recordings[0]
     return move(whole, recording, command_rows(recording, np.random.SeedSequence(3)), until)
@@ -66,6 +66,6 @@ def performed(effects: dict, kind: str, until: float = 3.0, **spec) -> Motion:
 def let_go(
     effects: dict, angle_deg: float, until: float = 3.0, plant: dict | None = None, rest_s: float = 0.5
 ) -> Motion:
-    """Hold by hand and let go after the rest."""
+    """Return the motion of a head that is held and then released after the rest."""
     free = {"kind": "free", "initial_angle_deg": angle_deg, "rest_s": rest_s}
     return moved(effects, None, until, command=free, plant=plant or UNDAMPED)

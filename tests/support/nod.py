@@ -1,4 +1,4 @@
-"""The errors behind a head that nods, made to order."""
+"""Error sources of a nodding head with chosen sizes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ COVARIANCE = np.array([[0.05, 0.02], [0.02, 0.09]])
 
 
 def nod_sources(*, mirrored=False, neutral=REST, noise=0.03, pose=0.02, **more) -> tuple[ErrorSources, np.ndarray]:
-    """Return sources of a nodding head, and its mouth in the picture."""
+    """Return the error sources of a nodding head, and the positions of its mouth in the picture."""
     time = np.arange(N) / 30.0
     line = np.radians(-8.0 + 20.0 * np.sin(2.0 * time) * ~REST + 0.02 * np.sin(40.0 * time))
     lever = 200.0 + 0.05 * np.cos(30.0 * time)

@@ -1,4 +1,4 @@
-"""The film-maker's own claims: its angle, its motion, its files."""
+"""Tests of the second renderer: its angle, its motion, its files."""
 
 import cv2
 import numpy as np
@@ -14,7 +14,7 @@ from support.scene import red_object_centre
 
 
 def _centre_angles(images, look):
-    """Direction of each mask's centroid from the pivot, in degrees from neutral."""
+    """Return the direction of each mask's centroid from the pivot, in degrees from neutral."""
     y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]]
     at = np.array([[(m * x).sum(), (m * y).sum()] / m.sum() for m in images])
     away = (at - look.pivot) * [look.sign, -1]
@@ -32,7 +32,7 @@ def test_the_lips_are_drawn_at_the_true_angle_within_0_002_deg(facing, lever):
     assert np.abs(at - look.mouth(angles)).max() < 0.02
 
 
-def test_the_lips_in_the_finished_picture_turn_as_the_truth_says():
+def test_the_lips_in_the_finished_picture_turn_by_the_true_angle():
     look = Look(red_object=None, noise=0.0)
     angles = np.linspace(-15.0, 15.0, 13)
     excess = []
@@ -40,7 +40,7 @@ def test_the_lips_in_the_finished_picture_turn_as_the_truth_says():
         b, g, r = (frame[..., k].astype(float) for k in range(3))
         excess.append(np.clip(r - 1.1 * np.maximum(g, b) - 60, 0, None))
     drawn, _ = _centre_angles(excess, look)
-    # A weight by redness leans to the bright lip: a constant, which the mean takes away.
+    # A weight by redness is biased towards the bright lip: a constant, which subtracting the mean removes.
     assert np.std(drawn - angles) < 0.005
 
 
@@ -73,7 +73,7 @@ def test_dry_friction_takes_two_f_over_b_from_every_half_swing():
     loss = np.degrees(2 * 2.0 / 100.0)
     expected = [10.0, -(10 - loss), 10 - 2 * loss, -(10 - 3 * loss), 10 - 4 * loss]
     assert angles[:5] == pytest.approx(expected, abs=1e-6)
-    assert angles[5] == pytest.approx(angles[4], abs=1e-9)  # 0.83° of pull is less than the friction holds
+    assert angles[5] == pytest.approx(angles[4], abs=1e-9)  # the restoring torque of 0.83° is less than the friction
 
 
 @pytest.mark.parametrize("kind", ["steps", "stairs", "triangle", "chirp", "random"])
@@ -103,8 +103,8 @@ def test_a_session_has_its_files_and_a_lossless_clip_its_pixels(tmp_path):
     clip = cv2.VideoCapture(str(truth["go"].clip))
     frames = [clip.read()[1] for _ in truth["go"].time_s]
     assert not clip.read()[0]
-    still = np.stack(frames[:20]).astype(float)  # at rest: what differs is noise
-    # The rounding to whole grey levels adds its 1/12.
+    still = np.stack(frames[:20]).astype(float)  # at rest: only noise differs
+    # Rounding to whole grey levels adds a variance of 1/12.
     assert np.std(still - still.mean(axis=0)) == pytest.approx(np.sqrt((4 + 1 / 12) * 19 / 20), rel=0.01)
 
 

@@ -14,13 +14,13 @@ def table(duration: float = 4.0, effects: dict | None = None, **camera):
 
 
 @pytest.mark.parametrize("fps", [15.0, 29.97, 30.0, 60.0, 120.0])
-def test_a_good_camera_takes_frames_when_its_file_says(fps):
+def test_a_good_camera_takes_frames_at_their_time_stamps(fps):
     good = table(fps=fps)
     np.testing.assert_allclose(good.times, good.taken, atol=1e-12)
     assert len(good.taken) == round(4 * fps)
 
 
-def test_a_fast_clock_says_a_second_before_a_second_has_passed():
+def test_a_fast_clock_shows_a_second_before_a_second_has_passed():
     fast = table(effects={"clock_scale": {"scale": 1.02}})
     np.testing.assert_allclose(fast.times, 1.02 * fast.taken, atol=1e-12)
     np.testing.assert_allclose(np.diff(fast.times), 1 / 30, atol=1e-12)
@@ -31,7 +31,7 @@ def test_a_wrong_declared_rate_stretches_the_clip():
     np.testing.assert_allclose(wrong.times, 1.2 * wrong.taken, atol=1e-12)
 
 
-def test_a_dropped_frame_leaves_a_gap_and_a_duplicate_keeps_the_time_of_what_it_repeats():
+def test_a_dropped_frame_leaves_a_gap_and_a_duplicate_keeps_the_true_time_of_the_repeated_picture():
     bad = table(duration=40.0, dropped=0.1, duplicated=0.05)
     assert len(bad.taken) == pytest.approx(0.9 * 1200, abs=4 * np.sqrt(1200 * 0.09))
     assert bad.repeats.mean() == pytest.approx(0.05, abs=0.025)
@@ -43,7 +43,7 @@ def test_a_dropped_frame_leaves_a_gap_and_a_duplicate_keeps_the_time_of_what_it_
     assert set(np.round(np.diff(bad.times) * 30)) >= {1.0, 2.0}
 
 
-def test_a_variable_rate_is_uneven_within_its_bounds_and_never_goes_back():
+def test_variable_intervals_stay_within_their_bounds_and_time_increases():
     uneven = table(interval_jitter=0.4, container="mp4", codec="h264")
     gaps = np.diff(uneven.taken) * 30
     assert gaps.min() >= 0.6
@@ -62,9 +62,9 @@ COMBINATIONS = [
 @pytest.mark.parametrize(
     "trouble", [{}, {"fps": 29.97}, {"dropped": 0.2, "duplicated": 0.2}, {"declared_fps": 25}, {"interval_jitter": 0.4}]
 )
-def test_a_file_says_the_times_of_the_timetable(tmp_path, codec, container, trouble):
+def test_a_files_time_stamps_are_those_of_the_timetable(tmp_path, codec, container, trouble):
     if container == "avi" and ("interval_jitter" in trouble or (codec == "h264" and "dropped" in trouble)):
-        return  # refused by the spec: AVI has no place for it
+        return  # refused by the spec: AVI cannot represent it
     camera = Camera.model_validate({"size": [96, 64], "codec": codec, "container": container, **trouble})
     planned = timetable(camera, Effects(), 1.0, SEED)
     path = tmp_path / f"clip.{container}"
@@ -79,5 +79,5 @@ def test_a_file_says_the_times_of_the_timetable(tmp_path, codec, container, trou
 
 
 def test_avi_refuses_a_variable_rate():
-    with pytest.raises(ValueError, match="fixed grid"):
+    with pytest.raises(ValueError, match="fixed frame rate"):
         Camera(interval_jitter=0.2)

@@ -1,4 +1,4 @@
-"""What is commanded, and the nod that nobody commands."""
+"""The commands, and the human nod, which has no command."""
 
 import math
 
@@ -64,7 +64,7 @@ def test_the_papers_series_stays_within_the_linkage_with_the_overshoot_that_the_
 
 def test_a_chirp_sweeps_from_its_first_frequency_to_its_last():
     rows = rows_of("chirp", 10.71, amplitude_deg=8.0, from_hz=0.5, to_hz=2.0)
-    since = rows[1:, 0] - 0.71 + 0.01  # the middle of each tread
+    since = rows[1:, 0] - 0.71 + 0.01  # the middle of each hold
     expected = 8.0 * np.sin(2 * math.pi * (0.5 * since + 1.5 / 10 * since**2 / 2))
     np.testing.assert_allclose(rows[1:, 1], expected, atol=1e-5)
     np.testing.assert_allclose(np.diff(rows[1:, 0]), 0.02, atol=2e-6)
@@ -88,7 +88,7 @@ def test_random_steps_follow_their_seed_and_their_bounds():
 
 
 def test_a_nod_takes_0_3_s_for_70_degrees_without_overshoot_and_comes_back():
-    motion = performed({"coulomb_friction": {"torque": 5.0}}, "nod")  # effects of the plant do not touch a nod
+    motion = performed({"coulomb_friction": {"torque": 5.0}}, "nod")  # effects of the plant do not affect a nod
     times = np.linspace(0.0, 3.0, 30001)
     angle = np.degrees(motion.angle(times))
     rising, held, back = times >= 0.71, times >= 1.01, times >= 1.61
@@ -98,7 +98,7 @@ def test_a_nod_takes_0_3_s_for_70_degrees_without_overshoot_and_comes_back():
     assert angle.min() >= -1e-9
     np.testing.assert_allclose(angle[times >= 1.911], 0.0, atol=1e-9)
     assert (np.diff(angle[rising & ~held]) > 0).all()
-    # least jerk has 1.875 times the mean speed in the middle, and 10/√3 of 70°/0.3² s as greatest acceleration
+    # minimum jerk has 1.875 times the mean speed in the middle, and 10/√3 of 70°/0.3² s as its largest acceleration
     speed = np.degrees(motion.speed(times))
     assert speed.max() == pytest.approx(1.875 * 70 / 0.3, rel=1e-6)
     assert speed.max() == pytest.approx(np.gradient(angle, times).max(), rel=1e-5)
@@ -106,7 +106,7 @@ def test_a_nod_takes_0_3_s_for_70_degrees_without_overshoot_and_comes_back():
     assert acceleration.max() == pytest.approx(10 / math.sqrt(3) * 70 / 0.09, rel=1e-3)
 
 
-def test_no_smooth_way_from_rest_to_rest_has_less_jerk_than_the_nods():
+def test_no_smooth_motion_from_rest_to_rest_has_less_jerk_than_the_nod():
     times = np.linspace(0.0, 1.0, 4001)
     command = {"kind": "nod", "rise_deg": math.degrees(1.0), "rise_s": 1.0, "rest_s": 0.5}
     recording = Recording.model_validate({"name": "x", "duration_s": 3.0, "command": command})

@@ -1,4 +1,4 @@
-"""The areas by which engines are judged, and how far each quality is from them."""
+"""The closed-form areas, and each quality's edge error against them."""
 
 import math
 
@@ -42,21 +42,21 @@ def test_exact_areas_are_exact_to_single_precision(quality):
     error = edge_error(Raster, quality)
     assert error.half_plane_px < 1e-7
     assert error.half_plane_fit_px < 1e-8
-    # the disc is a polygon of 1024 sides, 1e-4 px in and out of the circle, several to a pixel
+    # the disc is a polygon of 1024 sides within 1e-4 px of the circle, several sides per pixel
     assert error.disc_px < 1e-5
     assert error.disc_centre_px < 1e-7
     assert error.worst_px < 1e-4
 
 
-def test_an_engine_that_looks_at_centres_alone_errs_evenly_by_up_to_half_a_pixel():
+def test_an_engine_that_samples_pixel_centres_has_uniform_errors_of_up_to_half_a_pixel():
     error = edge_error(Raster, "draft", trials=100)
-    # even over the pixel's width |nx| + |ny| along the normal, weighted by the chord: somewhat below 1/√12
+    # uniform over the pixel's width |nx| + |ny| along the normal, weighted by the chord: slightly below 1/√12
     assert error.half_plane_px == pytest.approx(0.28, abs=0.01)
     assert error.disc_px == pytest.approx(error.half_plane_px, abs=0.01)
     assert error.worst_px > 0.45
 
 
-def test_an_edge_in_the_wrong_place_is_measured_as_such():
+def test_a_displaced_edge_is_measured_with_its_displacement():
     class Shifted(Raster):
         def draw(self, camera, poses, rows):
             moved = {name: pose.copy() for name, pose in poses.items()}
@@ -68,7 +68,7 @@ def test_an_edge_in_the_wrong_place_is_measured_as_such():
     assert error.half_plane_fit_px == pytest.approx(0.01 / math.sqrt(2), rel=0.05)  # mean of cos² of the angles
 
 
-def test_steps_of_a_byte_are_told_from_wrong_edges():
+def test_quantisation_to_bytes_hardly_changes_the_edge_error():
     class Bytes(Raster):
         def draw(self, camera, poses, rows):
             return np.rint(super().draw(camera, poses, rows) * 255) / np.float32(255)

@@ -6,7 +6,7 @@ from synth.exposure import Shutter, instants
 
 @pytest.mark.parametrize(("exposure", "row_time"), [(0.02, 0.0), (0.02, 3e-5), (0.001, 5e-5), (0.0, 5e-5)])
 @pytest.mark.parametrize("steps", [1, 3, 40])
-def test_weights_are_complete_and_keep_every_rows_mean_time(exposure, row_time, steps):
+def test_weights_sum_to_1_and_preserve_every_rows_mean_time(exposure, row_time, steps):
     shutter = Shutter(exposure, row_time, 480)
     planned = instants(shutter, 1.7, path_px=float(steps), step_px=1.0)
     np.testing.assert_allclose(planned.weights.sum(axis=0), 1.0, atol=1e-12)
@@ -15,14 +15,14 @@ def test_weights_are_complete_and_keep_every_rows_mean_time(exposure, row_time, 
     assert (planned.weights >= 0).all()
 
 
-def test_a_still_mark_needs_one_instant_and_a_moving_one_as_many_as_its_way_asks_for():
+def test_a_still_mark_needs_one_instant_and_a_moving_mark_needs_them_in_proportion_to_its_path():
     shutter = Shutter(0.02, 0.0, 480)
     assert len(instants(shutter, 0.0, 0.09, 0.5).times) == 1
     assert len(instants(shutter, 0.0, 0.11, 0.5).times) == 2
     assert len(instants(shutter, 0.0, 10.0, 0.5).times) == 21
 
 
-def test_the_blur_of_steady_motion_is_as_wide_as_the_exposure():
+def test_the_blur_of_uniform_motion_is_as_wide_as_the_exposure():
     shutter = Shutter(0.02, 0.0, 480)
     planned = instants(shutter, 0.0, path_px=12.0, step_px=0.25)
     spread = (planned.weights[:, 0] * planned.times**2).sum()

@@ -57,21 +57,21 @@ def named(parts: list[Part], name: str) -> Part:
 def test_the_head_is_a_closed_body_of_human_size_and_its_regions_share_their_borders(whose, neck):
     rig = Rig(head=whose, neck=neck, marker="none")
     mesh = trimesh.util.concatenate([part.mesh for part in head(rig, np.random.default_rng(0))])
-    vertices, welded = np.unique(mesh.vertices, axis=0, return_inverse=True)  # equal to the last bit, or there are gaps
+    vertices, welded = np.unique(mesh.vertices, axis=0, return_inverse=True)  # bitwise, or there are gaps
     whole = trimesh.Trimesh(vertices, welded.ravel()[mesh.faces], process=False)
     assert whole.is_watertight
     assert whole.is_winding_consistent
-    assert 0.0015 < whole.volume < 0.0045  # m³; the normals point outwards, or it were negative
+    assert 0.0015 < whole.volume < 0.0045  # m³; positive because the normals point outwards
     width, height, depth = np.ptp(vertices, axis=0)
     assert 0.2 < width < 0.28
     assert 0.19 < height < 0.23
     assert 0.12 < depth < 0.16
 
 
-def test_a_circle_blown_up_is_a_ball():
+def test_an_inflated_circle_is_a_ball():
     radius = 50 * MM
     body = inflate(Profile(ellipse((0, 0), (50, 50), 1 * MM), {}), radius, [Lattice(3 * MM)], [Lattice(4 * MM)])
-    # φ = (R² − r²)/4 on a disc, so that sqrt(φ/φ_max) is the ball itself
+    # φ = (R² − r²)/4 on a disc, so that sqrt(φ/φ_max) is exactly the ball
     np.testing.assert_allclose(np.linalg.norm(body.vertices, axis=1), radius, atol=0.2 * MM)
 
 
@@ -88,7 +88,7 @@ def test_the_lips_touch_the_outline_and_stand_in_front_of_the_shaft(whose):
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_the_texture_holds_nothing_finer_than_4_mm_and_a_few_grey_levels(seed):
+def test_the_texture_has_no_structure_finer_than_4_mm_and_an_amplitude_of_a_few_grey_levels(seed):
     side, step = 128, 1 * MM
     x, y = np.meshgrid(np.arange(side) * step, np.arange(side) * step)
     grid = np.column_stack([x.ravel(), y.ravel(), np.zeros(side**2)])
@@ -101,7 +101,7 @@ def test_the_texture_holds_nothing_finer_than_4_mm_and_a_few_grey_levels(seed):
     assert power[number > 1 / (4 * MM)].sum() < 1e-3 * power.sum()
 
 
-def test_the_vertices_of_the_cheek_carry_the_texture_whole():
+def test_the_vertices_of_the_cheek_sample_the_texture_fully():
     parts = build(spec())
     mesh = named(parts, "skin").mesh
     centres = mesh.triangles_center
@@ -112,7 +112,7 @@ def test_the_vertices_of_the_cheek_carry_the_texture_whole():
     assert left.std() < 0.2 * at[mesh.faces[cheek]].std()
 
 
-def test_the_texture_belongs_to_the_seed_and_to_the_skin_alone():
+def test_the_texture_depends_on_the_seed_and_applies_to_the_skin_only():
     first, again, other = (mechanism.build(spec(seed=seed)) for seed in (3, 3, 4))
     np.testing.assert_array_equal(named(first, "skin").colours, named(again, "skin").colours)
     assert np.abs(named(first, "skin").colours - named(other, "skin").colours).mean() > 1
@@ -120,7 +120,7 @@ def test_the_texture_belongs_to_the_seed_and_to_the_skin_alone():
 
 
 @pytest.mark.parametrize("skin", SKINS)
-def test_skin_and_lips_have_the_colours_asked_for(skin):
+def test_skin_and_lips_have_the_specified_colours(skin):
     parts = build(spec(rig={"skin": skin, "lips": (150, 56, 42)}))
     assert np.abs(np.median(named(parts, "skin").colours, axis=0) - SKINS[skin]).max() < 8
     lips = named(parts, "lips").colours
@@ -131,7 +131,7 @@ def test_skin_and_lips_have_the_colours_asked_for(skin):
 
 
 def angles_of(linkage: FourBar) -> np.ndarray:
-    """All that the linkage reaches, but for a hair's breadth at the ends."""
+    """Return angles over the linkage's reach, without a tiny margin at the ends."""
     low, high = reach(linkage)
     return neutral_rocker(linkage) - np.linspace(low + 1e-3, high - 1e-3, 25)
 
@@ -196,7 +196,7 @@ def test_marker_and_shaft_end_turn_about_the_axis_and_their_area_is_a_circles():
     assert not any(part.name == "marker" for part in build(spec(rig={"marker": "none"})))
 
 
-def test_with_a_pivot_offset_the_marker_is_the_bearings_and_off_the_axis():
+def test_with_a_pivot_offset_the_marker_is_on_the_bearing_and_off_the_axis():
     offset = (4 * MM, -3 * MM)
     parts = mechanism.build(spec(effects={"pivot_offset": {"dx_px": 1, "dy_px": 1}}), offset)
     for name in ("marker", "shaft end"):
@@ -226,7 +226,7 @@ def test_a_persons_neck_has_no_mechanism_and_reaches_further():
 
 
 @pytest.mark.parametrize("rig", [{"head": "female"}, {"head": "male"}, {"neck": "human", "marker": "none"}])
-def test_the_rig_keeps_to_its_triangles_and_every_part_to_its_body(rig):
+def test_the_number_of_triangles_is_bounded_and_every_part_has_a_pose(rig):
     wanted = spec(
         rig=rig,
         scene={"lamp_px": [600, 40], "occluders": [{"from_s": 1, "for_s": 1}], "distractor": {"at_px": [560, 400]}},
@@ -242,7 +242,7 @@ def test_the_rig_keeps_to_its_triangles_and_every_part_to_its_body(rig):
         assert part.colours.min() >= 0
         assert part.colours.max() <= 255
         np.testing.assert_allclose(np.linalg.norm(part.mesh.vertex_normals, axis=1), 1, atol=1e-6)
-        # the winding agrees with the normals, or a renderer that culls would show the inside
+        # the winding must agree with the normals, or a renderer with culling would show the inside
         facing = (part.mesh.face_normals * part.mesh.vertex_normals[part.mesh.faces].mean(axis=1)).sum(axis=1)
         assert (facing > 0).mean() > 0.99, part.name
 
@@ -324,11 +324,11 @@ def test_lamp_and_mug_stand_at_their_pixels(view):
     mug = named(parts, "mug")
     cup = np.abs(mug.mesh.vertices[:, 0]) <= -mug.mesh.bounds[0, 0] + 1e-12
     across = seen(mug, rest["mug"], camera)[cup]
-    assert np.ptp(across[:, 0]) == pytest.approx(50, rel=0.12)  # its rim stands nearer than its axis
+    assert np.ptp(across[:, 0]) == pytest.approx(50, rel=0.12)  # its rim is nearer than its axis
     assert (mug.colours == wanted.rig.lips_rgb).all()
 
 
-def test_the_lamp_waits_behind_the_wall_until_it_is_lit():
+def test_the_lamp_is_behind_the_wall_until_it_is_lit():
     wanted = spec(scene={"lamp_px": [600, 40]})
     camera = camera_of(wanted)
     wall = camera.draw(named(build(wanted), "wall").mesh.vertices)[1].max()
@@ -340,7 +340,7 @@ def test_the_lamp_waits_behind_the_wall_until_it_is_lit():
 
 
 @pytest.mark.parametrize("view", VIEWS)
-def test_an_occluder_covers_the_mouth_from_and_for_as_long_as_asked(view):
+def test_an_occluder_covers_the_mouth_at_and_for_the_specified_time(view):
     wanted = spec(scene={"occluders": [{"from_s": 3.0, "for_s": 0.4, "width_px": 60}]}, **view)
     camera = camera_of(wanted)
     bar = named(props(wanted, camera), "occluder-0")

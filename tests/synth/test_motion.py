@@ -1,4 +1,4 @@
-"""The base model, what is known of it in closed form, and how a motion begins and ends."""
+"""The base model against closed forms, and the beginning and end of a motion."""
 
 import math
 
@@ -13,7 +13,7 @@ TIMES = np.linspace(0.0, 3.0, 1501)
 
 
 def step_response(times: np.ndarray, at: float, level: float) -> np.ndarray:
-    """Solve θ̈ = c·u − a·θ̇ − b·θ from rest in closed form, underdamped."""
+    """Return the closed-form solution of θ̈ = c·u − a·θ̇ − b·θ from rest, underdamped."""
     since = np.maximum(times - at, 0.0)
     damping, rate = PLANT["a"] / 2, math.sqrt(PLANT["b"] - PLANT["a"] ** 2 / 4)
     swing = np.exp(-damping * since) * (np.cos(rate * since) + damping / rate * np.sin(rate * since))
@@ -26,19 +26,19 @@ def test_a_step_gives_the_closed_form_of_the_linear_model():
 
 
 def test_speed_is_the_derivative_of_angle():
-    times, h = TIMES + 0.0003, 1e-4  # away from the step itself
+    times, h = TIMES + 0.0003, 1e-4  # away from the step
     motion = moved({})
     slope = (8 * (motion.angle(times + h) - motion.angle(times - h))) / (12 * h)
     slope -= (motion.angle(times + 2 * h) - motion.angle(times - 2 * h)) / (12 * h)
     np.testing.assert_allclose(motion.speed(times), slope, atol=1e-6)
 
 
-def test_dead_time_shifts_the_answer_exactly_even_by_less_than_a_frame():
+def test_dead_time_shifts_the_response_exactly_even_by_less_than_a_frame():
     late = moved({"dead_time": {"tau_s": 0.0437}}).angle(TIMES)
     np.testing.assert_allclose(late, step_response(TIMES, 0.7437, math.radians(15)), atol=1e-10)
 
 
-def test_free_release_waits_for_the_hand_and_then_swings_about_zero():
+def test_a_released_head_rests_until_its_release_and_then_swings_about_zero():
     angle = let_go({}, math.degrees(0.2), rest_s=0.7).angle(TIMES)
     expected = 0.2 * np.cos(math.sqrt(524.0) * np.maximum(TIMES - 0.7, 0.0))
     np.testing.assert_allclose(angle, expected, atol=1e-9)
@@ -65,7 +65,7 @@ def slack_energy(theta: np.ndarray, stiffness: float, slack_deg: float) -> np.nd
     return stiffness / 2 * np.maximum(theta - math.radians(slack_deg), 0.0) ** 2
 
 
-def test_actuator_lag_settles_where_the_plant_does_and_answers_later():
+def test_actuator_lag_delays_the_response_and_keeps_the_final_value():
     lagging = moved({"actuator_lag": {"tau_s": 0.05}})
     final = PLANT["c"] / PLANT["b"] * math.radians(15)
     assert lagging.angle(3.0) == pytest.approx(final, abs=1e-9)
@@ -79,7 +79,7 @@ def test_actuator_lag_settles_where_the_plant_does_and_answers_later():
     np.testing.assert_allclose(lagging.angle(since + 0.7), answer.real, atol=1e-9)
 
 
-def test_a_periodic_disturbance_shakes_the_head_by_the_frequency_response():
+def test_a_periodic_disturbance_moves_the_head_by_the_frequency_response():
     frequency, strength = 1.7, 12.0
     effects = {"periodic_disturbance": {"amplitude": strength, "frequency_hz": frequency, "phase": 0.8}}
     times = np.linspace(3.0, 5.9, 2000)
@@ -89,16 +89,16 @@ def test_a_periodic_disturbance_shakes_the_head_by_the_frequency_response():
     np.testing.assert_allclose(moved(effects, None, 6.0).angle(times), expected, atol=1e-9)
 
 
-def test_a_steady_torque_has_moved_the_head_before_the_film_begins():
+def test_a_constant_torque_has_moved_the_head_before_the_film_begins():
     motion = moved({"constant_torque": {"torque": 10.0}})
     np.testing.assert_allclose(motion.angle(np.linspace(-1.0, 0.7, 50)), 10.0 / PLANT["b"], atol=1e-12)
     stuck = moved({"constant_torque": {"torque": 10.0}, "coulomb_friction": {"torque": 6.0}}, None)
-    np.testing.assert_allclose(stuck.angle(TIMES), 4.0 / PLANT["b"], atol=1e-11)  # friction carries the other 6
+    np.testing.assert_allclose(stuck.angle(TIMES), 4.0 / PLANT["b"], atol=1e-11)  # friction holds the other 6
     held = moved({"constant_torque": {"torque": 10.0}, "coulomb_friction": {"torque": 11.0}}, None)
     assert np.ptp(held.angle(TIMES)) == 0.0
 
 
-def test_a_motion_is_known_a_second_before_and_after_in_any_shape():
+def test_a_motion_is_defined_a_second_before_and_after_for_times_of_any_shape():
     motion = let_go({"flexible_appendage": {"frequency_hz": 5.0}}, 12.0, 3.0)
     grid = np.linspace(-1.0, 4.0, 60).reshape(3, 4, 5)
     assert motion.angle(grid).shape == motion.speed(grid).shape == motion.appendage(grid).shape == (3, 4, 5)
@@ -124,13 +124,13 @@ def test_everything_at_once_moves_by_every_command(kind, plant):
     assert np.ptp(angle[times < 0]) == 0.0
 
 
-def test_a_head_that_would_leave_the_linkage_is_an_error_that_says_when():
+def test_a_head_that_would_leave_the_linkages_reach_is_an_error_with_the_time():
     for effects, plant in (({"linkage_geometry": {"share": 0.2}}, PLANT), ({}, NECK)):
         with pytest.raises(ValueError, match=r"would leave the range in which the linkage closes, at t = 0\.\d+ s"):
             moved(effects, np.array([[0.0, 0.0], [0.5, 75.0]]), plant=plant)
 
 
-def test_a_softening_spring_that_gives_way_is_an_error_and_not_a_number():
+def test_a_runaway_on_a_softening_spring_is_an_error():
     with pytest.raises(ValueError, match=r"runs away, at t = 0\.\d+ s"):
         moved({"stiffening_spring": {"k3": -3e5}})
 
@@ -141,7 +141,7 @@ def test_contradicting_shares_are_an_error():
         moved(effects)
 
 
-def test_the_same_spec_moves_the_same_to_the_last_digit():
+def test_the_same_spec_gives_bitwise_the_same_motion():
     recording = {"name": "x", "duration_s": 2.0, "command": {"kind": "random"}}
     spec = Spec.model_validate({"effects": EVERYTHING, "recordings": [recording]})
     angles = []

@@ -1,4 +1,4 @@
-"""The command's way to the load: controller, dead time, rate limit, play, lag."""
+"""The command's path to the load: controller, dead time, rate limit, play, lag."""
 
 import math
 
@@ -27,7 +27,7 @@ def sampled(line: PiecewiseLinear, times: np.ndarray) -> np.ndarray:
     return np.where(k >= 0, values, 0.0)
 
 
-def test_the_rate_limit_carries_on_from_where_a_new_command_finds_it():
+def test_the_rate_limit_continues_from_its_present_value_at_a_new_command():
     line = asked(ROWS, {"rate_limit": {"r_deg_per_s": 50.0}})
     np.testing.assert_allclose(line.knots, [0.0, 0.5, 0.6, 0.7, 1.5, 1.6])
     np.testing.assert_allclose(np.degrees(line.levels), [0, 0, 5, 0, 0, 5], atol=1e-12)
@@ -40,7 +40,7 @@ def test_dead_time_shifts_every_knot_and_nothing_else():
     np.testing.assert_array_equal(line.levels, np.radians(ROWS[:, 1]))
 
 
-def test_play_takes_the_way_of_a_play_operator_stepped_finely():
+def test_play_equals_a_finely_stepped_play_operator():
     rng = np.random.default_rng(8)
     knots = np.sort(rng.choice(np.arange(1, 5000), 60, replace=False)) / 1000  # on the grid below
     slopes = rng.normal(0, math.radians(60), 60) * (rng.random(60) < 0.8)
@@ -48,7 +48,7 @@ def test_play_takes_the_way_of_a_play_operator_stepped_finely():
     leader, half_width = PiecewiseLinear(knots, levels, slopes), math.radians(1.5)
     times = np.arange(0, 20001) / 4000
     follower, at = [], 0.0
-    # a step within the grid needs the value just before each knot as well: a straight line may turn there
+    # the value just before each knot is needed too, because the line may turn there
     for time in times:
         for value in (sampled(leader, np.array([time - 1e-12]))[0], sampled(leader, np.array([time]))[0]):
             at = min(max(at, value - half_width), value + half_width)
@@ -80,7 +80,7 @@ def test_eight_bits_over_180_degrees_of_the_arm_are_a_quarter_of_a_degree_of_the
     assert asked(np.array([[0.0, 80.0]]), controller={"bits": 8}).levels[0] == pytest.approx(127 * size)
 
 
-def test_a_command_waits_for_the_next_pulse_and_the_last_one_before_it_counts():
+def test_a_command_waits_for_the_next_pulse_and_only_the_last_command_before_it_counts():
     rows = np.array([[0.0, 0.0], [0.5, 1.0], [0.7101, 2.0], [0.7199, 3.0], [0.741, 4.0]])
     line = asked(rows, controller={"pulse_hz": 50})
     np.testing.assert_allclose(line.knots, [0.0, 0.5, 0.72, 0.76], atol=1e-12)
@@ -105,8 +105,8 @@ def test_controller_dead_time_rate_limit_and_play_act_in_this_order():
 
 def test_the_lag_has_the_closed_form_of_a_ramp_through_a_first_order_system():
     line = PiecewiseLinear(np.array([0.0, 0.5]), np.array([0.0, 0.0]), np.array([0.0, 2.0]))
-    v = line.after(0.05, 0.5, 0.3)
+    v = line.lagged(0.05, 0.5, 0.3)
     t = 0.62
     assert v(t) == pytest.approx(2.0 * (t - 0.5 - 0.05) + (0.3 + 0.1) * math.exp(-(t - 0.5) / 0.05), abs=1e-14)
-    later = line.after(0.05, 0.6, v(0.6))  # begun in the midst of the line it goes on the same
+    later = line.lagged(0.05, 0.6, v(0.6))  # started later on the same line it gives the same values
     assert later(t) == pytest.approx(v(t), abs=1e-14)

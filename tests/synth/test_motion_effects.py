@@ -1,4 +1,4 @@
-"""Each effect of actuator and load against what is known of it in closed form."""
+"""Each effect of actuator and load against closed forms."""
 
 import math
 
@@ -15,7 +15,7 @@ RATE = math.sqrt(B)
 HALF = math.pi / RATE
 """Half a period of the undamped rig, s."""
 SLOW = {"a": 120.0, "b": B, "c": C}
-"""Overdamped: it creeps up to where it stops."""
+"""Overdamped: it approaches its final angle without overshoot."""
 LEVEL = math.radians(15.0)
 
 
@@ -35,7 +35,7 @@ def test_dry_friction_takes_2_f_over_b_from_every_half_swing_and_then_holds():
 def test_dry_friction_may_differ_between_the_two_directions():
     motion = let_go({"coulomb_friction": {"torque": 12.0, "downward": 5.0}}, math.degrees(0.25))
     first, second = motion.angle(0.5 + HALF * np.array([1, 2]))
-    assert first == pytest.approx(-(0.25 - 2 * 5.0 / B), abs=1e-9)  # it began by swinging down
+    assert first == pytest.approx(-(0.25 - 2 * 5.0 / B), abs=1e-9)  # the first half swing is downwards
     assert second == pytest.approx(-first - 2 * 12.0 / B, abs=1e-9)
 
 
@@ -61,7 +61,7 @@ def test_stribecks_curve_joins_breakaway_and_sliding():
     assert np.abs(np.diff(costs)).max() < 0.1
 
 
-def test_a_slow_ramp_through_stribeck_friction_goes_by_jerks():
+def test_a_slow_ramp_through_stribeck_friction_gives_stick_slip():
     effects = {
         "coulomb_friction": {"torque": 4.0, "breakaway": 10.0, "stribeck_deg_per_s": 2.0},
         "rate_limit": {"r_deg_per_s": 5.0},
@@ -73,13 +73,13 @@ def test_a_slow_ramp_through_stribeck_friction_goes_by_jerks():
     assert stops >= 3
     angle = motion.angle(times)
     assert (np.diff(angle) >= -1e-12).all()
-    # it leaves each stop where the ramp has pulled breakaway past it
+    # it leaves each stop when the ramp's torque exceeds the breakaway
     leaves = times[1:][np.diff(stands.astype(int)) == -1]
     ramp = np.radians(5.0) * (leaves - 0.7)
     np.testing.assert_allclose(C * ramp - B * motion.angle(leaves), 10.0, atol=0.02)
 
 
-def test_drag_takes_the_energy_that_it_should():
+def test_drag_dissipates_the_energy_of_the_closed_form():
     # on the way down d(ω²)/dθ = −2bθ + 2qω², so that (1 + 2qθ)·e^(−2qθ) is the same at both turning points
     q, start = 2.0, 0.25
     motion = let_go({"quadratic_drag": {"q": q}}, math.degrees(start))
@@ -92,15 +92,15 @@ def test_drag_takes_the_energy_that_it_should():
     assert kept(turned) == pytest.approx(kept(start), abs=1e-8)
 
 
-def test_a_saturated_servo_without_feedback_answers_as_to_a_smaller_step():
-    limit = 60.0  # of 133 rad/s² that 15° ask for
+def test_a_saturated_servo_without_feedback_responds_as_to_a_smaller_step():
+    limit = 60.0  # of the 133 rad/s² of 15°
     motion = moved({"torque_saturation": {"limit": limit, "share": 0.0}})
     smaller = moved({}, np.array([[0.0, 0.0], [0.7, math.degrees(limit / C)]]))
     times = np.linspace(0, 3, 1501)
     np.testing.assert_allclose(motion.angle(times), smaller.angle(times), atol=1e-10)
 
 
-def test_a_saturated_servo_pushes_evenly_until_its_error_is_small_enough():
+def test_a_saturated_servo_has_constant_torque_until_its_error_is_small_enough():
     limit, a = 60.0, PLANT["a"]
     motion = moved({"torque_saturation": {"limit": limit}})
     since = np.linspace(0, 0.05, 51)
@@ -118,7 +118,7 @@ def test_a_dead_zone_leaves_the_head_short_by_its_width():
     assert np.abs(moved({"dead_zone": {"half_width_deg": 0.8}}, small).angle(np.linspace(0, 3, 99))).max() == 0.0
 
 
-def test_dead_zone_and_limit_together_are_five_straight_lines():
+def test_dead_zone_and_limit_together_give_five_straight_lines():
     effects = {"dead_zone": {"half_width_deg": 0.8}, "torque_saturation": {"limit": 60.0}}
     motion = moved(effects, until=6.0, plant=SLOW)
     since = np.linspace(0, 0.1, 51)
@@ -137,11 +137,11 @@ def test_a_one_sided_spring_makes_one_half_swing_shorter():
     np.testing.assert_allclose(motion.angle(times), expected, atol=1e-9)
 
 
-def test_an_appendage_swings_in_the_two_normal_modes():
+def test_head_and_appendage_swing_in_two_normal_modes():
     share, own = 0.2, 2 * math.pi * 5.0
     effects = {"flexible_appendage": {"frequency_hz": 5.0, "damping_ratio": 0.0, "inertia_share": share}}
     motion = let_go(effects, 12.0)
-    # both angles from the room: M = diag(1, s), K from the two springs
+    # with both angles measured in the room: M = diag(1, s), K from the two springs
     mass = np.diag([1.0, share])
     stiffness = np.array([[B + share * own**2, -share * own**2], [-share * own**2, share * own**2]])
     squares, shapes = np.linalg.eig(np.linalg.solve(mass, stiffness))
@@ -152,7 +152,7 @@ def test_an_appendage_swings_in_the_two_normal_modes():
     np.testing.assert_allclose(motion.appendage(times), tip - head, atol=1e-9)
 
 
-def test_an_appendage_goes_on_swinging_on_a_head_that_sticks():
+def test_an_appendage_keeps_swinging_on_a_head_that_sticks():
     own, zeta = 2 * math.pi * 5.0, 0.02
     effects = {"flexible_appendage": {"frequency_hz": 5.0}, "coulomb_friction": {"torque": 20.0, "breakaway": 60.0}}
     motion = moved(effects, STEP, 4.0)
@@ -166,7 +166,7 @@ def test_an_appendage_goes_on_swinging_on_a_head_that_sticks():
     assert np.diff(times[peaks]).mean() == pytest.approx(2 * math.pi / (own * math.sqrt(1 - zeta**2)), rel=0.003)
 
 
-def test_warm_oil_damps_less_and_warms_by_the_motion_itself():
+def test_oil_warms_with_the_motion_and_then_damps_less():
     effects = {"warming_damping": {"share": 0.6, "work": 0.5}}
     plant = {"a": 4.0, "b": B, "c": C}
     motion = let_go(effects, 15.0, 6.0, plant)
@@ -181,7 +181,7 @@ def test_warm_oil_damps_less_and_warms_by_the_motion_itself():
     assert warm[-1] > 0.5
 
 
-def test_gravity_and_linkage_geometry_conserve_their_own_energy():
+def test_gravity_and_linkage_geometry_conserve_energy():
     effects = {"gravity_geometry": {"strength": 190.0, "gravity_deg": 45.0}, "linkage_geometry": {"share": 0.7}}
     motion = let_go(effects, 14.0, 10.5)
     times = np.linspace(0.5, 10.5, 5001)
@@ -193,7 +193,7 @@ def test_gravity_and_linkage_geometry_conserve_their_own_energy():
     np.testing.assert_allclose(energy, energy[0], rtol=0, atol=1e-7 * B * theta[0] ** 2 / 2)
 
 
-def test_through_the_linkage_the_head_settles_where_the_crank_is_sent():
+def test_through_the_linkage_the_head_settles_at_the_commanded_crank_angle():
     plant = {"a": 60.0, "b": C, "c": C}
     motion = moved({"linkage_geometry": {}}, plant=plant)
     through = transmission(FourBar())
@@ -213,7 +213,7 @@ def test_geometry_vanishes_with_the_amplitude_in_the_second_order(effects):
         return float(np.abs(moved(effects, rows).angle(times) - moved({}, rows).angle(times)).max())
 
     orders = np.log2([gap(a) / gap(a / 2) for a in (0.8, 0.4, 0.2, 0.1)])
-    np.testing.assert_allclose(orders, 2.0, atol=0.1)  # small enough for the next order to be out of sight
+    np.testing.assert_allclose(orders, 2.0, atol=0.1)  # small enough for the next order to be negligible
 
 
 def test_without_effects_nothing_is_added_to_the_undamped_rig():

@@ -1,8 +1,8 @@
-"""The power of everything that acts, written down afresh, against the energy of the motion: at every instant.
+"""Energy balance of the motion at every instant, with all powers derived independently of `synth.motion`.
 
-Energy is what is stored in motion, springs and weight; the servo, the disturbance and a steady torque bring power in,
-all kinds of friction take it out. The balance is the equation of motion times the speed, so it holds to the digits of
-the integrator only if every term is there, in every mode, and the state goes on without a jump from kink to kink.
+Energy is stored in motion, springs and weight. The servo, the disturbance and a constant torque supply power, all kinds
+of friction dissipate it. The balance is the equation of motion times the speed. It holds to the integrator's accuracy
+only if every term is present in every mode and the state is continuous from kink to kink.
 """
 
 import itertools
@@ -36,12 +36,12 @@ def everything(kind: str, plant: dict) -> tuple[Spec, np.ndarray, Motion]:
 
 
 def arriving(spec: Spec, rows: np.ndarray) -> np.ndarray:
-    """Take the drive's straight lines through the lag, to each of the times."""
+    """Return the lagged command at each of the times."""
     line, lag = drive(rows, spec), spec.effects.actuator_lag.tau_s
     bounds = [0.0, *line.knots[(line.knots > 0) & (line.knots < UNTIL)].tolist(), UNTIL + STEP_S]
     out, v = np.empty(len(TIMES)), 0.0
     for begin, end in itertools.pairwise(bounds):
-        after = line.after(lag, begin, v)
+        after = line.lagged(lag, begin, v)
         inside = (begin <= TIMES) & (end > TIMES)
         out[inside] = [after(t) for t in TIMES[inside].tolist()]
         v = after(end)
@@ -49,7 +49,7 @@ def arriving(spec: Spec, rows: np.ndarray) -> np.ndarray:
 
 
 def load_energy(spec: Spec, theta: np.ndarray, omega: np.ndarray, psi: np.ndarray, swing: np.ndarray) -> np.ndarray:
-    """Sum what effects store, per inertia of the head."""
+    """Return the energy stored by effects, per inertia of the head."""
     e = spec.effects
     own = 2 * math.pi * e.flexible_appendage.frequency_hz
     energy = e.flexible_appendage.inertia_share * ((omega + swing) ** 2 + own**2 * psi**2) / 2
@@ -63,7 +63,7 @@ def load_energy(spec: Spec, theta: np.ndarray, omega: np.ndarray, psi: np.ndarra
 
 
 def load_power(spec: Spec, omega: np.ndarray, swing: np.ndarray) -> np.ndarray:
-    """Sum what effects bring in, less what they take out."""
+    """Return the net power supplied by effects, per inertia of the head."""
     e = spec.effects
     dry, shake = e.coulomb_friction, e.periodic_disturbance
     level = np.where(omega > 0, dry.torque, dry.downward)
@@ -98,7 +98,7 @@ def test_energy_is_balanced_with_all_effects_on_the_base_model(kind):
     width = math.radians(EVERYTHING["dead_zone"]["half_width_deg"])
     asked = c * np.sign(error) * np.maximum(np.abs(error) - width, 0.0)
     servo = lever * np.clip(asked, -LIMIT, LIMIT)
-    if kind == "stairs":  # every kink has been met
+    if kind == "stairs":  # the motion passes every kink
         assert (np.abs(asked) > LIMIT).any()
         assert (np.abs(error) < width).any()
         assert (omega == 0).any()
@@ -108,7 +108,7 @@ def test_energy_is_balanced_with_all_effects_on_the_base_model(kind):
 
 
 def test_energy_is_balanced_with_all_effects_on_the_neck_and_a_heavy_rotor():
-    # the rotor has a hundred million times the inertia of the paper's, so that its terms are seen
+    # the rotor has 10⁸ times the paper's inertia, so that its terms matter
     spec, rows, motion = everything("stairs", {**NECK, "rotor_inertia": 1e-3})
     theta, omega, psi, swing, warm = motion.state(TIMES)
     p = spec.plant

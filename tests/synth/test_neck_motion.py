@@ -1,4 +1,4 @@
-"""The paper's neck: linkage, springs, servo and head at large angles, and the linear model they tend to."""
+"""The paper's neck: linkage, springs, servo and head at large angles, and the linear model at small angles."""
 
 import math
 
@@ -40,7 +40,7 @@ def test_gamma_is_the_slope_of_figure_4_at_every_angle():
     assert -0.43 < slope.min() < slope.max() < 0
 
 
-def test_gammas_own_slope_and_integral_belong_to_it():
+def test_gammas_slope_and_integral_are_consistent_with_gamma():
     for angle in (-0.4, -0.2, 0.0, 0.3, 0.53):
         h = 1e-4
         around = [THROUGH.at(angle + k * h).gamma for k in (-2, -1, 1, 2)]
@@ -62,19 +62,19 @@ def test_the_springs_carry_the_head_at_neutral_and_have_the_papers_stiffness():
 def test_neither_spring_goes_slack_within_the_linkages_reach():
     stretched = np.array([SPRINGS.stretched(angle) for angle in WITHIN])
     assert stretched.min() > 0.005
-    # the one spring of the paper's equations would, 9° below neutral, with its whole rate and gravity's stretch alone
+    # the paper's single spring, with its full rate and gravity's stretch, would be slack 9° below neutral
     alone = (SPRINGS.behind - SPRINGS.before) / 2
     slack = [angle for angle in WITHIN if SPRINGS.stretched(angle)[0] - SPRINGS.behind + alone < 0]
     assert math.degrees(max(slack)) == pytest.approx(-8.7, abs=0.3)
 
 
-def test_left_alone_the_neck_stands():
+def test_without_a_command_the_neck_stays_at_rest():
     motion = moved({}, None, plant=NECK)
     assert np.abs(motion.angle(np.linspace(-1, 3, 400))).max() < 1e-13
 
 
 def test_the_undamped_neck_keeps_its_energy_over_ten_seconds():
-    # a motor of next to no constant and so much more gain has the paper's torque and no damping of its own
+    # a motor with a tiny constant and a large gain has the paper's torque without the motor's damping
     plant = {**NECK, "damping": 0.0, "motor_constant": 3.3e-8, "amplifier_gain": 37e5}
     motion = let_go({}, 15.0, 10.5, plant)
     times = np.linspace(0.5, 10.5, 2001)
@@ -93,7 +93,7 @@ def test_the_undamped_neck_keeps_its_energy_over_ten_seconds():
 def test_eq_28_has_the_numbers_of_table_5():
     a, b, c = linear_model(PAPER, FourBar())
     gamma = THROUGH.neutral_gamma
-    assert gamma == pytest.approx(-0.4224, abs=1e-4)  # -0.357 is the straight line's over the whole range
+    assert gamma == pytest.approx(-0.4224, abs=1e-4)  # -0.357 is the slope of the straight line over the whole range
     assert c == pytest.approx(2.930 / 0.00585, rel=1e-3)
     assert a == pytest.approx((0.15 + 3.136e-3 * gamma) / 0.00585, rel=1e-3)
     assert b == pytest.approx((2.930 * 1.4 * gamma + 5.318 - 0.801) / 0.00585, rel=1e-3)
@@ -122,7 +122,7 @@ def test_the_neck_settles_where_its_torques_balance():
     assert servo + weight == pytest.approx(SPRINGS.torque(theta), abs=1e-10)
 
 
-def test_a_necks_servo_pushes_no_harder_than_its_limit():
+def test_a_necks_servo_torque_stays_within_its_limit():
     limit = 40.0
     motion = moved({"torque_saturation": {"limit": limit}}, np.array([[0.0, 0.0], [0.5, 18.0]]), plant=NECK)
     t = 2e-4

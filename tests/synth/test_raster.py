@@ -1,4 +1,4 @@
-"""Our own rasteriser against areas worked out by hand, against brute force, and against itself."""
+"""The rasteriser against areas computed by hand, against brute-force sampling, and against itself."""
 
 import dataclasses
 import itertools
@@ -21,17 +21,17 @@ QUALITIES = ("draft", "standard", "metrology")
 SLANTED = Rotation.from_euler("yxz", [0.2, -0.15, 0.1]).as_matrix()
 STILL = {"ground": np.eye(4)}
 SQUARE_ON = (AMBIENT + sum(strength * lamp[2] / math.hypot(*lamp) for lamp, strength in LAMPS)) ** (1 / 2.2)
-"""What a sheet that faces the camera makes of its grey level, as a factor."""
+"""Factor on the grey level of a sheet that faces the camera."""
 
 
 def pinhole(width: int, height: int, lever_px: float = 200.0, rotation: np.ndarray | None = None) -> Pinhole:
-    """Camera whose pivot stands where it does in a picture of 640 x 480."""
+    """Return a camera whose pivot has the same relative position as in a picture of 640 x 480."""
     at = (240.0 / 640 * width, 300.0 / 480 * height)
     return Pinhole((width, height), lever_px * 1.5 / 0.115, at, 1.5, np.eye(3) if rotation is None else rotation)
 
 
 def sheet(camera: Pinhole, corners: list[tuple[float, float]], z: float, grey: float, name: str = "sheet") -> Part:
-    """Flat convex polygon at height z, its corners given in pixels, clockwise to the eye."""
+    """Return a flat convex polygon at height z from its corners in pixels, clockwise in the picture."""
     places = np.array([camera.place(corner, z) for corner in corners])
     return slanted_sheet(places, grey, name)
 
@@ -51,7 +51,7 @@ def draw(parts: list[Part], camera: Pinhole, quality: str = "standard", gamma: f
     return Raster(parts, camera, quality, gamma).draw(camera, STILL, slice(0, camera.size[1]))
 
 
-def test_vertices_appear_where_the_camera_says():
+def test_vertices_appear_at_the_cameras_projection():
     rng = np.random.default_rng(3)
     camera = dataclasses.replace(pinhole(640, 480, rotation=SLANTED), k1=-0.3)
     vertices, body = rng.uniform(-0.15, 0.15, (500, 3)), rng.integers(0, 3, 500).astype(np.int32)
@@ -88,7 +88,7 @@ def test_a_needle_between_the_centres_of_pixels_counts_with_its_area():
     expected = np.zeros((24, 32))
     expected[5:16, 10] = 0.1
     expected[[5, 15], 10] = 0.05
-    np.testing.assert_allclose(seen, expected, atol=1e-6)  # brighter than white is white
+    np.testing.assert_allclose(seen, expected, atol=1e-6)  # light above white is clipped
 
 
 def test_bodies_that_pass_through_each_other_meet_on_a_straight_line():
@@ -97,7 +97,7 @@ def test_bodies_that_pass_through_each_other_meet_on_a_straight_line():
     corners = np.array([[-1, 1], [1, 1], [1, -1], [-1, -1]]) * 8 * camera.distance_m / camera.focal_px
     places = [np.column_stack([corners, slope * corners[:, 0]]) + crossing for slope in (0.5, -0.5)]
     seen = draw([slanted_sheet(places[0], 200.0, "one"), slanted_sheet(places[1], 100.0, "two")], camera)[12]
-    # the camera is above: to the left of the line the falling sheet is nearer, to the right the rising one
+    # the camera is above: to the left of the line the falling sheet is nearer, to the right the rising sheet
     share = np.clip(np.arange(10, 21) + 0.5 - 15.3, 0, 1)
     np.testing.assert_allclose(seen[10:21, 0], SQUARE_ON * (100 + 100 * share) / 255, rtol=1e-6)
 
@@ -172,16 +172,16 @@ def test_the_rig_agrees_with_brute_force_as_far_as_samples_go():
     fine, coarse = sampled(parts, camera, placed, 16), sampled(parts, camera, placed, 8)
     drawn = {q: Raster(parts, camera, q, 1.0).draw(camera, placed, slice(0, 60)) for q in QUALITIES}
     rms = {q: float(np.sqrt(np.mean((drawn[q] - fine) ** 2))) for q in QUALITIES}
-    # 8 x 8 samples err twice as much as 16 x 16 at straight edges: exact areas are nearer to these than those are
+    # 8 x 8 samples have twice the error of 16 x 16 at straight edges: exact areas must be nearer to 16 x 16
     sampling = float(np.sqrt(np.mean((coarse - fine) ** 2)))
     assert rms["metrology"] < 0.7 * sampling
     assert rms["metrology"] < rms["standard"] < rms["draft"] / 4
-    # a sample stands for 1/16 of an edge's way through the pixel, half of it either way, and two edges may meet
+    # a sample represents 1/16 of an edge's path through the pixel, ± half of it, and two edges may meet
     assert np.abs(drawn["metrology"] - fine).max() < 2 / 32
 
 
 def sampled(parts: list[Part], camera: Pinhole, placed: dict[str, np.ndarray], times: int) -> np.ndarray:
-    """Mean light of times x times samples in each pixel, each by a depth buffer, triangle by triangle."""
+    """Return the mean light of times x times samples in each pixel, from a depth buffer over all triangles."""
     width, height = camera.size
     light, depths = np.zeros((height * times, width * times, 3)), np.zeros((height * times, width * times))
     for part in parts:

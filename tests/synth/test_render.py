@@ -1,4 +1,4 @@
-"""Small films, looked at closely: 320 × 240, a few frames."""
+"""Detailed checks of small films: 320 × 240, a few frames."""
 
 import hashlib
 import json
@@ -60,7 +60,7 @@ def rendered(tmp_path_factory):
     return folder
 
 
-def test_the_session_holds_what_the_contract_says_and_the_truth_what_it_says(rendered):
+def test_session_and_truth_contain_the_files_of_the_contract(rendered):
     assert {path.name for path in (rendered / "session").iterdir()} == {
         "rig.yaml", "one.avi", "one.command.csv", "two.avi",
     }  # fmt: skip
@@ -80,14 +80,14 @@ def test_nothing_of_the_truth_reaches_the_session(rendered):
     for path in (rendered / "session").iterdir():
         content = path.read_bytes().lower()
         for secret in (b"dead_time", b"coulomb", b"torque", b"0.0412", b"seed", b"truth", b"effect", b"lavc", b"lavf"):
-            # compressed pixels may spell short words by chance; the headers stand before the first frame
+            # compressed pixels may contain short words by chance; the headers precede the first frame
             assert secret not in (content.split(b"movi")[0] if path.suffix == ".avi" else content)
     with av.open(str(rendered / "session" / "one.avi")) as container:
         assert container.metadata == {}
         assert container.streams.video[0].metadata == {}
 
 
-def test_the_truth_knows_every_frames_pixels_and_how_good_its_edges_are(rendered):
+def test_the_truth_records_every_frames_hash_and_the_edge_errors(rendered):
     _, frames = read_clip(rendered / "session" / "one.avi")
     rows = np.genfromtxt(rendered / "truth" / "one.truth.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
     assert [hashlib.sha256(np.ascontiguousarray(frame)).hexdigest() for frame in frames] == list(rows["frame_sha256"])
@@ -96,7 +96,7 @@ def test_the_truth_knows_every_frames_pixels_and_how_good_its_edges_are(rendered
     assert set(facts["versions"]) >= {"python", "anglecam", "numpy", "trimesh"}
 
 
-def test_every_frame_is_there_at_its_time(rendered):
+def test_every_frame_is_in_the_file_at_its_time(rendered):
     for name, count in (("one", 30), ("two", 21)):
         times, frames = read_clip(rendered / "session" / f"{name}.avi")
         truth = np.genfromtxt(rendered / "truth" / f"{name}.truth.csv", delimiter=",", names=True)
@@ -114,7 +114,7 @@ def test_the_command_acts_late_by_the_hidden_delay_and_the_release_at_once(rende
     assert two["angle_deg"][-1] > -10.0
 
 
-def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_noise(rendered, tmp_path):
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_different_noise(rendered, tmp_path):
     short = [{"name": "one", "duration_s": 0.3, "command": {"kind": "step", "amplitude_deg": 15, "rest_s": 0.51}}]
     frames = {}
     for name, seed in (("same", 5), ("other", 6)):
@@ -125,12 +125,12 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_another_noise(rende
     first = read_clip(rendered / "session" / "one.avi")[1][: len(frames["same"])]
     np.testing.assert_array_equal(frames["same"], first)
     assert (frames["other"] != first).mean() > 0.5
-    # a still head: what changes from frame to frame is the noise, and nothing else
+    # a still head: only the noise changes from frame to frame
     assert np.std(first[1].astype(float) - first[0]) == pytest.approx(2.0 * np.sqrt(2), rel=0.03)
 
 
 def marks_alone(spec: Spec) -> list[Part]:
-    """Lips and marker at full brightness in colours of their own, all else black: grey levels are then areas."""
+    """Return the rig with bright lips and marker in separate colours, all else black: grey levels are areas."""
     shown = {"lips": [1e6, 0.0, 0.0], "marker": [0.0, 0.0, 1e6]}
     return [
         Part(part.name, part.body, part.mesh, np.zeros_like(part.colours) + shown.get(part.name, [0.0, 0.0, 0.0]))
@@ -140,7 +140,9 @@ def marks_alone(spec: Spec) -> list[Part]:
 
 @pytest.mark.parametrize("engine", ["raster", "pyrender"])
 @pytest.mark.parametrize(("facing", "marker"), [("right", "disc"), ("left", "ring")])
-def test_the_picture_is_the_analytic_oracles_and_the_truth_is_where_it_shows_the_marks(engine, facing, marker):
+def test_the_picture_equals_the_analytic_oracles_and_the_truth_is_where_the_picture_shows_the_marks(
+    engine, facing, marker
+):
     spec = Spec.model_validate(
         {
             "camera": {"size": [320, 300]},
@@ -170,7 +172,7 @@ def test_the_picture_is_the_analytic_oracles_and_the_truth_is_where_it_shows_the
             assert np.sqrt(np.mean((picture[..., 0] - drawn)[(drawn > 0) & (drawn < 1)] ** 2)) < 0.02
 
 
-def test_a_worker_that_dies_is_replaced_and_no_frame_is_lost_and_without_workers_the_frames_are_the_same():
+def test_a_dead_worker_is_replaced_without_losing_frames_and_frames_do_not_depend_on_workers():
     spec = Spec.model_validate(SPEC)
     seen = view(spec)
     (take, _) = perform(spec, seen)
@@ -208,7 +210,7 @@ def test_lossy_clips_keep_times_and_nearly_the_picture(rendered, tmp_path, codec
 
 
 @pytest.mark.parametrize(("out", "truth"), [("same", "same"), ("session", "session/truth"), ("truth/session", "truth")])
-def test_the_truth_may_not_lie_where_the_session_is(tmp_path, out, truth):
+def test_the_truth_must_not_be_in_the_sessions_folder(tmp_path, out, truth):
     with pytest.raises(SpecError, match="truth leaks"):
         render(write_spec(tmp_path), tmp_path / out, tmp_path / truth)
 
@@ -233,7 +235,7 @@ def test_a_bad_spec_ends_with_status_2_and_one_line(tmp_path, monkeypatch, capfd
     path = write_spec(tmp_path, **changes)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["synth", "render", str(path), "--out", "o", "--truth", "t"])
-    monkeypatch.setattr(signal, "signal", lambda *_: None)  # the tests' own process stays as it is
+    monkeypatch.setattr(signal, "signal", lambda *_: None)  # the test process keeps its signal handlers
     with pytest.raises(SystemExit) as ended:
         main()
     told = capfd.readouterr().err
@@ -249,7 +251,7 @@ def call(spec: Path, folder: Path, **environment: str) -> subprocess.Popen:
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env={**os.environ, **environment})
 
 
-def test_h264_gives_the_same_bytes_whatever_lay_in_memory(tmp_path):
+def test_h264_gives_the_same_bytes_whatever_the_memory_contains(tmp_path):
     short = [{"name": "one", "duration_s": 0.7, "command": {"kind": "free", "rest_s": 0.5}}]
     camera = {"size": [160, 128], "codec": "h264"}
     path = write_spec(tmp_path, recordings=short, camera=camera, rig={"lever_px": 50, "pivot_px": [60, 80]})
@@ -261,7 +263,7 @@ def test_h264_gives_the_same_bytes_whatever_lay_in_memory(tmp_path):
     assert written[0] == written[1]
 
 
-def test_pyrender_makes_films_too_and_says_how_good_its_edges_are(tmp_path):
+def test_pyrender_makes_films_too_and_records_its_edge_errors(tmp_path):
     short = [{**SPEC["recordings"][0], "duration_s": 0.2}]
     render_spec = {"engine": "pyrender", "quality": "standard"}
     render(write_spec(tmp_path, recordings=short, render=render_spec), tmp_path / "session", tmp_path / "truth")
@@ -272,13 +274,13 @@ def test_pyrender_makes_films_too_and_says_how_good_its_edges_are(tmp_path):
 
 
 @pytest.mark.parametrize("blow", [signal.SIGTERM, signal.SIGKILL])
-def test_who_ends_the_command_ends_its_workers(tmp_path, blow):
+def test_ending_the_command_ends_its_workers(tmp_path, blow):
     long = [{**SPEC["recordings"][0], "duration_s": 8.0}]
     with call(write_spec(tmp_path, recordings=long), tmp_path) as rendering:
         while not list((tmp_path).glob("session/.unfinished-*")):
             assert rendering.poll() is None
             time.sleep(0.1)
         rendering.send_signal(blow)
-        # workers hold the other end of the pipe: it closes when the last of them is gone
+        # workers hold the other end of the pipe: it closes when the last worker ends
         rendering.communicate(timeout=20)
     assert not (tmp_path / "session" / "one.avi").exists()

@@ -35,7 +35,7 @@ def truth(tmp_path):
 
 
 def write_angles(result: Path, truth: Path, name: str, error: np.ndarray, lost: set[int] = frozenset()) -> Path:
-    """Write angles that are off by a known error, with rows lost."""
+    """Write angles with a known error and lost rows."""
     true = np.genfromtxt(truth / f"{name}.truth.csv", delimiter=",", names=True)
     rows = ["frame,time_s,angle_deg,status"]
     for k, angle in enumerate(true["angle_deg"] + error):
@@ -52,7 +52,7 @@ def test_the_error_of_a_clip_is_its_rms_over_the_frames_that_are_ok(truth, tmp_p
     assert scored.rms_deg == pytest.approx(0.03)
 
 
-def test_only_without_a_command_the_median_is_taken_out(truth, tmp_path):
+def test_the_median_is_subtracted_only_without_a_command(truth, tmp_path):
     shifted = np.full(30, 1.5)
     free = score_clip(write_angles(tmp_path, truth, "two", shifted), truth / "two.truth.csv", has_command=False)
     assert free.rms_deg == pytest.approx(0.0, abs=1e-9)
@@ -61,7 +61,7 @@ def test_only_without_a_command_the_median_is_taken_out(truth, tmp_path):
     assert commanded.rms_deg == pytest.approx(1.5)
 
 
-def test_everything_that_was_found_stands_beside_the_truth(truth, tmp_path):
+def test_every_result_is_printed_with_its_truth(truth, tmp_path):
     result = tmp_path / "result"
     result.mkdir()
     write_angles(result, truth, "one", np.full(30, 0.01))
@@ -81,7 +81,7 @@ def test_everything_that_was_found_stands_beside_the_truth(truth, tmp_path):
         assert said in text.getvalue()
 
 
-def test_a_folder_without_results_or_without_truth_is_said(truth, tmp_path):
+def test_a_folder_without_results_or_without_truth_is_an_error(truth, tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(SpecError, match="neither"):
         score(tmp_path / "empty", truth, Console(file=io.StringIO()))

@@ -18,19 +18,19 @@ def developed(level: float, gain: float = 1.0, **camera) -> np.ndarray:
     return picture.astype(float)
 
 
-def test_a_perfect_sensor_gives_the_grey_levels_of_the_light():
+def test_an_ideal_sensor_gives_the_grey_levels_of_the_light():
     assert (developed(117.0, noise_grey=0.0) == 117).all()
 
 
-def test_reading_noise_has_the_asked_spread_and_no_bias():
+def test_read_noise_has_the_specified_standard_deviation_and_no_bias():
     picture = developed(117.3, noise_grey=2.0)
-    # rounding adds a twelfth of a grey level squared
+    # rounding adds a variance of 1/12 grey level squared
     assert picture.std() == pytest.approx(math.sqrt(4 + 1 / 12), rel=0.01)
     assert picture.mean() == pytest.approx(117.3, abs=0.02)
 
 
 @pytest.mark.parametrize("level", [30.0, 200.0])
-def test_shot_noise_is_that_of_the_counted_electrons(level):
+def test_shot_noise_is_the_poisson_noise_of_the_electrons(level):
     electrons = 2000.0
     picture = developed(level, noise_grey=1.0, electrons_at_white=electrons)
     counted = electrons * level / 255
@@ -50,7 +50,7 @@ def test_the_corners_lose_the_stated_share():
 
 def test_focus_blur_spreads_a_point_by_its_standard_deviation():
     light = np.zeros((61, 61, 3), dtype=np.float32)
-    light[30, 30] = 20.0  # far above white, so that rounding does not matter
+    light[30, 30] = 20.0  # far above white, so that rounding is negligible
     camera = Camera(noise_grey=0.0, focus_blur_px=2.0)
     picture = develop(light, camera, np.ones(1), np.random.default_rng(0)).astype(float)[..., 0]
     x = np.arange(61) - 30
@@ -66,7 +66,7 @@ def test_flicker_is_averaged_over_the_exposure_and_differs_from_row_to_row():
     assert flicker(camera, Shutter(0.0, 0.0, 480), 0.0025)[0] == pytest.approx(1.1)
 
 
-def test_shake_has_its_spread_and_its_band_and_is_smooth():
+def test_vibration_has_its_standard_deviation_and_band_and_is_smooth():
     camera = Camera.model_validate({"shake": {"rms_px": 2.0, "frequency_hz": 5.0}})
     times = np.arange(0, 200, 0.01)
     moved = np.concatenate(
@@ -84,7 +84,7 @@ def test_a_camera_that_stands_still_does_not_move():
     assert (still.roll([0.0, 1.0]) == 0).all()
 
 
-def test_the_sag_turns_the_picture_at_its_rate():
+def test_angle_drift_turns_the_picture_at_its_rate():
     sagging = unrest(
         Camera(), Effects.model_validate({"angle_drift": {"rate_deg_per_s": 0.2}}), np.random.SeedSequence(0)
     )

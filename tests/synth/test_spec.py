@@ -19,7 +19,7 @@ def written(folder: Path, **changes) -> Path:
 
 
 @pytest.mark.parametrize("path", sorted(Path(__file__).parents[2].glob("configs/*.yaml")), ids=lambda path: path.name)
-def test_every_spec_that_we_ship_is_valid(path):
+def test_every_shipped_spec_is_valid(path):
     read_spec(path)
 
 
@@ -91,7 +91,7 @@ def test_a_bad_spec_is_one_line_with_file_and_key(tmp_path, changes, key):
 @pytest.mark.parametrize(
     "content", [b"recordings: [", b"- 1\n", b"\xff\xfe\x00", b"", b"a: 2020-13-45\n", b"seed: 1\nseed: 2\n"]
 )
-def test_what_is_no_spec_at_all_is_one_line_too(tmp_path, content):
+def test_a_file_that_is_not_a_spec_is_one_line_too(tmp_path, content):
     path = tmp_path / "spec.yaml"
     path.write_bytes(content)
     with pytest.raises(SpecError, match=r"spec\.yaml: "):
