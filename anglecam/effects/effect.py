@@ -25,13 +25,12 @@ import numpy as np
 
 from anglecam.data.camera_evidence import View
 from anglecam.data.typing import Floats
+from anglecam.effects.unit_names import split_unit
 
 Values = tuple[float, ...]
 """Parameters as compiled functions take them. Reading them from an array would cost more than the evaluation."""
 
 PORTS = ("command", "lag", "servo", "load", "friction", "dynamics", "timing", "observation")
-UNIT_WORDS = ("deg", "rad", "s", "s2", "px", "per")
-"""Words that the unit at the end of a parameter's name is made of."""
 
 
 @dataclass(frozen=True)
@@ -79,10 +78,7 @@ class Parameter:
     @property
     def unit(self) -> str:
         """Unit in files, parsed from the name: ``friction_deg_per_s2`` → ``deg/s2``; empty for a pure number."""
-        words = self.name.split("_")
-        first = next(i for i in range(1, len(words) + 1) if all(word in UNIT_WORDS for word in words[i:]))
-        unit = ["1", *words[first:]] if words[first:][:1] == ["per"] else words[first:]
-        return " ".join(unit).replace(" per ", "/")
+        return split_unit(self.name)[1]
 
     def in_file_unit(self, value: float, sigma: float = 0.0) -> tuple[float, float]:
         """Convert a value and its standard uncertainty from SI to the unit in files; an absent limit is infinite."""

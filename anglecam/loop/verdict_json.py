@@ -17,8 +17,6 @@ from anglecam.loop.verdict import Verdict
 
 MODEL_NAMES = ("a_per_s", "b_per_s2", "c_per_s2")
 NEXT_COMMAND = "next.command.csv"
-UNITS = ("deg", "rad", "s", "s2", "px", "per")
-"""Words of units at the end of a parameter's name."""
 
 
 def next_experiment(verdict: Verdict) -> Experiment | None:
@@ -92,7 +90,7 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
         "p_value_after": verdict.last_test.p_value,
         "model": {name: model[name] for name in MODEL_NAMES if name in model},
         "detectable": [
-            {"id": name, "smallest": size_of(name).in_file_unit(smallest)[0], "unit": split_unit(size_of(name).name)[1]}
+            {"id": name, "smallest": size_of(name).in_file_unit(smallest)[0], "unit": size_of(name).unit}
             for name, smallest in verdict.last_test.detectable.items()
             if name not in named
         ],
@@ -106,20 +104,6 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
         ],
         "policy": verdict.policy.as_list(),
     }
-
-
-def split_unit(name: str) -> tuple[str, str]:
-    """Split a parameter's name into words and unit.
-
-    Examples
-    --------
-    >>> split_unit("dry_friction_deg_per_s2")
-    ('dry friction', 'deg/s2')
-    """
-    words = name.split("_")
-    end = next(i for i in range(1, len(words) + 1) if all(word in UNITS for word in words[i:]))
-    units = ["1", *words[end:]] if words[end:][:1] == ["per"] else words[end:]
-    return " ".join(words[:end]), " ".join(units).replace(" per ", "/")
 
 
 def size_of(effect_id: str) -> Parameter:

@@ -12,6 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from anglecam import __version__
 from anglecam.data.series import AngleSeries
 from anglecam.effects import effect
+from anglecam.effects.unit_names import split_unit
 from anglecam.identification.identified import Identified
 from anglecam.io.files import write_atomically
 from anglecam.io.session import CORRECTED
@@ -21,7 +22,7 @@ from anglecam.loop.residual_test import StructureTest
 from anglecam.loop.residual_torque import estimate_residual_torque
 from anglecam.loop.stepwise import applicable
 from anglecam.loop.verdict import Verdict
-from anglecam.loop.verdict_json import NEXT_COMMAND, size_of, split_unit
+from anglecam.loop.verdict_json import NEXT_COMMAND, size_of
 from anglecam.report import loop_figures as figures
 from anglecam.report.path_figure import path_figure
 from anglecam.report.wording import plain, sentence, with_uncertainty

@@ -126,17 +126,17 @@ def test_a_view_with_wrong_corners_is_rejected():
 def test_a_clip_without_a_board_is_refused(tmp_path):
     write_pictures(tmp_path / "wall.mkv", [np.full((480, 640), 120.0)] * 3)
     with pytest.raises(InputError, match=r"wall.mkv: chessboard of 9×6 inner corners not found in any of 3 frames"):
-        calibrate_clip(tmp_path / "wall.mkv", BOARD)
+        calibrate_clip(open_film(tmp_path / "wall.mkv"), BOARD)
 
 
 def test_too_few_poses_are_refused(tmp_path):
     film_board(tmp_path / "still.mkv", CAMERA, poses(2, camera=CAMERA), hold=4)
     with pytest.raises(InputError, match=r"found in . of 8 frames searched, but in only 2 different poses"):
-        calibrate_clip(tmp_path / "still.mkv", BOARD)
+        calibrate_clip(open_film(tmp_path / "still.mkv"), BOARD)
 
 
 def test_a_board_that_never_leans_gives_no_focal_length(tmp_path):
     flat = [(Rotation.identity(), np.array([x, y, 0.5])) for x in (-0.05, 0.0, 0.05) for y in (-0.03, 0.03)]
     write_pictures(tmp_path / "flat.mkv", [board_picture(BoardCamera(), pose) for pose in flat])
     with pytest.raises(InputError, match="lean it by 20° to 40°"):
-        calibrate_clip(tmp_path / "flat.mkv", BOARD)
+        calibrate_clip(open_film(tmp_path / "flat.mkv"), BOARD)

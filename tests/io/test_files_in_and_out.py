@@ -173,7 +173,7 @@ def test_unused_files_and_free_swings_are_noted(tmp_path):
     session = read_session(tmp_path)
     (unused,) = session.notes
     assert "swing.commands.csv: not used; a command is NAME.command.csv" in unused
-    assert measure_session(session).notes == ("swing: no command that changes; taken for a free swing",)
+    assert measure_session(session).notes == ("swing: no command that changes; treated as a free swing",)
 
 
 def test_times_in_milliseconds_are_refused(tmp_path):

@@ -96,7 +96,7 @@ def test_commands_by_another_clock_are_dated_by_the_lamps_of_all_clips_together(
 def test_a_clip_of_its_own_says_that_the_clocks_disagree(late):
     clip = late / "steps-0.avi"
     measurement = measure_clip(open_film(clip), rig_beside(clip), read_command(late / "steps-0.command.csv"))
-    assert any("dated by the lamp" in note for note in measurement.notes)
+    assert any("the command's times are corrected by it" in note for note in measurement.notes)
 
 
 def test_a_lamp_that_stays_dark_is_missed_and_one_outside_the_picture_is_an_error(filmed):

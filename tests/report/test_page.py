@@ -12,6 +12,7 @@ import pytest
 from anglecam.data.command import Command
 from anglecam.data.series import AngleSeries
 from anglecam.effects import effect
+from anglecam.effects.unit_names import split_unit
 from anglecam.identification.identify_records import identify_records
 from anglecam.identification.output_error import fit_output_error
 from anglecam.io.command_csv import read_command
@@ -19,7 +20,7 @@ from anglecam.io.rig import Rig
 from anglecam.loop.close import close_records
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.verdict import Accepted
-from anglecam.loop.verdict_json import next_experiment, split_unit, verdict_as_dict, write_next_command
+from anglecam.loop.verdict_json import next_experiment, verdict_as_dict, write_next_command
 from anglecam.report.page import p_in_words, validation_in_words, write_report
 from anglecam.report.wording import sentence
 from support.motion import Plant

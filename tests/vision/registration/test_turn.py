@@ -6,6 +6,7 @@ import yaml
 
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import measure_clip
+from anglecam.video.film import open_film
 from synth.session import render
 
 SPEC = {
@@ -23,7 +24,7 @@ def swing(tmp_path_factory):
     (folder / "spec.yaml").write_text(yaml.safe_dump(SPEC))
     render(folder / "spec.yaml", folder / "session", folder / "truth")
     truth = np.genfromtxt(folder / "truth" / "swing.truth.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
-    return measure_clip(folder / "session" / "swing.avi", Rig()), truth
+    return measure_clip(open_film(folder / "session" / "swing.avi"), Rig()), truth
 
 
 def test_the_whole_body_gives_the_angle_to_a_thousandth_of_a_degree(swing):

@@ -1,0 +1,45 @@
+"""One clip through the workflow: opened once, measured, written."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anglecam.errors import InputError
+from anglecam.io.netcdf_parquet import Also, read_netcdf
+from anglecam.workflow.clip import measure_source, open_source, write_clip_overlay, write_measurement
+from support.drawn import Look, draw_frames, write_clip
+
+
+@pytest.fixture(scope="module")
+def clip(tmp_path_factory):
+    path = tmp_path_factory.mktemp("film") / "swing.avi"
+    write_clip(path, draw_frames(Look(), 8.0 * np.sin(2.0 * np.pi * np.arange(45) / 30.0)))
+    return path
+
+
+def test_all_results_of_a_clip_come_from_one_open_film(clip, tmp_path, monkeypatch):
+    opened = []
+    real = __import__("anglecam.video.container", fromlist=["av"]).av.open
+
+    def counted(file, *arguments, **options):
+        opened.append(str(file))
+        return real(file, *arguments, **options)
+
+    monkeypatch.setattr("anglecam.video.container.av.open", counted)
+    source = open_source(clip)
+    measurement = measure_source(source)
+    write_measurement(measurement, source.command, tmp_path, [Also.netcdf])
+    write_clip_overlay(source, measurement, tmp_path)
+    # once for what the container declares, once for decoding; the pictures of a short film are then in memory
+    assert sum("swing.avi" in name for name in opened) == 2
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {"swing.angles.csv", "swing.angles.nc", "swing.png", "swing.overlay.mp4"} <= names
+    np.testing.assert_array_equal(read_netcdf(tmp_path / "swing.angles.nc").angle, measurement.series.angle)
+
+
+def test_a_series_of_angles_is_not_measured(tmp_path):
+    path = tmp_path / "a.angles.csv"
+    path.write_text("time_s,angle_deg\n0,1\n")
+    with pytest.raises(InputError, match="holds angles already"):
+        open_source(path)

@@ -1,0 +1,69 @@
+"""The command line, the Python API and the batch check a session by the same functions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import anglecam
+from anglecam.errors import InputError, RigError
+from anglecam.io.session import read_session
+from anglecam.workflow.session import loop_input, measure_session, require_recordings
+from support.motion import Plant, Recording, command_rows, move
+
+KINDS = ("stairs", "chirp")
+
+
+@pytest.fixture
+def session(tmp_path):
+    rng = np.random.default_rng(3)
+    for kind in KINDS:
+        recording = Recording(kind, kind)
+        rows = command_rows(recording, rng)
+        time = np.arange(0.0, recording.duration_s, 1.0 / 30.0)
+        angle = move(Plant(), recording, time, rows) + rng.normal(0.0, 0.05, len(time))
+        np.savetxt(tmp_path / f"{kind}.command.csv", rows, "%.6f", ",", header="time_s,command_deg", comments="")
+        columns = np.column_stack([time, angle])
+        np.savetxt(tmp_path / f"{kind}.angles.csv", columns, "%.6f", ",", header="time_s,angle_deg", comments="")
+    return tmp_path
+
+
+def test_identify_in_python_with_every_recording_held_out_is_one_line(session):
+    (session / "rig.yaml").write_text("held_out: [stairs, chirp]\n")
+    with pytest.raises(RigError, match="every recording that can be used is held out; nothing is left to fit"):
+        anglecam.identify(session)
+    with pytest.raises(RigError, match="every recording that can be used is held out"):
+        anglecam.close_loop(session)
+
+
+def test_identify_in_python_takes_every_estimator_and_holds_out_by_name(session):
+    model = anglecam.identify(session, "ekf", hold_out=["chirp"])
+    assert [record.name for record in model.fitted] == ["stairs"]
+    assert model.held_out is not None
+    neck = anglecam.identify(session, "neck")
+    assert neck.estimator == "neck"
+    with pytest.raises(RigError, match="no estimator 'magic'"):
+        anglecam.identify(session, "magic")
+
+
+def test_a_recording_that_does_not_exist_cannot_be_held_out(session):
+    with pytest.raises(RigError, match="hold out nobody: no such recording"):
+        anglecam.close_loop(session, hold_out=["nobody"])
+    opened = read_session(session)
+    require_recordings(opened, KINDS)
+    with pytest.raises(RigError, match="hold out nobody: no such recording"):
+        require_recordings(opened, ["stairs", "nobody"])
+
+
+def test_a_session_without_a_usable_recording_is_one_line(tmp_path):
+    (tmp_path / "a.angles.csv").write_text("time_s,angle_deg\n" + "".join(f"{i / 30},0\n" for i in range(5)))
+    with pytest.raises(InputError, match="no recording can be used"):
+        anglecam.identify(tmp_path)
+
+
+def test_the_loop_sees_the_series_themselves_where_no_film_was_measured(session):
+    measured = measure_session(read_session(session))
+    assert [series.name for series in measured.series] == sorted(KINDS)
+    shown = loop_input(measured)
+    assert not shown.differs
+    assert shown.records == measured.records
