@@ -74,8 +74,8 @@ class Plant:
 
     @property
     def kinked(self) -> bool:
-        """Whether the torque jumps or has kinks: dry friction, or a servo with a limit or a dead zone."""
-        return any(e.port in ("servo", "friction") for e in self.effects)
+        """Whether the torque jumps or has kinks: dry friction, a servo with a limit or a dead zone, a stop."""
+        return any(e.kinked or e.port in ("servo", "friction") for e in self.effects)
 
     def with_effect(self, effect: Effect) -> Plant:
         """Return the plant with one more effect."""
@@ -138,7 +138,7 @@ class Plant:
     def _max_step(self) -> float:
         """Longest step of the integrator, s."""
         ports = {e.port for e in self.effects}
-        if ports & {"servo", "dynamics"}:
+        if ports & {"servo", "dynamics"} or any(e.kinked for e in self.effects):
             return KINKED_STEP
         return MAX_STEP if ports & {"load", "friction"} else EXACT
 

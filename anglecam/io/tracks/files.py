@@ -46,7 +46,14 @@ def read_tracks(path: Path) -> Tracks:
     """
     with open_tracks_file(path) as file:
         found = _format_of(file)
-        return replace(found.read(file), software=found.program, usual_limit=found.usual_limit)
+        try:
+            tracks = found.read(file)
+        except (ValueError, KeyError, TypeError, IndexError, OSError) as fault:
+            if file.is_hdf5:
+                raise  # `open_hdf5` words it
+            reason = getattr(fault, "strerror", None) or str(fault).partition("\n")[0]
+            raise InputError(f"{path}: not a readable {found.program} {found.kind} ({reason})") from fault
+        return replace(tracks, software=found.program, usual_limit=found.usual_limit)
 
 
 def find_tracks(directory: Path) -> list[Path]:

@@ -75,7 +75,10 @@ class TracksFormat:
     recognises: Callable[[TracksFile], bool]
     """Whether a file with one of ``endings`` is of this format; reads no more than the header."""
     read: Callable[[TracksFile], Tracks]
-    """Read a file of this format; raises `InputError` for a damaged one."""
+    """Read a file of this format into `Tracks`, with a row of NaN for a frame without points; one unnamed animal has
+    the name ``""``. `anglecam.io.tracks.files.read_tracks` fills in the program's name and its usual limit, and turns a
+    `ValueError`, `KeyError`, `TypeError`, `IndexError` or `OSError` into an `InputError` that names the file. A text
+    file is opened by `anglecam.io.files.open_text`, which limits its size."""
     clip_name: Callable[[str], str | None] = lambda stem: None
     """The clip's name from the stem of a file name that the program made of it; ``None`` if the program did not."""
     usual_limit: float = 0.0

@@ -248,7 +248,7 @@ def test_a_csv_that_is_no_table_of_tracks_is_one_line(tmp_path):
         "a cell too few": ([*good[:5], good[5].rpartition(",")[0], *good[6:]], "row 6 has 6 cells"),
         "a word": ([*good[:5], good[5].rpartition(",")[0] + ",high", *good[6:]], "row 6: 'high' is not a number"),
         "no rows": (good[:3], "a header but no rows"),
-        "another table": (["time_s,angle_deg", "0,1"], "not with scorer, bodyparts, coords"),
+        "another table": (["time_s,angle_deg", "0,1"], "not a DeepLabCut table"),
         "nothing": ([], "not a DeepLabCut table"),
         "frames backwards": ([*good[:3], good[4], good[3]], "does not number the frames"),
         "a far frame": ([*good[:4], "9999999" + good[4][1:]], "does not number the frames"),
@@ -259,7 +259,7 @@ def test_a_csv_that_is_no_table_of_tracks_is_one_line(tmp_path):
         (tmp_path / "bad.csv").write_text("\n".join(lines) + "\n")
         assert cause in refusal(tmp_path / "bad.csv")
     (tmp_path / "bad.csv").write_bytes(b"\xff\xfe\x00scorer")
-    assert "cannot be read as CSV" in refusal(tmp_path / "bad.csv")
+    assert "cannot be read as" in refusal(tmp_path / "bad.csv")
     assert "No such file" in refusal(tmp_path / "not_there.csv")
     assert "no such file" in refusal(tmp_path / "not_there.h5")
 
