@@ -41,7 +41,7 @@ def measure(
     ] = None,
 ) -> None:
     """Measure the angle in every frame: NAME.angles.csv and a plot for each clip, and its response to every change."""
-    from anglecam.report.summary import response_table, series_table
+    from anglecam.report.clip_tables import response_table, series_table
     from anglecam.workflow.clip import open_source, write_clip_overlay, write_measurement
 
     declared = read_rig(rig) if rig else None

@@ -31,7 +31,7 @@ def identify(
     """Fit a model to a session: model.json, and model.mat for MATLAB."""
     from anglecam.identification.estimators import ESTIMATORS
     from anglecam.io.neck_file import read_neck
-    from anglecam.report.summary import model_table
+    from anglecam.report.session_tables import model_table
     from anglecam.workflow.session_results import write_identified
 
     if estimator not in ESTIMATORS:  # before any clip is measured
@@ -59,7 +59,7 @@ def close(
     ] = None,
 ) -> None:
     """Find what the model lacks: loop.json, report.html and, where it helps, the command to play next."""
-    from anglecam.report.summary import loop_table, model_table
+    from anglecam.report.session_tables import loop_table, model_table
     from anglecam.workflow.session import loop_input, require_recordings
     from anglecam.workflow.session_results import write_closed
 
