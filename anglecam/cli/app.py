@@ -48,9 +48,8 @@ def _anglecam(
 
 
 app.add_typer(neck, name="neck")
-app.command(cls=EstimatorCommand)(identify)
-for _command in (measure, budget, calibrate, close, batch):
-    app.command()(_command)
+for _command in (measure, budget, calibrate, identify, close, batch):
+    app.command(cls=EstimatorCommand if _command is identify else None)(_command)
 
 
 def main() -> None:
