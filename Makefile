@@ -7,9 +7,10 @@ DEV := $(VENV)/.dev-ready
 MESA := libegl1 libgl1 libgl1-mesa-dri
 DEMO := build/demo
 
-# uv installs in seconds what takes pip minutes; pip is the way out where only pip is configured to reach an index.
+# uv installs in seconds what takes pip minutes; it compiles bytecode as pip does, without which every process starts two
+# seconds later where Python may not write it. pip is the way out where only pip is configured to reach an index.
 INSTALL = install() { \
-	  $(BIN)/uv pip install -q --python $(BIN)/python "$$@" \
+	  $(BIN)/uv pip install -q --compile-bytecode --python $(BIN)/python "$$@" \
 	    || { echo "setup: uv could not install; trying again with pip, which is slower" && \
 	         $(BIN)/python -m pip install -q --disable-pip-version-check "$$@"; }; }; install --no-build-isolation
 COMPILE = $(BIN)/uv pip compile -q --universal --generate-hashes --no-emit-index-url --python-version 3.11 \
