@@ -87,15 +87,14 @@ class Film:
     @property
     def times(self) -> Floats:
         """(n,) presentation times of all frames, s; reads the film if it was not read before."""
-        if self._memory.times is None:
-            for _ in self._rows():
-                pass
+        self._read_times()
         return np.array(self._memory.times)
 
     @property
     def undecodable(self) -> int:
         """Number of frames that cannot be decoded; reads the film if it was not read before."""
-        return len(self.times) and self._memory.undecodable
+        self._read_times()
+        return self._memory.undecodable
 
     @property
     def rotation_deg(self) -> int:
@@ -165,6 +164,12 @@ class Film:
             return None
         of = f" of {self.declared_frames}" if self.declared_frames else ""
         return f"truncated: {sample.decoded}{of} frames could be read"
+
+    def _read_times(self) -> None:
+        """Read the film unless it was read completely before."""
+        if self._memory.times is None:
+            for _ in self._rows():
+                pass
 
     def _rows(self) -> Iterator[Row]:
         """Yield the film's rows from memory, or decode them; the first complete reading fills the memory."""

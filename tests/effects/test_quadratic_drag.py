@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -42,6 +43,12 @@ def test_the_motion_with_drag_equals_scipys(drag):
     expected = reference(drag)
     assert np.degrees(np.abs(predicted(drag) - expected)).max() < INTEGRATION_DEG[drag]
     assert np.degrees(np.abs(expected - reference(0.0))).max() > 100.0 * INTEGRATION_DEG[drag]
+
+
+def test_the_steps_of_a_kinked_torque_are_short_enough_for_strong_drag():
+    kinked = replace(effect("quadratic_drag"), kinked=True)
+    found = Plant((kinked,)).predict(np.array([A, B, C, 20.0]), TIME, COMMAND, np.zeros(2))
+    assert np.degrees(np.abs(found - reference(20.0))).max() < INTEGRATION_DEG[0.5]
 
 
 def test_at_its_null_it_is_the_base_model():

@@ -13,9 +13,11 @@ import pandas as pd
 import pytest
 
 from anglecam.errors import InputError
+from anglecam.io.tracks import deeplabcut
 from anglecam.io.tracks.files import find_tracks, name_by_tool, read_tracks
 from anglecam.io.tracks.names_in_pickle import read_names
 from anglecam.io.tracks.tracks import choose_pair
+from anglecam.io.tracks.tracks_format import open_tracks_file
 from support.tracked import SCORER, frame, write_deeplabcut, write_sleap
 
 RNG = np.random.default_rng(3)
@@ -25,9 +27,15 @@ SCORES = RNG.uniform(0.7, 1.0, (12, 2, 3))
 NAMES = ("nose", "neck", "ear")
 
 
-def refusal(path) -> str:
+def read_as_deeplabcut(path):
+    """Read a file by DeepLabCut's reader, whatever other formats have the same ending."""
+    with open_tracks_file(path) as file:
+        return deeplabcut.FORMAT.read(file)
+
+
+def refusal(path, read=read_tracks) -> str:
     with pytest.raises(InputError) as caught:
-        read_tracks(path)
+        read(path)
     line = str(caught.value)
     assert line.startswith(f"{path}: ")
     assert "\n" not in line
@@ -248,7 +256,7 @@ def test_a_csv_that_is_no_table_of_tracks_is_one_line(tmp_path):
         "a cell too few": ([*good[:5], good[5].rpartition(",")[0], *good[6:]], "row 6 has 6 cells"),
         "a word": ([*good[:5], good[5].rpartition(",")[0] + ",high", *good[6:]], "row 6: 'high' is not a number"),
         "no rows": (good[:3], "a header but no rows"),
-        "another table": (["time_s,angle_deg", "0,1"], "not a DeepLabCut table"),
+        "another table": (["time_s,angle_deg", "0,1"], "not with scorer, bodyparts, coords"),
         "nothing": ([], "not a DeepLabCut table"),
         "frames backwards": ([*good[:3], good[4], good[3]], "does not number the frames"),
         "a far frame": ([*good[:4], "9999999" + good[4][1:]], "does not number the frames"),
@@ -257,9 +265,10 @@ def test_a_csv_that_is_no_table_of_tracks_is_one_line(tmp_path):
     }
     for lines, cause in cases.values():
         (tmp_path / "bad.csv").write_text("\n".join(lines) + "\n")
-        assert cause in refusal(tmp_path / "bad.csv")
+        assert cause in refusal(tmp_path / "bad.csv", read_as_deeplabcut)
+        refusal(tmp_path / "bad.csv")
     (tmp_path / "bad.csv").write_bytes(b"\xff\xfe\x00scorer")
-    assert "cannot be read as" in refusal(tmp_path / "bad.csv")
+    assert "cannot be read as CSV" in refusal(tmp_path / "bad.csv", read_as_deeplabcut)
     assert "No such file" in refusal(tmp_path / "not_there.csv")
     assert "no such file" in refusal(tmp_path / "not_there.h5")
 
