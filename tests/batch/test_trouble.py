@@ -109,11 +109,15 @@ def test_every_clip_that_takes_too_long_gives_one_line(tmp_path):
 
 
 def test_a_process_that_hangs_is_ended_by_its_time_limit(tmp_path):
-    lab, out, others = tiny_lab(tmp_path / "clips", ["a.avi"]), tmp_path / "out", set(children(os.getpid()))
+    lab, out = tiny_lab(tmp_path / "clips", ["a.avi"]), tmp_path / "out"
+    others = children(os.getpid())  # measuring processes that other tests share
+
+    def is_new(child):
+        return child not in others and "anglecam.batch.child" in command_line(child)
 
     def stop():
         # not before it runs its program: stopping a fork of this process before its exec would stop this process, too
-        while not (mine := [c for c in set(children(os.getpid())) - others if "anglecam.batch.child" in command_line(c)]):
+        while not (mine := [c for c in children(os.getpid()) if is_new(c)]):
             time.sleep(0.001)
         os.kill(mine[0], signal.SIGSTOP)
 
