@@ -109,7 +109,9 @@ def _first(error: ValidationError) -> str:
     unknown = [f for f in findings if f["type"] == "extra_forbidden"]
     finding = (unknown or findings)[0]
     types = {"literal['auto']", "float", *(section.__name__ for section in Declared.__subclasses__())}
-    key = ".".join(str(part)[:60] for part in finding["loc"] if part not in types)  # of a union, pydantic adds the type
+    # Of a union, pydantic adds the type, and its validators' names.
+    path = (str(part) for part in finding["loc"] if part not in types)
+    key = ".".join(part[:60] for part in path if not part.startswith("function-"))
     if unknown:
         return f"unknown key {key}"
     cause = finding["msg"].removeprefix("Value error, ").replace("tuple", "list")

@@ -35,6 +35,10 @@ from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, Background
 from anglecam.vision.stabilise.learn import learn_background
 
 
+_CLEAR = 2.0
+"""Ratio of the best score to the next best from which on the choice of the mark is clear."""
+
+
 def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | None = None) -> Detections:
     """Find the mark in every frame of a clip, and the pivot.
 
@@ -88,7 +92,7 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
             f"{path}: no pivot found: the mark's path is too short to determine its centre, and there is no round"
             " marker near it; declare it: pivot: {at: [x, y], sigma_px: s} in rig.yaml, also outside the picture"
         )
-    notes = [disagreement] if disagreement else []
+    notes = [note for note in (_choice(found, track), disagreement) if note]
     if shakes is not None:
         notes.append(
             f"the camera shakes by {_rms_shift(shakes):.2f} px RMS; this was measured on the background and corrected"
@@ -159,6 +163,20 @@ def _follow(
         found = replace(found, place_px=centred.rectify(lens.distort(found.place_px)))
         lens = centred
     return lens, track, marker, pivot, disagreement
+
+
+def _choice(found: FoundMark, track: MarkTrack) -> str | None:
+    """Return what was taken for the mark where that may be unexpected, ``None`` for a declared mark or a clear red one."""
+    if found.cue in ("declared", "pointed") or (found.cue == "red" and found.margin > _CLEAR):
+        return None
+    places = np.array(
+        [r.centre_px for r, s in zip(track.regions, track.status, strict=True) if r is not None and s == OK]
+    )
+    where = "" if not len(places) else " around {:.0f},{:.0f}".format(*np.median(places, axis=0))
+    rgb = ",".join(map(str, found.model.mean_rgb))
+    rival = "" if np.isinf(found.margin) else f"; its score is {found.margin:.1f} times that of the next best"
+    point = "" if found.margin > _CLEAR else "; if it is not, declare it: mark: {at: [x, y], frame: k} in rig.yaml"
+    return f"the mark is the thing of colour {rgb}{where}, found by how it moves{rival}{point}"
 
 
 def _unshaken(regions: Sequence[Region], move: CameraMove) -> list[Region]:

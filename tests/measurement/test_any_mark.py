@@ -9,7 +9,7 @@ from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.video.film import open_film
-from tests.support.things import ball, film, hanging, stick, wheel
+from support.things import ball, film, hanging, stick, wheel
 
 TIME = np.arange(50) / 30.0
 SWING = 22.0 * np.exp(-0.2 * TIME) * np.cos(2.0 * np.pi * TIME / 1.1)

@@ -25,7 +25,7 @@ from anglecam.vision.mark.cues import RED, Cue, declared_cue, moving_cues, point
 from anglecam.vision.mark.found_mark import FoundMark, Samples
 from anglecam.vision.mark.learn_colour import MIN_CONTRAST, is_same_colour, learn_colour
 from anglecam.vision.mark.segment import SMALLEST_SHARE, disc, find_regions
-from anglecam.vision.mark.track import follow_mark
+from anglecam.vision.mark.track import MarkTrack, follow_mark
 
 _LEVEL_SHARES = (0.3, 0.4, 0.5, 0.6, 0.7)
 """Thresholds for blobs, as shares of the way from the picture's usual contrast to its highest."""
@@ -36,6 +36,11 @@ _MAX_NOISE, _MAX_NOISE_DECLARED = 0.15, 0.4
 the colour is declared and the mark has it, the mark may stand out less, as brick-red lips on brown skin do."""
 _LEAST_SHARE = 0.3
 """Share of the samples in which the mark must be found again, whole and on its circle."""
+_LARGEST_SHARE = 0.06
+"""Share of the picture's area above which a region is no mark: the whole face, where a part of it was found first."""
+_STEADY = 20.0
+"""Travel, in units of the scatter around the circle, at which a mark's score is halved. Filmed marks reach hundreds,
+and ten where an undeclared tilt makes the circle an ellipse."""
 _COMPACT_SHARE = 0.9
 """Share of a blob into which the opening's disc fits; with less, a thread or a rod is attached to it. Of an ellipse
 three times as long as wide, as of lips, it is 0.98."""
@@ -105,7 +110,7 @@ def _mark_of_cue(cue: Cue, samples: Samples, near_px: Floats | None, at_rest: bo
             mark = FoundMark(model, *_typical(track), track.circle, cue.name, _opening(track, maps), track.score)
             if track.circle is None:
                 return mark
-            seen = _seen_again(mark, samples, hint)
+            seen = _seen_again(mark, cue, float(np.median(track.blobs.contrast[track.members])), samples, hint)
             if seen is not None:
                 return replace(seen, score=seen.score * _RED_PRIOR) if cue is RED else seen
     return None
@@ -143,7 +148,7 @@ def _opening(track: BlobTrack, maps: Sequence[NDArray[Any]]) -> int:
     return int(np.median(radii)) if np.median(shares) < _COMPACT_SHARE else 0
 
 
-def _seen_again(mark: FoundMark, samples: Samples, hint: Floats | None) -> FoundMark | None:
+def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hint: Floats | None) -> FoundMark | None:
     """Find the mark again by the colour that was learnt, as in the whole clip; ``None`` where it does not stay itself.
 
     The threshold that found the blobs may have cut off a part of the mark, or joined it to something. A disc that
@@ -161,14 +166,35 @@ def _seen_again(mark: FoundMark, samples: Samples, hint: Floats | None) -> Found
     if samples.pointed_px is not None:
         first = np.flatnonzero(blobs.frame == 0)
         through = first[_in_box(blobs.picture_px[first], samples.pointed_px, np.sqrt(mark.area_px2))]
-    track = moving_track(blobs, samples.images, 0.0, hint, on_body=False, through=through)
-    if track is None or track.circle is None:
-        return None
-    area, place = _typical(track)
-    mark = replace(mark, area_px2=area, place_px=place, circle=track.circle)
-    status = follow_mark(regions, samples.time, mark).status
-    share = status.count(OK) / len(status)
-    return replace(mark, score=mark.score * share**2) if share >= _LEAST_SHARE else None
+    best: FoundMark | None = None
+    for centre in (hint,) if hint is None else (hint, None):
+        track = moving_track(blobs, samples.images, 0.0, centre, on_body=cue.on_body, through=through)
+        if track is None or track.circle is None:
+            continue
+        area, place = _typical(track)
+        if area > _LARGEST_SHARE * samples.images[0].shape[0] * samples.images[0].shape[1]:
+            continue
+        again = replace(mark, area_px2=area, place_px=place, circle=track.circle)
+        followed = follow_mark(regions, samples.time, again)
+        share = followed.status.count(OK) / len(followed.status)
+        score = contrast * track.score * share**2 * _steadiness(followed, track.circle)
+        if share >= _LEAST_SHARE and (best is None or score > best.score):
+            best = replace(again, score=score)
+    return best
+
+
+def _steadiness(followed: MarkTrack, circle: tuple[Floats, float]) -> float:
+    """Return how far a mark travels relative to its scatter around the circle, from 0 for none to 1.
+
+    A patch of wallpaper whose outline comes and goes with the noise jitters but does not travel.
+    """
+    places = [r.centre_px for r, s in zip(followed.regions, followed.status, strict=True) if s == OK and r is not None]
+    if not places:
+        return 0.0
+    centre, radius = circle if followed.circle is None else (followed.circle.centre_px, followed.circle.radius_px)
+    off = np.hypot(*(np.array(places) - centre).T) - radius
+    travel = float(np.hypot(*np.ptp(places, axis=0)))
+    return travel / (travel + _STEADY * float(np.sqrt((off**2).mean())))
 
 
 def _contrast_range(maps: Sequence[NDArray[Any]], at_rest: bool) -> tuple[float, float]:

@@ -14,8 +14,9 @@ _MAX_RADIUS_SIGMA = 0.2
 """Relative uncertainty of the path's radius above which its centre alone is no pivot."""
 _DISAGREE = 9.21
 """99 % point of χ² with two degrees of freedom."""
-_MARKED = 0.5
-"""Probability, before looking, that a rig has a round marker on its pivot."""
+_MARKED, _NEARER = 0.4, 0.1
+"""Probabilities, before looking, that a rig has a round marker on its pivot, and that it has one which is nearer to the
+camera than the mark."""
 _CERTAIN = 0.99
 """Probability from which on a round thing counts as the pivot's marker."""
 
@@ -46,11 +47,11 @@ def combine_pivot(
     another round thing, such as a screw. With the density q of round things and N(S) the density of its distance from
     the pivot that motion or hint predict, for the covariance S of either case, the weights are::
 
-        ¼·N(C + C_marker),    ¼·N(C + C_marker + D),    q
+        0.4·N(C + C_marker),    0.1·N(C + C_marker + D),    q
 
-    with the covariance D of the displacement. Mean and covariance are those of the mixture. A screw near the
-    ill-determined centre of a short arc is thus an uncertain pivot, and a marker at the centre of a long arc a certain
-    one.
+    with the covariance D of the displacement. The pivot is that of the heaviest case, and its covariance is that of the
+    mixture around it. A screw near the ill-determined centre of a short arc is thus an uncertain pivot, and a marker at
+    the centre of a long arc a certain one.
 
     Parameters
     ----------
@@ -81,14 +82,14 @@ def combine_pivot(
         _case(expected, marker.centre_px, marker.covariance_px2),
         _case(expected, marker.centre_px, marker.covariance_px2 + D),
     ]
-    weight = np.array([_MARKED / 2.0 * case.density for case in cases] + [round_things_per_px2])
+    weight = np.array([_MARKED * cases[0].density, _NEARER * cases[1].density, round_things_per_px2])
     distance = float(np.hypot(*(marker.centre_px - expected.centre_px)))
     if min(case.away for case in cases) > _DISAGREE or weight.sum() == 0.0:
         return expected, _disagreement(expected, marker, distance)
     weight /= weight.sum()
     means = np.array([*(case.centre_px for case in cases), expected.centre_px])
     covariances = np.array([*(case.covariance_px2 for case in cases), expected.covariance_px2])
-    centre = weight @ means
+    centre = means[np.argmax(weight)]
     off = means - centre
     covariance = np.einsum("k,kij->ij", weight, covariances) + np.einsum("k,ki,kj->ij", weight, off, off)
     note = None
