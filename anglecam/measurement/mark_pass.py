@@ -34,7 +34,6 @@ from anglecam.vision.pivot.marker import RoundMarker
 from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
 from anglecam.vision.stabilise.learn import learn_background
 
-
 _CLEAR = 2.0
 """Ratio of the best score to the next best from which on the choice of the mark is clear."""
 
@@ -166,7 +165,7 @@ def _follow(
 
 
 def _choice(found: FoundMark, track: MarkTrack) -> str | None:
-    """Return what was taken for the mark where that may be unexpected, ``None`` for a declared mark or a clear red one."""
+    """Return what was taken for the mark; ``None`` for a declared mark or a clear red one."""
     if found.cue in ("declared", "pointed") or (found.cue == "red" and found.margin > _CLEAR):
         return None
     places = np.array(
