@@ -46,47 +46,50 @@ def decode(path: Path) -> Iterator[Row]:
         size, or the film has no frame, more frames than `MOST_FRAMES` or a longer duration than `LONGEST_S`.
     """
     with open_container(path) as container:
-        stream = container.streams.video[0]
-        decoder = stream.codec_context
-        decoder.thread_type = "SLICE"
-        decoder.thread_count = native_threads()
-        base = float(stream.time_base or 0.0)
-        is_avi = container.format.name == "avi"
-        stamps = CountedStamps(decoder) if is_avi else PresentationStamps()
-        one_size = OneSize(path, (stream.width, stream.height))  # saved, because the decoder's changes with the film
-        first: int | None = None
-        last: int | None = None
+        yield from decode_container(path, container)
 
-        def row(stamp: int, picture: av.VideoFrame | None) -> Row:
-            nonlocal first, last
-            first = stamp if first is None else first
-            if last is not None and stamp <= last:
-                raise InputError(f"{path}: timestamps do not increase at {stamp * base:g} s")
-            if (stamp - first) * base > LONGEST_S:
-                raise InputError(
-                    f"{path}: frames at {first * base:g} s and at {stamp * base:g} s; a week is the longest"
-                )
-            last = stamp
-            return stamp * base, picture
 
-        for number, (packet, pictures) in enumerate(_packets(path, container, stream, is_avi)):
-            if number > MOST_FRAMES:
-                raise InputError(f"{path}: more than {MOST_FRAMES:,} frames are not read")
-            if not packet.is_discard:
-                stamps.expect(packet, is_lost=packet.is_corrupt or pictures is None)
-            for picture in pictures or ():
-                lost, stamp, intact = stamps.place(picture)
-                for one in lost:
-                    yield row(one, None)
-                if stamp is None:
-                    raise InputError(f"{path}: frames without timestamps")
-                fits = one_size.allows(picture, stamp * base)
-                yield row(stamp, picture if fits and intact and not picture.is_corrupt else None)
-        for one in stamps.left():
-            yield row(one, None)
-        if last is None:
-            cut = is_cut_short(path)
-            raise InputError(f"{path}: truncated before its first frame" if cut else f"{path}: no frames in it")
+def decode_container(path: Path, container: av.container.InputContainer) -> Iterator[Row]:
+    """Yield the rows of a film that is open, and of which nothing was decoded; see `decode`."""
+    stream = container.streams.video[0]
+    decoder = stream.codec_context
+    decoder.thread_type = "SLICE"
+    decoder.thread_count = native_threads()
+    base = float(stream.time_base or 0.0)
+    is_avi = container.format.name == "avi"
+    stamps = CountedStamps(decoder) if is_avi else PresentationStamps()
+    one_size = OneSize(path, (stream.width, stream.height))  # saved, because the decoder's changes with the film
+    first: int | None = None
+    last: int | None = None
+
+    def row(stamp: int, picture: av.VideoFrame | None) -> Row:
+        nonlocal first, last
+        first = stamp if first is None else first
+        if last is not None and stamp <= last:
+            raise InputError(f"{path}: timestamps do not increase at {stamp * base:g} s")
+        if (stamp - first) * base > LONGEST_S:
+            raise InputError(f"{path}: frames at {first * base:g} s and at {stamp * base:g} s; a week is the longest")
+        last = stamp
+        return stamp * base, picture
+
+    for number, (packet, pictures) in enumerate(_packets(path, container, stream, is_avi)):
+        if number > MOST_FRAMES:
+            raise InputError(f"{path}: more than {MOST_FRAMES:,} frames are not read")
+        if not packet.is_discard:
+            stamps.expect(packet, is_lost=packet.is_corrupt or pictures is None)
+        for picture in pictures or ():
+            lost, stamp, intact = stamps.place(picture)
+            for one in lost:
+                yield row(one, None)
+            if stamp is None:
+                raise InputError(f"{path}: frames without timestamps")
+            fits = one_size.allows(picture, stamp * base)
+            yield row(stamp, picture if fits and intact and not picture.is_corrupt else None)
+    for one in stamps.left():
+        yield row(one, None)
+    if last is None:
+        cut = is_cut_short(path)
+        raise InputError(f"{path}: truncated before its first frame" if cut else f"{path}: no frames in it")
 
 
 class OneSize:

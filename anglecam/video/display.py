@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from pathlib import Path
+from typing import Any
 
 import av
 import cv2
@@ -19,6 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from anglecam.data.typing import Floats, Image
+from anglecam.errors import InputError
+from anglecam.video.container import LONGEST_SIDE, MOST_PIXELS
 
 SQUARE = Fraction(1)
 _NOT_STRAIGHT = 1e-3
@@ -111,11 +115,13 @@ class Display:
         return (-row_time_s if self.upside_down else row_time_s) / self.stretch[1]
 
 
-def read_display(picture: av.VideoFrame, pixel_aspect: Fraction | None) -> Display:
-    """Read how a player shows a picture.
+def read_display(path: Path, picture: av.VideoFrame, pixel_aspect: Fraction | None) -> Display:
+    """Read how a player shows the pictures of a film.
 
     Parameters
     ----------
+    path : Path
+        The film, for messages.
     picture : VideoFrame
         A decoded picture of the film.
     pixel_aspect : Fraction or None
@@ -128,8 +134,9 @@ def read_display(picture: av.VideoFrame, pixel_aspect: Fraction | None) -> Displ
 
     Raises
     ------
-    ValueError
+    InputError
         Where the display matrix turns by another angle than a multiple of 90°: players differ in what they show then.
+        Also where square pixels would make the picture larger than `anglecam.video.container` allows.
     """
     size = (picture.width, picture.height)
     aspect = pixel_aspect or SQUARE
@@ -139,15 +146,21 @@ def read_display(picture: av.VideoFrame, pixel_aspect: Fraction | None) -> Displ
     lengths = np.hypot(*turn.T)[:, None]
     straight = np.round(turn / np.where(lengths > 0.0, lengths, 1.0))
     if (np.abs(straight).sum(axis=0) != 1).any() or (np.abs(turn - straight * lengths) > _NOT_STRAIGHT * lengths).any():
-        raise ValueError("players turn its picture by an angle that is not a multiple of 90°, or distort it")
-    transposed = straight[0, 0] == 0.0
-    return Display(size, aspect, transposed, *(bool(axis < 0.0) for axis in straight.sum(axis=1)))
+        raise InputError(
+            f"{path}: it is to be shown turned by an angle that is no multiple of 90°; turn the film itself"
+        )
+    transposed = bool(straight[0, 0] == 0.0)
+    display = Display(size, aspect, transposed, *(bool(axis < 0.0) for axis in straight.sum(axis=1)))
+    width, height = display.size
+    if max(width, height) > LONGEST_SIDE or width * height > MOST_PIXELS:
+        raise InputError(f"{path}: its pixels of {aspect} make pictures of {width} × {height} px, which are not read")
+    return display
 
 
 def _display_matrix(picture: av.VideoFrame) -> Floats:
     """Return the picture's display matrix, (9,); the identity where it has none."""
     try:
-        matrix = picture.side_data.get("DISPLAYMATRIX")
+        matrix: Any = picture.side_data.get("DISPLAYMATRIX")
     except ValueError:
         # PyAV cannot list the side data of a picture that has a kind unknown to it: EXIF, in JPEG. What it reads of
         # the orientation is the turn; an EXIF orientation that mirrors is not written by cameras.

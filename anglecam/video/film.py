@@ -9,9 +9,9 @@ again for every reading.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from fractions import Fraction
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
@@ -23,8 +23,8 @@ from anglecam.data.typing import Floats, Image
 from anglecam.errors import InputError, RigError
 from anglecam.io.numbered_images import find_numbered_images
 from anglecam.io.rig import RigFrames
-from anglecam.video.container import LONGEST_SIDE, MOST_PIXELS, open_container
-from anglecam.video.decode import Row, decode, to_brightness, to_colours
+from anglecam.video.container import open_container
+from anglecam.video.decode import Row, decode, decode_container, to_brightness, to_colours
 from anglecam.video.display import Display, read_display
 from anglecam.video.fields import fill_rows, first_field, is_bottom_first
 from anglecam.video.images import decode_images
@@ -88,6 +88,8 @@ class Film:
     """Whether colour is stored at a lower resolution than brightness."""
     cut_short: bool
     """Whether bytes are missing at the end of the file."""
+    decode: Callable[[], Iterator[Row]] = field(repr=False)
+    """Decodes all its rows from the start, because seeking may end on a wrong frame."""
     bottom_first: bool = False
     """Whether the second line of an interlaced picture belongs to its first field."""
     wanted: RigFrames = field(default_factory=RigFrames)
@@ -241,9 +243,9 @@ class Film:
         memory.rows = rows if room >= 0 else None
 
     def _decoded(self) -> Iterator[Row]:
-        """Decode the film from its start, because seeking may end on a wrong frame, and yield the wanted rows."""
+        """Decode the wanted rows."""
         stop = None if self.wanted.last is None else self.wanted.last + 1
-        return islice(_decode(self.path, self.wanted), self.first_frame, stop)
+        return islice(self.decode(), self.first_frame, stop)
 
 
 def open_film(path: Path, frames: RigFrames | None = None) -> Film:
@@ -270,53 +272,51 @@ def open_film(path: Path, frames: RigFrames | None = None) -> Film:
         Where numbered pictures have no declared rate, or a film has one besides its time stamps.
     """
     wanted = RigFrames() if frames is None else frames
-    picture = next((picture for _, picture in _decode(path, wanted) if picture is not None), None)
     if path.is_dir():
-        assert picture is not None  # else its decoder has raised
-        display = _display_of(path, picture, None, (picture.width, picture.height))
-        kind = next(iter(find_numbered_images(path).values())).suffix[1:].lower()
-        return Film(path, display, 0, kind, _has_coarse_colour(picture.format), False, wanted=wanted)
+        return _open_images(path, wanted)
+    if wanted.rate_hz is not None:
+        raise RigError(f"{path}: frames: {{rate_hz}} is for numbered pictures; a film has time stamps of its own")
     with open_container(path) as container:
         stream = container.streams.video[0]
-        decoder = stream.codec_context
+        codec = stream.codec_context.name
+        size = stream.width, stream.height
+        coarse_colour = _has_coarse_colour(stream.codec_context.format)
+        declared = _declared_frames(container, stream)
+        picture = _first_picture(decode_container(path, container))
         return Film(
             path=path,
-            display=_display_of(path, picture, stream.sample_aspect_ratio, (stream.width, stream.height)),
-            declared_frames=_declared_frames(container, stream),
-            codec=decoder.name,
-            coarse_colour=_has_coarse_colour(decoder.format),
+            display=Display(size) if picture is None else read_display(path, picture, stream.sample_aspect_ratio),
+            declared_frames=declared,
+            codec=codec,
+            coarse_colour=coarse_colour,
             cut_short=is_cut_short(path),
-            bottom_first=is_bottom_first(decoder.field_order),
+            decode=partial(decode, path),
+            bottom_first=is_bottom_first(stream.codec_context.field_order),
             wanted=wanted,
         )
 
 
-def _decode(path: Path, frames: RigFrames) -> Iterator[Row]:
-    """Return the rows of a film, or of a folder of numbered pictures."""
-    if not path.is_dir():
-        if frames.rate_hz is not None:
-            raise RigError(f"{path}: frames: {{rate_hz}} is for numbered pictures; a film has time stamps of its own")
-        return decode(path)
-    images = find_numbered_images(path)
-    if frames.rate_hz is None:
-        raise RigError(f"{path}: numbered pictures have no times: declare frames: {{rate_hz: …}} in rig.yaml")
-    return decode_images(path, images, frames.rate_hz)
+def _open_images(folder: Path, wanted: RigFrames) -> Film:
+    images = find_numbered_images(folder)
+    if wanted.rate_hz is None:
+        raise RigError(f"{folder}: numbered pictures have no times: declare frames: {{rate_hz: …}} in rig.yaml")
+    decode_all = partial(decode_images, folder, images, wanted.rate_hz)
+    picture = _first_picture(decode_all())
+    assert picture is not None  # else its decoder has raised
+    return Film(
+        path=folder,
+        display=read_display(folder, picture, None),
+        declared_frames=0,
+        codec=images[min(images)].suffix[1:].lower(),
+        coarse_colour=_has_coarse_colour(picture.format),
+        cut_short=False,
+        decode=decode_all,
+        wanted=wanted,
+    )
 
 
-def _display_of(
-    path: Path, picture: av.VideoFrame | None, aspect: Fraction | None, stored_size: tuple[int, int]
-) -> Display:
-    """Return how a film is shown; as it is stored where no picture of it can be decoded."""
-    if picture is None:
-        return Display(stored_size)
-    try:
-        display = read_display(picture, aspect)
-    except ValueError as error:
-        raise InputError(f"{path}: {error}; turn the film itself") from error
-    width, height = display.size
-    if max(width, height) > LONGEST_SIDE or width * height > MOST_PIXELS:
-        raise InputError(f"{path}: its pixels of {aspect} make pictures of {width} × {height} px; they are not read")
-    return display
+def _first_picture(rows: Iterator[Row]) -> av.VideoFrame | None:
+    return next((picture for _, picture in rows if picture is not None), None)
 
 
 def _declared_frames(container: av.container.InputContainer, stream: av.VideoStream) -> int:
