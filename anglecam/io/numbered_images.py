@@ -22,7 +22,7 @@ def find_numbered_images(folder: Path) -> dict[int, Path]:
     Parameters
     ----------
     folder : Path
-        A folder. Files that are no pictures, or whose names do not end in a number, are left out.
+        A folder. Hidden files, and files that are no pictures or whose names do not end in a number, are left out.
 
     Returns
     -------
@@ -40,7 +40,7 @@ def find_numbered_images(folder: Path) -> dict[int, Path]:
         raise InputError(f"{folder}: no numbered pictures in this folder")
     if len(series) > 1:
         one, other = sorted(series)[:2]
-        raise InputError(f"{folder}: pictures of several series ({one}…, {other}…); give each series its own folder")
+        raise InputError(f"{folder}: pictures of several series ({one}, {other}); give each series its own folder")
     images = sorted(*series.values(), key=lambda image: image[0])
     found = dict(images)
     if len(found) < len(images):
@@ -56,6 +56,7 @@ def _series(folder: Path) -> dict[str, list[tuple[int, Path]]]:
     found: dict[str, list[tuple[int, Path]]] = {}
     for path in folder.iterdir():
         named = _NUMBERED.fullmatch(path.stem)
-        if named is not None and path.suffix.lower() in IMAGE_ENDINGS and path.is_file():
+        is_image = path.suffix.lower() in IMAGE_ENDINGS and not path.name.startswith(".")
+        if named is not None and is_image and path.is_file():
             found.setdefault(f"{named['series']}*{path.suffix}", []).append((int(named["number"]), path))
     return found

@@ -55,15 +55,12 @@ def fill_rows(field: Image, height: int, bottom_first: bool) -> Image:
     ndarray
         (height, width, planes) bytes; the rows of the lines are unchanged.
     """
-    one = np.ones(1)
-    # the anchor is the line below the row in between, and the line above it where the field starts with row 0
-    below = 3 if bottom_first else 2
-    between = cv2.sepFilter2D(field, -1, one, _BETWEEN, anchor=(0, below), borderType=cv2.BORDER_REPLICATE)
-    between = between.reshape(field.shape)
+    longer = np.concatenate([field, field[-1:]])  # for a row below the last line
+    # the anchor is the line above the row in between, or the line below it where the field starts with row 1
+    anchor = (0, 3 if bottom_first else 2)
+    between = cv2.sepFilter2D(longer, -1, np.ones(1), _BETWEEN, anchor=anchor, borderType=cv2.BORDER_REPLICATE)
     picture = np.empty((height, *field.shape[1:]), np.uint8)
     lines, others = (1, 0) if bottom_first else (0, 1)
     picture[lines::2] = field
-    picture[others::2] = between[: len(picture[others::2])]
-    if len(picture[others::2]) > len(between):  # an odd height ends with a row of the other field
-        picture[-1] = field[-1]
+    picture[others::2] = between.reshape(longer.shape)[: len(picture[others::2])]
     return picture
