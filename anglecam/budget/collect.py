@@ -58,7 +58,7 @@ def error_sources(measured: Measurement, rig: Rig) -> ErrorSources:
             angles, angles.registered, rows, neutral, mirrored
         )
     return ErrorSources(
-        frame=rows[kept],
+        frame=rows[kept] + series.first_frame,
         time=series.time[rows][kept],
         angle=angles.line[kept] - angles.neutral,
         line=angles.line[kept],

@@ -10,6 +10,29 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from anglecam.errors import RigError
+from anglecam.io.rig import Rig
+from anglecam.video.film import Film
+
+
+def rig_as_shown(rig: Rig, film: Film) -> Rig:
+    """Return a rig whose ``row_time_s`` counts the rows of the picture as a player shows it, not those of the sensor.
+
+    Raises
+    ------
+    RigError
+        Where it is declared, but the rows of the sensor are shown as columns.
+    """
+    if rig.camera.row_time_s is None:
+        return rig
+    shown = film.display.shown_row_time(rig.camera.row_time_s)
+    if shown is None:
+        raise RigError(
+            f"{film.path}: camera: {{row_time_s}}: players turn this film by 90°, so the rows of its sensor are columns"
+            " of the picture; a rolling shutter is corrected along rows only"
+        )
+    return rig.model_copy(update={"camera": rig.camera.model_copy(update={"row_time_s": shown})})
+
 
 def measurement_time(
     time: ArrayLike, mark_y_px: ArrayLike, height: int, row_time_s: float | None

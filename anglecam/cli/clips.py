@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from anglecam.cli.options import Out, RigFile
+from anglecam.cli.options import FirstFrame, LastFrame, Out, RigFile
 from anglecam.cli.progress import end, progress_bars
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.io.netcdf_parquet import Also
-from anglecam.io.rig import Rig, read_rig
-from anglecam.io.session import find_clips, find_measurable, recording_name, rig_beside
+from anglecam.io.rig import Rig, RigFrames, read_rig
+from anglecam.io.session import find_clips, find_measurable, is_film_of_images, recording_name, rig_beside
 from anglecam.io.tracks.files import tracker_names
 from anglecam.terminal import errors, make_folder, screen
 
@@ -35,6 +35,8 @@ def measure(
     ],
     out: Out,
     rig: RigFile = None,
+    first: FirstFrame = None,
+    last: LastFrame = None,
     overlay: Annotated[bool, typer.Option("--overlay", help="Also write NAME.overlay.mp4.")] = False,
     also: Annotated[
         list[Also] | None, typer.Option("--also", help="Also write NAME.angles.nc or .parquet; repeatable.")
@@ -53,7 +55,7 @@ def measure(
         if name in names:
             raise InputError(f"{clip}: {names[name]} has the same name; measure them to separate folders")
         names[name] = clip
-        source = open_source(clip, declared)
+        source = open_source(clip, declared, (first, last))
         measurement = _measure(source, bars)
         answers = write_measurement(measurement, source.command, out, also or ())
         if answers:
@@ -75,6 +77,8 @@ def budget(
     clips: Annotated[list[Path], typer.Argument(metavar="CLIP", help="Clips, or folders of clips.")],
     out: Out,
     rig: RigFile = None,
+    first: FirstFrame = None,
+    last: LastFrame = None,
 ) -> None:
     """Write the budget of the angle's uncertainty: NAME.budget.json and a page for each clip."""
     from anglecam.measurement.clip import Measurement
@@ -84,7 +88,7 @@ def budget(
     declared = read_rig(rig) if rig else None
 
     def budget_one(clip: Path, bars: Progress) -> Measurement | MeasuredTracks:
-        source = open_source(clip, declared)
+        source = open_source(clip, declared, (first, last))
         if source.is_tracks or source.film is None:
             raise InputError(f"{clip}: a budget needs the pictures; give the clip")
         measurement = _measure(source, bars)
@@ -112,7 +116,9 @@ def calibrate(
         raise RigError(f"--board {board}: give the number of inner corners, such as 9x6") from None
     make_folder(out)
     with blame(clip):
-        found = calibrate_clip(open_film(clip), (columns, rows))
+        # the times of photographs of the board do not matter
+        film = open_film(clip, RigFrames(rate_hz=1.0) if clip.is_dir() else None)
+        found = calibrate_clip(film, (columns, rows))
     write_calibration(found.calibration, out / f"{clip.stem}.calibration.yaml")
     plot_calibration(found, out / f"{clip.stem}.calibration.png", clip.name)
     terms = ", ".join(found.terms) or "no distortion"
@@ -148,7 +154,7 @@ def _expand(
 ) -> Iterator[Path]:
     for path in paths:
         if path.is_dir():
-            found = list_folder(path)
+            found = list_folder(path) or ([path] if is_film_of_images(path) else [])
             if not found:
                 problems.append(InputError(f"{path}: no clip in this folder"))
             yield from found

@@ -58,6 +58,8 @@ class AngleSeries:
     """(n, 2) position of the pivot, px."""
     bounds: dict[float, Floats] = field(default_factory=dict)
     """Worst-case angle error, rad, for a mark anywhere within the radius (the key), px."""
+    first_frame: int = 0
+    """Number in the film of the first row's frame; the others follow without a gap."""
     evidence: CameraEvidence = NO_EVIDENCE
     """Evidence of the film besides the angle; empty for a series without a film."""
 

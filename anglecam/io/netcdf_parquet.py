@@ -157,6 +157,7 @@ def read_netcdf(path: Path) -> AngleSeries:
         mark_px=exact.get("mark_px"),
         pivot_px=exact.get("pivot_px"),
         bounds={float(r): exact["bounds"][i] for i, r in enumerate(exact["radius"])},
+        first_frame=int(stated.get("first_frame", 0)),
         evidence=evidence,
     )
 
@@ -173,6 +174,7 @@ def _write_exact(group: Any, series: AngleSeries) -> None:
     for name in ("mark_px", "pivot_px"):
         if getattr(series, name) is not None:
             group.create_variable(name, ("time", "space"), "f8", data=getattr(series, name))
+    group.attrs["first_frame"] = np.int64(series.first_frame)
     group.attrs["name"] = np.frombuffer(os.fsencode(series.name), np.uint8)  # a file's name need not be valid text
     for field in fields(series.evidence):
         value = getattr(series.evidence, field.name)

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from anglecam.io.yaml_schema import Declared, Finite, Positive, read_declared
 
 Byte = Annotated[int, Field(ge=0, le=255)]
+FrameNumber = Annotated[int, Field(ge=0, le=10**9)]
 SlantDeg = Annotated[float, Field(gt=-80, lt=80, allow_inf_nan=False)]
 
 
@@ -93,6 +94,30 @@ class RigCamera(Declared):
         return self
 
 
+class RigFrames(Declared):
+    """Which frames of a film are measured, and the rate of numbered pictures.
+
+    Examples
+    --------
+    >>> frames = RigFrames.model_validate({"from": 30, "to": 149})
+    >>> frames.first, frames.last
+    (30, 149)
+    """
+
+    first: FrameNumber | None = Field(default=None, alias="from")
+    """Number of the first frame that is measured; the film's first frame has 0."""
+    last: FrameNumber | None = Field(default=None, alias="to")
+    """Number of the last frame that is measured."""
+    rate_hz: Positive | None = None
+    """Pictures per second, for a folder of numbered pictures, which have no time stamps."""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> RigFrames:
+        if self.last is not None and self.last < (self.first or 0):
+            raise ValueError(f"to: {self.last} comes before from: {self.first}")
+        return self
+
+
 class RigSync(Declared):
     """What relates the command's clock to the clip's clock."""
 
@@ -159,6 +184,8 @@ class Rig(Declared):
     held_out: tuple[str, ...] = ()
     """Names of the recordings that are only predicted and never fitted to."""
     camera: RigCamera = RigCamera()
+    frames: RigFrames = RigFrames()
+    """Which frames of a film are measured."""
     marks: RigKeypoints | None = None
     """For sessions whose recordings are tracks of points."""
     sync: RigSync = RigSync()

@@ -59,7 +59,8 @@ def series_columns(series: AngleSeries) -> dict[str, NDArray]:
     bounds = {r: np.degrees(series.bounds.get(r, empty[:, 0])) for r in (*CONTRACT_RADII_PX, *further)}
     angle, sigma = np.degrees(series.angle), np.degrees(series.sigma)
     contract_bounds = [bounds[r] for r in CONTRACT_RADII_PX]
-    cells = [np.arange(n), series.time, angle, sigma, *contract_bounds, np.degrees(line), *mark.T, *pivot.T]
+    frame = np.arange(n) + series.first_frame
+    cells = [frame, series.time, angle, sigma, *contract_bounds, np.degrees(line), *mark.T, *pivot.T]
     columns = dict(zip(SERIES_COLUMNS, [*cells, np.array(series.status, dtype=str)], strict=True))
     return columns | {f"bound_{r:g}px_deg": bounds[r] for r in further}
 
@@ -105,7 +106,16 @@ def read_series(path: Path) -> AngleSeries:
     }
     line = np.radians(table["line_deg"]) if "line_deg" in table else None
     name = path.name.removesuffix(".csv").removesuffix(".angles")
-    return AngleSeries(name, time, angle, sigma, status, line, points.get("mouth"), points.get("pivot"))
+    first = _first_frame(table.get("frame"))
+    return AngleSeries(
+        name, time, angle, sigma, status, line, points.get("mouth"), points.get("pivot"), first_frame=first
+    )
+
+
+def _first_frame(numbers: NDArray | None) -> int:
+    """Return the first of numbers that count frames one by one, else 0."""
+    counts = numbers is not None and np.isfinite(numbers).all() and (np.diff(numbers) == 1.0).all()
+    return int(numbers[0]) if counts and numbers is not None and numbers[0] == np.floor(numbers[0]) else 0
 
 
 def _cell(column: str, value: Any) -> str:

@@ -13,10 +13,11 @@ from pathlib import Path
 from anglecam.data.command import Command
 from anglecam.errors import InputError, RigError
 from anglecam.io.command_csv import COMMAND_ENDING, read_command
+from anglecam.io.numbered_images import has_numbered_images
 from anglecam.io.rig import Rig, read_rig
 from anglecam.io.tracks.files import TRACKS_ENDINGS, find_tracks, name_by_tool
 
-CLIP_ENDINGS = (".avi", ".mp4", ".mkv", ".mov")
+CLIP_ENDINGS = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".webm")
 SERIES_ENDING = ".angles.csv"
 CORRECTED = "corrected"
 """Folder, within a session's results, of the series with the effects of the camera removed."""
@@ -58,12 +59,17 @@ class Session:
 
 def command_beside(source: Path) -> Command | None:
     """Read the command file in a recording's folder that has its name; ``None`` if there is none."""
-    path = source.with_name(recording_name(source) + COMMAND_ENDING)
+    path = (source.resolve() if source.is_dir() else source).with_name(recording_name(source) + COMMAND_ENDING)
     return read_command(path) if path.exists() else None
 
 
 def recording_name(source: Path) -> str:
-    """Return a recording's name: its file's name without the ending, and for tracks without the program's additions."""
+    """Return a recording's name: its file's name without the ending, and for tracks without the program's additions.
+
+    A folder of numbered pictures gives them its name.
+    """
+    if source.is_dir():
+        return source.resolve().name
     if source.name.endswith(SERIES_ENDING):
         return source.name.removesuffix(SERIES_ENDING)
     if source.suffix.lower() not in TRACKS_ENDINGS:
@@ -87,9 +93,20 @@ def _name_beside(tracks: Path) -> str:
 
 
 def rig_beside(source: Path) -> Rig:
-    """Read ``rig.yaml`` in the folder of ``source``, or in ``source`` if it is a folder; without it, the defaults."""
-    path = (source if source.is_dir() else source.parent) / "rig.yaml"
-    return read_rig(path) if path.exists() else Rig()
+    """Read ``rig.yaml`` in the folder of ``source``, or in ``source`` if it is a folder; without it, the defaults.
+
+    Of a folder of numbered pictures both are tried, because it is a clip and a folder.
+    """
+    folders = [source, source.resolve().parent] if source.is_dir() else [source.parent]
+    if source.is_dir() and not is_film_of_images(source):
+        folders.pop()
+    path = next((folder / "rig.yaml" for folder in folders if (folder / "rig.yaml").exists()), None)
+    return Rig() if path is None else read_rig(path)
+
+
+def is_film_of_images(folder: Path) -> bool:
+    """Return whether a folder is one clip: it holds numbered pictures, and no films."""
+    return not find_clips(folder) and has_numbered_images(folder)
 
 
 def clip_beside(tracks: Path) -> Path | None:

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.camera.shutter import measurement_time
+from anglecam.camera.shutter import measurement_time, rig_as_shown
 from anglecam.data.camera_evidence import CameraEvidence
 from anglecam.data.command import Command
 from anglecam.data.series import OK, AngleSeries
@@ -54,8 +54,8 @@ class Measurement:
     clock: str | None
     """Message where the lamp shows an offset between the command's clock and the clip's, or is not seen."""
 
-    display: str | None = None
-    """Message where players rotate the stored picture."""
+    interlaced: str | None = None
+    """Message where frames show two instants, of which one is measured."""
 
     @property
     def pivot(self) -> str:
@@ -78,7 +78,7 @@ class Measurement:
     def notes(self) -> tuple[str, ...]:
         """Messages to the user, a line each."""
         coarse = () if self.why_coarse is None else (f"measured on the {self.by} alone: {self.why_coarse}",)
-        found = (note for note in (self.display, self.zero, self.clock) if note is not None)
+        found = (note for note in (self.interlaced, self.zero, self.clock) if note is not None)
         return (*self.detections.notes, *coarse, *found)
 
     @property
@@ -106,13 +106,14 @@ def measure_clip(
     Returns
     -------
     Measurement
-        Its series has a row for every frame of the file, measured or not.
+        Its series has a row for every frame of the film that the rig wants, measured or not.
 
     Raises
     ------
     InputError
         Where the file cannot be read, or no frame of it can be measured: one line with file, count and cause.
     """
+    rig = rig_as_shown(rig, film)
     changes = command is not None and command.first_change() is not None
     lamp = see_lamp(film, rig) if changes else None
     offset = offset_of(command, lamp)
@@ -148,13 +149,17 @@ def measure_clip(
     series = _series(film.path, rig, time, detections, ok, angles, lamp)
     zero = why_zero_is_elsewhere(rig, command, time[ok])
     dark = changes and lamp is None and rig.sync.lamp is not None
-    return Measurement(series, detections, angles, why_coarse, zero, DARK if dark else note_on(offset), _display(film))
+    return Measurement(
+        series, detections, angles, why_coarse, zero, DARK if dark else note_on(offset), _interlaced(film)
+    )
 
 
-def _display(film: Film) -> str | None:
-    turn = film.rotation_deg
+def _interlaced(film: Film) -> str | None:
+    count = film.interlaced
     return (
-        f"players rotate this film by {turn}°; all pixels and angles are those of the stored picture" if turn else None
+        f"{count} frames are interlaced: of their two instants the first is measured, on half of the rows"
+        if count
+        else None
     )
 
 

@@ -86,11 +86,13 @@ def frame_of_mark(film: Film, mark: RigMark) -> Frame:
     Raises
     ------
     InputError
-        Where the film does not have that frame, or it cannot be decoded.
+        Where the film does not have that frame, the rig leaves it out, or it cannot be decoded.
     """
-    found = next((frame for frame in film.frames() if frame.index == mark.frame), None)
+    found = next((frame for frame in film.frames() if film.first_frame + frame.index == mark.frame), None)
     if found is None:
-        raise InputError(f"{film.path}: the mark is declared in frame {mark.frame}, which the film does not have")
+        left_out = film.wanted.first is not None or film.wanted.last is not None
+        why = "is not among the frames that are measured" if left_out else "the film does not have"
+        raise InputError(f"{film.path}: the mark is declared in frame {mark.frame}, which {why}")
     if found.image is None:
         raise InputError(f"{film.path}: the mark is declared in frame {mark.frame}, which cannot be decoded")
     return found

@@ -69,6 +69,7 @@ def series_of_angles(
         line=lines,
         mark_px=np.where(measured[:, None], mark_px, np.nan),
         pivot_px=np.where(measured[:, None], pivot_px, np.nan),
+        first_frame=rig.frames.first or 0,
         evidence=evidence,
         bounds={r: worst_case(r, levers) for r in {*CONTRACT_RADII_PX, *rig.pixel_error_px}},
     )

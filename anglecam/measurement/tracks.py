@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.camera.lens import lens_from_rig
-from anglecam.camera.shutter import measurement_time
+from anglecam.camera.shutter import measurement_time, rig_as_shown
 from anglecam.data.camera_evidence import CameraEvidence
 from anglecam.data.command import Command
 from anglecam.data.series import OK, AngleSeries
@@ -105,6 +105,7 @@ def measure_tracks(path: Path, rig: Rig, command: Command | None = None, *, film
     RigError
         Where the rig does not declare which points are mark and pivot.
     """
+    rig = rig if film is None else rig_as_shown(rig, film)
     marks, points = _read_points(path, rig, film)
     mark, pivot, size = points.mark_px, points.pivot_px, points.size
     seen, based = np.isfinite(mark[:, 0]), np.isfinite(pivot[:, 0])
@@ -143,8 +144,11 @@ def _read_points(path: Path, rig: Rig, film: Film | None) -> tuple[RigKeypoints,
         )
     least = tracks.usual_limit if marks.least_likelihood is None else marks.least_likelihood
     pair = choose_pair(tracks, marks.mouth, marks.pivot, least)
-    rows = len(pair.mark_px)
-    both = int(np.isfinite(pair.mark_px + pair.pivot_px).all(axis=1).sum())
+    first = rig.frames.first or 0
+    wanted = slice(first, None if rig.frames.last is None else rig.frames.last + 1)
+    mark, pivot = pair.mark_px[wanted], pair.pivot_px[wanted]
+    rows = len(mark)
+    both = int(np.isfinite(mark + pivot).all(axis=1).sum())
     if both < _LEAST_FRAMES:
         raise InputError(
             f"{path}: {marks.mouth} and {marks.pivot} are both present in only {both} of {rows} frames (likelihood at"
@@ -154,6 +158,7 @@ def _read_points(path: Path, rig: Rig, film: Film | None) -> tuple[RigKeypoints,
     size = None
     if film is not None:
         size, time = film.size, film.times
+        mark, pivot = film.display.square(mark), film.display.square(pivot)
         undecodable = film.undecodable
         if rows > len(time):
             raise InputError(
@@ -169,9 +174,9 @@ def _read_points(path: Path, rig: Rig, film: Film | None) -> tuple[RigKeypoints,
     elif rig.camera.calibration is not None or rig.camera.row_time_s is not None:
         raise InputError(f"{path}: calibration and row_time_s need the clip in the folder of the tracks, for its size")
     else:
-        time = np.arange(rows) / marks.rate_hz
+        time = np.arange(first, first + rows) / marks.rate_hz
     missing = ((0, len(time) - rows), (0, 0))
-    mark, pivot = (np.pad(places, missing, constant_values=np.nan) for places in (pair.mark_px, pair.pivot_px))
+    mark, pivot = (np.pad(places, missing, constant_values=np.nan) for places in (mark, pivot))
     return marks, _Points(mark, pivot, time, size, f"{marks.mouth} ({tracks.software})", tuple(notes))
 
 

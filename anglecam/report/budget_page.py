@@ -53,9 +53,10 @@ def write_budget(film: Film, measured: Measurement, rig: Rig, out: Path) -> Budg
     InputError
         If the film can no longer be read.
     """
-    budget = budget_of(film.path.stem, error_sources(measured, rig), rig.pixel_error_px)
-    write_json(out / f"{film.path.stem}.budget.json", budget_as_dict(budget))
-    write_page(out / f"{film.path.stem}.budget.html", budget, _scene(film, measured, budget.typical.frame))
+    budget = budget_of(measured.series.name, error_sources(measured, rig), rig.pixel_error_px)
+    row = budget.typical.frame - film.first_frame
+    write_json(out / f"{budget.name}.budget.json", budget_as_dict(budget))
+    write_page(out / f"{budget.name}.budget.html", budget, _scene(film, measured, row))
     return budget
 
 
@@ -155,13 +156,13 @@ def budget_table(budget: Budget) -> Table:
     return table
 
 
-def _scene(film: Film, measured: Measurement, frame: int) -> Scene | None:
-    contour = measured.contours_px[frame]
+def _scene(film: Film, measured: Measurement, row: int) -> Scene | None:
+    contour = measured.contours_px[row]
     mark, pivot = measured.series.mark_px, measured.series.pivot_px
-    image = next((f.image for f in film.frames() if f.index == frame), None)
+    image = next((f.image for f in film.frames() if f.index == row), None)
     if image is None or contour is None or mark is None or pivot is None:
         return None
-    return Scene(image, contour, mark[frame], pivot[frame])
+    return Scene(image, contour, mark[row], pivot[row])
 
 
 def _frame_content(title: str, one: FrameBudget, content: dict[str, Any]) -> dict[str, Any]:

@@ -34,7 +34,7 @@ _OPENING_BYTES = 768 * 2**20
 The index of `MOST_FRAMES` takes 80 MB; the rest is for the first pictures, which FFmpeg decodes to learn the format."""
 _ONE_AT_A_TIME = threading.Lock()
 """The memory limit holds for the process: a second thread would mistake the first one's limit for the original."""
-_CONTAINERS = "avi,matroska,webm,mov,mp4,asf,flv,mpegts,mpeg,ogg,nut,mxf"
+_CONTAINERS = "avi,matroska,webm,mov,mp4,asf,flv,mpegts,mpeg,ogg,nut,mxf,gif"
 """FFmpeg's names of the containers that store time stamps and refer to no other file."""
 
 

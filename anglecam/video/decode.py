@@ -6,7 +6,6 @@ derived from a frame's number. A packet that cannot be decoded keeps its row: a 
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from anglecam.data.typing import Image
 from anglecam.errors import InputError
 from anglecam.threads import native_threads
 from anglecam.video.container import LONGEST_S, MOST_FRAMES, open_container
+from anglecam.video.stamps import CountedStamps, PresentationStamps
 from anglecam.video.truncation import is_cut_short
 
 Row = tuple[float, av.VideoFrame | None]
@@ -26,9 +26,8 @@ Row = tuple[float, av.VideoFrame | None]
 def decode(path: Path) -> Iterator[Row]:
     """Yield a film's rows in the order of presentation.
 
-    Decoders drop some broken packets without an error. So every packet's time stamp is remembered until a picture with
-    that time stamp or a later one is returned; time stamps that are left over belong to lost frames. Where a container
-    gives packets no presentation time (AVI with reordered frames), only a packet that raises is known to be lost.
+    A packet that the container marks to be discarded is no frame: an edit list leaves out the start of a film that was
+    trimmed, but the decoder needs it as reference.
 
     Parameters
     ----------
@@ -47,73 +46,87 @@ def decode(path: Path) -> Iterator[Row]:
         size, or the film has no frame, more frames than `MOST_FRAMES` or a longer duration than `LONGEST_S`.
     """
     with open_container(path) as container:
-        stream = container.streams.video[0]
-        stream.codec_context.thread_type = "SLICE"
-        stream.codec_context.thread_count = native_threads()
-        base = float(stream.time_base or 0.0)
-        is_avi = container.format.name == "avi"
-        pending: list[int] = []
-        broken: set[int] = set()
-        first: int | None = None
-        last: int | None = None
-        delay: int | None = None
-        size = stream.width, stream.height  # saved, because the decoder's change when the film does
-        other: tuple[int, int] | None = None
+        yield from decode_container(path, container)
 
-        def row(pts: int, picture: av.VideoFrame | None) -> tuple[float, av.VideoFrame | None]:
-            nonlocal first, last
-            first = pts if first is None else first
-            if last is not None and pts <= last:
-                raise InputError(f"{path}: timestamps do not increase at {pts * base:g} s")
-            if (pts - first) * base > LONGEST_S:
-                raise InputError(f"{path}: frames at {first * base:g} s and at {pts * base:g} s; a week is the longest")
-            last = pts
-            return (pts - (delay or 0)) * base, picture
 
-        for number, (packet, pictures) in enumerate(_packets(path, container, stream)):
-            if number > MOST_FRAMES:
-                raise InputError(f"{path}: more than {MOST_FRAMES:,} frames are not read")
-            stamp = packet.pts if packet.pts is not None else packet.dts
-            if delay is None and stamp is not None:
-                # AVI stores no presentation times: its frames follow each other from the start. libav derives times
-                # from the order of decoding, which are late by the decoder's delay.
-                delay = stamp - (packet.dts if packet.dts is not None else stamp) if is_avi else 0
-            if packet.pts is not None:
-                heapq.heappush(pending, packet.pts)
-            if stamp is not None and (packet.is_corrupt or pictures is None):
-                broken.add(stamp)
-                if packet.pts is None:
-                    heapq.heappush(pending, stamp)
-            for picture in pictures or ():
-                pts = picture.pts if picture.pts is not None else picture.dts
-                if pts is None:
-                    raise InputError(f"{path}: frames without timestamps")
-                while pending and pending[0] < pts:
-                    yield row(heapq.heappop(pending), None)
-                if pending and pending[0] == pts:
-                    heapq.heappop(pending)
-                usable = not (picture.is_corrupt or pts in broken)
-                broken.discard(pts)
-                shown = picture.width, picture.height
-                if shown != size:
-                    # one picture of another size is damaged; two of the same other size are another film
-                    if shown == other:
-                        raise InputError(
-                            f"{path}: pictures of {shown[0]} × {shown[1]} px at {pts * base:g} s, not of"
-                            f" {size[0]} × {size[1]} as its header says; cut the film there"
-                        )
-                    usable = False
-                other = None if shown == size else shown
-                yield row(pts, picture if usable else None)
-        while pending:
-            yield row(heapq.heappop(pending), None)
-        if last is None:
-            cut = is_cut_short(path)
-            raise InputError(f"{path}: truncated before its first frame" if cut else f"{path}: no frames in it")
+def decode_container(path: Path, container: av.container.InputContainer) -> Iterator[Row]:
+    """Yield the rows of a film that is open, and of which nothing was decoded; see `decode`."""
+    stream = container.streams.video[0]
+    decoder = stream.codec_context
+    decoder.thread_type = "SLICE"
+    decoder.thread_count = native_threads()
+    base = float(stream.time_base or 0.0)
+    is_avi = container.format.name == "avi"
+    stamps = CountedStamps(decoder) if is_avi else PresentationStamps()
+    one_size = OneSize(path, (stream.width, stream.height))  # saved, because the decoder's changes with the film
+    first: int | None = None
+    last: int | None = None
+
+    def row(stamp: int, picture: av.VideoFrame | None) -> Row:
+        nonlocal first, last
+        first = stamp if first is None else first
+        if last is not None and stamp <= last:
+            raise InputError(f"{path}: timestamps do not increase at {stamp * base:g} s")
+        if (stamp - first) * base > LONGEST_S:
+            raise InputError(f"{path}: frames at {first * base:g} s and at {stamp * base:g} s; a week is the longest")
+        last = stamp
+        return stamp * base, picture
+
+    for number, (packet, pictures) in enumerate(_packets(path, container, stream, is_avi)):
+        if number > MOST_FRAMES:
+            raise InputError(f"{path}: more than {MOST_FRAMES:,} frames are not read")
+        if not packet.is_discard:
+            stamps.expect(packet, is_lost=packet.is_corrupt or pictures is None)
+        for picture in pictures or ():
+            lost, stamp, intact = stamps.place(picture)
+            for one in lost:
+                yield row(one, None)
+            if stamp is None:
+                raise InputError(f"{path}: frames without timestamps")
+            fits = one_size.allows(picture, stamp * base)
+            yield row(stamp, picture if fits and intact and not picture.is_corrupt else None)
+    for one in stamps.left():
+        yield row(one, None)
+    if last is None:
+        cut = is_cut_short(path)
+        raise InputError(f"{path}: truncated before its first frame" if cut else f"{path}: no frames in it")
+
+
+class OneSize:
+    """Refuses pictures of another size than the first: one of them is damaged, two alike are another film.
+
+    Parameters
+    ----------
+    path : Path
+        The film, for the message.
+    size : tuple of int
+        Width and height that the film's header states, px.
+    """
+
+    def __init__(self, path: Path, size: tuple[int, int]) -> None:
+        self._path, self._size = path, size
+        self._other: tuple[int, int] | None = None
+
+    def allows(self, picture: av.VideoFrame, time: float) -> bool:
+        """Return whether a picture has the film's size.
+
+        Raises
+        ------
+        InputError
+            Where two pictures in a row have the same other size; ``time``, s, is that of the second.
+        """
+        size = picture.width, picture.height
+        if size != self._size and size == self._other:
+            raise InputError(
+                f"{self._path}: pictures of {size[0]} × {size[1]} px at {time:g} s, not of"
+                f" {self._size[0]} × {self._size[1]} as its header says; cut the film there"
+            )
+        self._other = None if size == self._size else size
+        return size == self._size
 
 
 def _packets(
-    path: Path, container: av.container.InputContainer, stream: av.VideoStream
+    path: Path, container: av.container.InputContainer, stream: av.VideoStream, number_them: bool
 ) -> Iterator[tuple[av.Packet, list[av.VideoFrame] | None]]:
     """Yield each packet with the pictures decoded from it, ``None`` where it could not be decoded."""
     packets = container.demux(stream)
@@ -130,6 +143,8 @@ def _packets(
             # An empty packet would flush the decoder; in AVI it means a frame that was dropped in recording.
             yield packet, None
             continue
+        if number_them:
+            packet.pts = packet.dts
         try:
             yield packet, packet.decode()
         except av.error.EOFError:
@@ -144,9 +159,16 @@ def to_colours(picture: av.VideoFrame) -> Image:
 
 
 def to_brightness(picture: av.VideoFrame) -> Image:
-    """Return a picture's brightness, (height, width, 1) bytes: the stored plane where there is one, else converted."""
-    if not picture.format.name.startswith(("yuv", "nv", "gray")) or picture.format.components[0].bits != 8:
+    """Return a picture's brightness, (height, width, 1) bytes: the stored plane where there is one, else converted.
+
+    Of samples of 9 to 16 bits the upper eight are returned.
+    """
+    bits = picture.format.components[0].bits
+    if not picture.format.name.startswith(("yuv4", "yuvj4", "yuva4", "nv", "gray")) or not 8 <= bits <= 16:
         return picture.to_ndarray(format="gray")[..., None]
     plane = picture.planes[0]
     rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
-    return rows[:, : plane.width, None].copy()
+    if bits == 8:
+        return rows[:, : plane.width, None].copy()
+    samples = rows[:, : 2 * plane.width].view(">u2" if picture.format.is_big_endian else "<u2")
+    return (samples >> (bits - 8)).astype(np.uint8)[..., None]

@@ -1,5 +1,7 @@
 """A film opened once: what its container declares, and its frames, as often as they are needed.
 
+The frames are those that a player shows, as it shows them: upright, with square pixels, one instant each.
+
 Measuring reads a film several times, and decoding a lossless picture takes as long as measuring in it. A `Film` keeps
 the decoded pictures of a short film in a bounded memory from its first complete reading on; a longer film is decoded
 again for every reading.
@@ -7,16 +9,25 @@ again for every reading.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
+from itertools import islice
 from pathlib import Path
 
+import av
 import numpy as np
 from av.video.frame import PictureType
 
 from anglecam.data.typing import Floats, Image
+from anglecam.errors import InputError, RigError
+from anglecam.io.numbered_images import find_numbered_images
+from anglecam.io.rig import RigFrames
 from anglecam.video.container import open_container
-from anglecam.video.decode import Row, decode, to_brightness, to_colours
+from anglecam.video.decode import Row, decode, decode_container, to_brightness, to_colours
+from anglecam.video.display import Display, read_display
+from anglecam.video.fields import fill_rows, first_field, is_bottom_first
+from anglecam.video.images import decode_images
 from anglecam.video.truncation import is_cut_short
 
 MOST_BYTES = 256 * 2**20
@@ -29,7 +40,7 @@ class Frame:
     """One frame of a film."""
 
     index: int
-    """0 for the first."""
+    """0 for the first that is measured."""
     time: float
     """Presentation time, s, on the clip's clock."""
     image: Image | None
@@ -40,7 +51,7 @@ class Frame:
 
 @dataclass(frozen=True)
 class Sample:
-    """Evenly spaced frames of a whole film."""
+    """Evenly spaced frames of all that are measured of a film."""
 
     frames: tuple[Frame, ...]
     """Those that could be decoded."""
@@ -56,6 +67,7 @@ class _Memory:
 
     times: list[float] | None = None
     undecodable: int = 0
+    interlaced: int = 0
     rows: list[Row] | None = None
     """All rows of a short film."""
 
@@ -65,10 +77,9 @@ class Film:
     """A film and what its container declares; made by `open_film`."""
 
     path: Path
-    width: int
-    """px."""
-    height: int
-    """px."""
+    """The file, or the folder of numbered pictures."""
+    display: Display
+    """From the stored picture to the shown one."""
     declared_frames: int
     """The container's count, 0 where it states none. It may be wrong in a complete file."""
     codec: str
@@ -77,32 +88,54 @@ class Film:
     """Whether colour is stored at a lower resolution than brightness."""
     cut_short: bool
     """Whether bytes are missing at the end of the file."""
+    decode: Callable[[], Iterator[Row]] = field(repr=False)
+    """Decodes all its rows from the start, because seeking may end on a wrong frame."""
+    bottom_first: bool = False
+    """Whether the second line of an interlaced picture belongs to its first field."""
+    wanted: RigFrames = field(default_factory=RigFrames)
+    """Which frames are measured: only these are yielded."""
     _memory: _Memory = field(default_factory=_Memory, repr=False)
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of the stored picture, px."""
-        return self.width, self.height
+        """Width and height of the shown picture, px."""
+        return self.display.size
+
+    @property
+    def width(self) -> int:
+        """Width of the shown picture, px."""
+        return self.size[0]
+
+    @property
+    def height(self) -> int:
+        """Height of the shown picture, px."""
+        return self.size[1]
+
+    @property
+    def first_frame(self) -> int:
+        """Number in the film of the first frame that is measured; the film's first frame has 0."""
+        return self.wanted.first or 0
 
     @property
     def times(self) -> Floats:
-        """(n,) presentation times of all frames, s; reads the film if it was not read before."""
-        self._read_times()
+        """(n,) presentation times of the frames, s; reads the film if it was not read before."""
+        self._read_once()
         return np.array(self._memory.times)
 
     @property
     def undecodable(self) -> int:
         """Number of frames that cannot be decoded; reads the film if it was not read before."""
-        self._read_times()
+        self._read_once()
         return self._memory.undecodable
 
     @property
-    def rotation_deg(self) -> int:
-        """Rotation that players apply to the stored picture, counter-clockwise, degrees; decodes the first picture."""
-        return next((picture.rotation for _, picture in self._rows() if picture is not None), 0)
+    def interlaced(self) -> int:
+        """Number of frames of which only the first field is shown; reads the film if it was not read before."""
+        self._read_once()
+        return self._memory.interlaced
 
     def frames(self, *, brightness: bool = False) -> Iterator[Frame]:
-        """Yield every frame in the order of presentation; memory does not grow with the film's length.
+        """Yield the frames in the order of presentation; memory does not grow with the film's length.
 
         Parameters
         ----------
@@ -117,10 +150,10 @@ class Film:
         Raises
         ------
         InputError
-            As `anglecam.video.decode.decode`.
+            As `anglecam.video.decode.decode`, and where the film ends before the first frame that is wanted.
         """
         for index, (time, picture) in enumerate(self._rows()):
-            image = None if picture is None else to_brightness(picture) if brightness else to_colours(picture)
+            image = None if picture is None else self._shown(picture, brightness)
             predicted = picture is not None and picture.pict_type in _PREDICTED
             yield Frame(index, time, image, predicted)
 
@@ -152,7 +185,7 @@ class Film:
             decoded += picture is not None
             if index % stride or picture is None:
                 continue
-            kept.append(Frame(index, time, to_colours(picture)))
+            kept.append(Frame(index, time, self._shown(picture)))
             if len(kept) > most:
                 stride *= 2
                 kept = [frame for frame in kept if frame.index % stride == 0]
@@ -160,70 +193,143 @@ class Film:
 
     def why_truncated(self, sample: Sample) -> str | None:
         """Return how much could be read of a file that ends too early, ``None`` for a complete one."""
+        last = self.wanted.last
         if not self.cut_short or 0 < self.declared_frames <= sample.decoded:
+            return None
+        if last is not None and sample.count == last - self.first_frame + 1:
             return None
         of = f" of {self.declared_frames}" if self.declared_frames else ""
         return f"truncated: {sample.decoded}{of} frames could be read"
 
-    def _read_times(self) -> None:
+    def _shown(self, picture: av.VideoFrame, brightness: bool = False) -> Image:
+        """Return a picture as a player shows it, of an interlaced one the first field."""
+        interlaced = picture.interlaced_frame
+        if interlaced:
+            picture = first_field(picture, self.bottom_first)
+        image = to_brightness(picture) if brightness else to_colours(picture)
+        if interlaced:
+            image = fill_rows(image, self.display.stored_size[1], self.bottom_first)
+        return self.display.show(image)
+
+    def _read_once(self) -> None:
         """Read the film unless it was read completely before."""
         if self._memory.times is None:
             for _ in self._rows():
                 pass
 
     def _rows(self) -> Iterator[Row]:
-        """Yield the film's rows from memory, or decode them; the first complete reading fills the memory."""
+        """Yield the wanted rows from memory, or decode them; the first complete reading fills the memory."""
         memory = self._memory
         if memory.times is not None:
-            yield from decode(self.path) if memory.rows is None else memory.rows
+            yield from self._decoded() if memory.rows is None else memory.rows
             return
         times: list[float] = []
-        undecodable = 0
+        undecodable = interlaced = 0
         rows: list[Row] = []
         room = MOST_BYTES
-        for row in decode(self.path):
+        for row in self._decoded():
             times.append(row[0])
             undecodable += row[1] is None
+            interlaced += row[1] is not None and row[1].interlaced_frame
             room -= _bytes(row)
             if room >= 0:
                 rows.append(row)
             else:
                 rows.clear()
             yield row
-        memory.times, memory.undecodable = times, undecodable
+        if not times:
+            raise InputError(f"{self.path}: it ends before frame {self.first_frame}, the first that is wanted")
+        memory.times, memory.undecodable, memory.interlaced = times, undecodable, interlaced
         memory.rows = rows if room >= 0 else None
 
+    def _decoded(self) -> Iterator[Row]:
+        """Decode the wanted rows."""
+        stop = None if self.wanted.last is None else self.wanted.last + 1
+        return islice(self.decode(), self.first_frame, stop)
 
-def open_film(path: Path) -> Film:
-    """Open a film and read what its container declares.
+
+def open_film(path: Path, frames: RigFrames | None = None) -> Film:
+    """Open a film, read what its container declares and decode its first picture, which says how it is shown.
 
     Parameters
     ----------
     path : Path
-        The file.
+        The file, or a folder of numbered pictures.
+    frames : RigFrames, optional
+        Which frames are measured, and how fast numbered pictures follow each other.
 
     Returns
     -------
     Film
-        Not yet decoded.
+        Of the wanted frames.
 
     Raises
     ------
     InputError
-        As `anglecam.video.container.open_container`.
+        As `anglecam.video.decode.decode`, and where the picture is shown turned by another angle than a multiple of
+        90°, or stretched beyond the limits.
+    RigError
+        Where numbered pictures have no declared rate, or a film has one besides its time stamps.
     """
+    wanted = RigFrames() if frames is None else frames
+    if path.is_dir():
+        return _open_images(path, wanted)
+    if wanted.rate_hz is not None:
+        raise RigError(f"{path}: frames: {{rate_hz}} is for numbered pictures; a film has time stamps of its own")
     with open_container(path) as container:
         stream = container.streams.video[0]
-        planes = stream.codec_context.format.components if stream.codec_context.format else ()
+        codec = stream.codec_context.name
+        size = stream.width, stream.height
+        coarse_colour = _has_coarse_colour(stream.codec_context.format)
+        declared = _declared_frames(container, stream)
+        picture = _first_picture(decode_container(path, container))
         return Film(
             path=path,
-            width=stream.width,
-            height=stream.height,
-            declared_frames=stream.frames,
-            codec=stream.codec_context.name,
-            coarse_colour=any(plane.width < stream.width for plane in planes),
+            display=Display(size) if picture is None else read_display(path, picture, stream.sample_aspect_ratio),
+            declared_frames=declared,
+            codec=codec,
+            coarse_colour=coarse_colour,
             cut_short=is_cut_short(path),
+            decode=partial(decode, path),
+            bottom_first=is_bottom_first(stream.codec_context.field_order),
+            wanted=wanted,
         )
+
+
+def _open_images(folder: Path, wanted: RigFrames) -> Film:
+    images = find_numbered_images(folder)
+    if wanted.rate_hz is None:
+        raise RigError(f"{folder}: numbered pictures have no times: declare frames: {{rate_hz: …}} in rig.yaml")
+    decode_all = partial(decode_images, folder, images, wanted.rate_hz)
+    picture = _first_picture(decode_all())
+    assert picture is not None  # else its decoder has raised
+    return Film(
+        path=folder,
+        display=read_display(folder, picture, None),
+        declared_frames=0,
+        codec=images[min(images)].suffix[1:].lower(),
+        coarse_colour=_has_coarse_colour(picture.format),
+        cut_short=False,
+        decode=decode_all,
+        wanted=wanted,
+    )
+
+
+def _first_picture(rows: Iterator[Row]) -> av.VideoFrame | None:
+    return next((picture for _, picture in rows if picture is not None), None)
+
+
+def _declared_frames(container: av.container.InputContainer, stream: av.VideoStream) -> int:
+    """Return the container's count of frames; where an MP4 has an edit list, without those that it leaves out."""
+    index = stream.index_entries
+    if not container.format.name.startswith("mov") or not len(index):
+        return stream.frames
+    return sum(not entry.is_discard for entry in index)
+
+
+def _has_coarse_colour(form: av.VideoFormat | None) -> bool:
+    planes = form.components if form else ()
+    return any(plane.width < planes[0].width for plane in planes)
 
 
 def _bytes(row: Row) -> int:

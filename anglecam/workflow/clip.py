@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from anglecam.data.command import Command
-from anglecam.errors import InputError, blame
+from anglecam.errors import InputError, RigError, blame
 from anglecam.io.files import write_json
 from anglecam.io.netcdf_parquet import Also, write_also
 from anglecam.io.rig import Rig
@@ -27,6 +27,8 @@ from anglecam.video.film import Film, open_film
 
 Progress = Callable[[int, int], None]
 """Called with the frames done and the frames in all."""
+FrameRange = tuple[int | None, int | None]
+"""Numbers of the first and the last frame that are measured."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class Source:
         return self.path.suffix.lower() in TRACKS_ENDINGS
 
 
-def open_source(path: Path, rig: Rig | None = None) -> Source:
+def open_source(path: Path, rig: Rig | None = None, frames: FrameRange = (None, None)) -> Source:
     """Open a clip or tracks, and read what is declared in the same folder.
 
     Parameters
@@ -55,6 +57,8 @@ def open_source(path: Path, rig: Rig | None = None) -> Source:
         A film, or a file of tracks.
     rig : Rig, optional
         In place of the ``rig.yaml`` in the folder of ``path``.
+    frames : FrameRange
+        In place of the rig's; ``None`` leaves the rig's.
 
     Returns
     -------
@@ -69,7 +73,7 @@ def open_source(path: Path, rig: Rig | None = None) -> Source:
         Where the rig file is wrong.
     """
     with blame(path):
-        return _open(path, rig_beside(path) if rig is None else rig, command_beside)
+        return _open(path, _of_frames(rig_beside(path) if rig is None else rig, frames), command_beside)
 
 
 def open_recording(path: Path, rig: Rig, command: Command | None) -> Source:
@@ -78,11 +82,20 @@ def open_recording(path: Path, rig: Rig, command: Command | None) -> Source:
         return _open(path, rig, lambda _: command)
 
 
+def _of_frames(rig: Rig, frames: FrameRange) -> Rig:
+    """Return a rig with another range of frames."""
+    wanted = {key: k for key, k in zip(("first", "last"), frames, strict=True) if k is not None}
+    within = rig.frames.model_copy(update=wanted)
+    if within.last is not None and within.last < (within.first or 0):
+        raise RigError(f"no frame lies from {within.first} to {within.last}; the first of them must not be the larger")
+    return rig.model_copy(update={"frames": within})
+
+
 def _open(path: Path, rig: Rig, command_of: Callable[[Path], Command | None]) -> Source:
     if path.name.endswith(SERIES_ENDING):
         raise InputError(f"{path}: holds angles already; identify or close the folder that contains it")
     clip = clip_beside(path) if path.suffix.lower() in TRACKS_ENDINGS else path
-    return Source(path, rig, command_of(path), None if clip is None else open_film(clip))
+    return Source(path, rig, command_of(path), None if clip is None else open_film(clip, rig.frames))
 
 
 def measure_source(source: Source, *, progress: Progress | None = None) -> Measurement | MeasuredTracks:

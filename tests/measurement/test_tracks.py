@@ -6,6 +6,7 @@ import csv
 import json
 import sys
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from anglecam.measurement.tracks import measure_tracks
 from anglecam.workflow.clip import measure_source, open_source
 from anglecam.workflow.session import loop_input, measure_session
 from support.drawn import Look, Plant, Recording, draw_frames, write_clip
+from support.encoded import encode
 from support.motion import command_rows, move
 from support.tracked import LEVER, PIVOT, SCORER, nod, write_deeplabcut, write_sleap
 
@@ -175,6 +177,29 @@ def test_times_come_from_the_clip_beside_and_every_frame_of_it_has_its_row(clip)
     np.testing.assert_allclose(measured.series.time, np.arange(40) / 30.0, atol=1e-9)
     assert measured.series.evidence.picture_px == (640, 480)
     assert measured.series.status == ("ok",) * 36 + ("no_mouth",) * 4
+
+
+@pytest.mark.parametrize("has_clip", [True, False])
+def test_a_range_of_frames_is_that_of_the_tracks(clip, tmp_path, has_clip):
+    angles = np.linspace(0.0, 20.0, 40)
+    beside = clip if has_clip else tmp_path / "swing.avi"
+    path = write_sleap(beside.with_name("swing.analysis.h5"), nod(angles, np.random.default_rng(0)))
+    series = measure_source(open_source(path, RIG, (10, 29))).series
+    path.unlink()
+    assert series.first_frame == 10
+    np.testing.assert_allclose(series.time, np.arange(10, 30) / (30.0 if has_clip else 60.0), atol=1e-9)
+    np.testing.assert_allclose(np.diff(np.degrees(series.angle)).mean(), np.diff(angles).mean(), atol=0.05)
+
+
+def test_points_found_in_stored_pixels_are_placed_in_the_shown_picture(tmp_path):
+    blank = [np.zeros((480, 480, 3), np.uint8)] * N
+    encode(tmp_path / "a.mp4", blank, rate_hz=60, aspect=Fraction(4, 3), options={"preset": "ultrafast"})
+    points = nod(SWING, np.random.default_rng(0))
+    points[..., 0] = (points[..., 0] + 0.5) * 0.75 - 0.5  # trackers see the pixels as they are stored
+    series = measure_source(open_source(write_sleap(tmp_path / "a.analysis.h5", points), RIG)).series
+    assert series.evidence.picture_px == (640, 480)
+    off = np.degrees(series.angle) - SWING
+    assert np.std(off) < 2.0 * np.degrees(np.median(series.sigma))  # ignoring the aspect costs 3°
 
 
 def test_tracks_longer_than_the_clip_beside_are_not_of_it(clip):

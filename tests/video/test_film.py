@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import itertools
 import weakref
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
-import av
 import numpy as np
 import pytest
 
 from anglecam.errors import InputError
+from anglecam.io.rig import RigFrames
 from anglecam.video import film as film_module
+from anglecam.video.display import Display
 from anglecam.video.film import Film, open_film
 from support.drawn import Look, draw_frames, write_clip
 
@@ -25,7 +27,7 @@ class Picture:
 
     planes = (SimpleNamespace(buffer_size=BYTES - 300), SimpleNamespace(buffer_size=300))
     pict_type = None
-    rotation = 90
+    interlaced_frame = False
 
 
 class Decoder:
@@ -35,7 +37,7 @@ class Decoder:
         self.calls = 0
         self.pictures = []
 
-    def __call__(self, path):
+    def __call__(self):
         self.calls += 1
         for k in range(12):
             picture = None if k == 3 else Picture()
@@ -47,17 +49,20 @@ class Decoder:
 @pytest.fixture
 def decoder(monkeypatch):
     decoder = Decoder()
-    monkeypatch.setattr(film_module, "decode", decoder)
     monkeypatch.setattr(film_module, "to_colours", lambda picture: np.zeros((2, 2, 3), np.uint8))
     return decoder
 
 
-def new_film():
-    return Film(Path("film.avi"), 2, 2, 12, "ffv1", False, False)
+def new_film(decode, **wanted):
+    display = Display((2, 2))
+    frames = RigFrames.model_validate(wanted)
+    return Film(
+        Path("film.avi"), display, 12, "ffv1", coarse_colour=False, cut_short=False, decode=decode, wanted=frames
+    )
 
 
 def test_a_short_film_is_decoded_once_and_its_pictures_are_released_with_it(decoder):
-    film = new_film()
+    film = new_film(decoder)
     for _ in range(2):
         assert [frame.index for frame in film.frames()] == list(range(12))
     assert film.sample(4).count == 12
@@ -69,7 +74,7 @@ def test_a_short_film_is_decoded_once_and_its_pictures_are_released_with_it(deco
 
 def test_a_long_film_is_decoded_at_every_reading_and_none_of_it_is_kept(decoder, monkeypatch):
     monkeypatch.setattr(film_module, "MOST_BYTES", 10 * BYTES)  # there are eleven pictures
-    film = new_film()
+    film = new_film(decoder)
     for calls in (1, 2, 3):
         assert len(list(film.frames())) == 12
         assert decoder.calls == calls
@@ -77,27 +82,26 @@ def test_a_long_film_is_decoded_at_every_reading_and_none_of_it_is_kept(decoder,
 
 
 def test_times_and_lost_frames_are_known_after_one_reading(decoder):
-    film = new_film()
+    film = new_film(decoder)
     np.testing.assert_allclose(film.times, np.arange(12) / 30)
     assert film.undecodable == 1
-    assert film.rotation_deg == 90
+    assert film.interlaced == 0
     assert decoder.calls == 1
 
 
 def test_an_interrupted_reading_is_not_taken_for_the_whole_film(decoder):
-    film = new_film()
+    film = new_film(decoder)
     assert len(list(itertools.islice(film.frames(), 5))) == 5
     assert len(list(film.frames())) == 12
 
 
 def test_an_error_is_raised_at_every_reading(monkeypatch):
-    def decode(path):
+    def decode():
         yield 0.0, Picture()
-        raise InputError(f"{path}: timestamps do not increase")
+        raise InputError("film.avi: timestamps do not increase")
 
-    monkeypatch.setattr(film_module, "decode", decode)
     monkeypatch.setattr(film_module, "to_colours", lambda picture: np.zeros((2, 2, 3), np.uint8))
-    film = new_film()
+    film = new_film(decode)
     for _ in range(2):
         with pytest.raises(InputError, match="do not increase"):
             list(film.frames())
@@ -126,14 +130,35 @@ def test_frames_from_memory_equal_those_from_the_file(tmp_path):
         np.testing.assert_array_equal(one.image, other.image)
 
 
-@pytest.mark.parametrize("turn", [0, 90, 180, -90])
-def test_the_rotation_that_players_apply_is_read(tmp_path, turn):
-    path = tmp_path / "phone.mp4"
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264", rate=30)
-        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        stream.set_display_rotation(turn)
-        for _ in range(3):
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(np.zeros((48, 64, 3), np.uint8), format="bgr24")))
-        container.mux(stream.encode())
-    assert (open_film(path).rotation_deg - turn) % 360 == 0
+@pytest.mark.parametrize(
+    ("wanted", "frames"),
+    [
+        ({"from": 5}, range(5, 12)),
+        ({"to": 5}, range(6)),
+        ({"from": 2, "to": 4}, range(2, 5)),
+        ({"from": 11, "to": 99}, range(11, 12)),
+    ],
+)
+@pytest.mark.parametrize("room", [100, 0])
+def test_a_range_has_its_frames_at_their_times_in_the_film(decoder, monkeypatch, wanted, frames, room):
+    monkeypatch.setattr(film_module, "MOST_BYTES", room * BYTES)
+    film = new_film(decoder, **wanted)
+    for _ in range(2):
+        read = list(film.frames())
+        np.testing.assert_allclose([frame.time for frame in read], np.array(frames) / 30)
+        assert [film.first_frame + frame.index for frame in read] == list(frames)
+        assert film.sample(4).count == len(frames)
+    assert film.undecodable == (3 in frames)
+
+
+def test_a_film_that_ends_before_the_range_says_so_at_every_reading(decoder):
+    film = new_film(decoder, **{"from": 12})
+    for _ in range(2):
+        with pytest.raises(InputError, match="it ends before frame 12"):
+            list(film.frames())
+
+
+def test_a_range_of_a_cut_file_is_complete_where_its_last_frame_is_there(decoder):
+    for last, complete in ((9, True), (20, False)):
+        film = replace(new_film(decoder, to=last), cut_short=True, declared_frames=24)
+        assert (film.why_truncated(film.sample(4)) is None) == complete
