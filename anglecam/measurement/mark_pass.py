@@ -31,9 +31,13 @@ from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.pivot.marker import RoundMarker
 from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
 from anglecam.vision.stabilise.learn import learn_background
+from anglecam.vision.stabilise.zoom import camera_zoom
 
 _SMALLEST_SHARE = 0.25
 """Of the mark's area; a smaller region is not the mark, even if partly hidden."""
+_LEAST_KNOWN = 0.5
+"""Least share of the sampled frames in which the motion of a camera that moves is known. In fewer, what was taken for
+scenery is not what the camera stands before."""
 
 
 def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | None = None) -> Detections:
@@ -65,6 +69,8 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
     noise = pixel_noise(images)
     steady = learn_background(images)
     moves = [] if steady is None else [steady.at(image) for image in images]
+    if moves:
+        images, moves = _with_known_motion(path, images, moves)
     near = None if rig.pivot.near is None else lens.rectify(rig.pivot.near)
 
     def placed(i: int, point: Floats) -> Floats:
@@ -77,6 +83,12 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
             return body
         besides = "" if body is None else f"; nor can the body be followed without a mark: {body}"
         raise InputError(_no_mark(path, sample, rig) + besides)
+    zoom = camera_zoom(images)
+    if zoom is not None:
+        raise InputError(
+            f"{path}: the camera zooms or comes nearer, by {100.0 * (zoom - 1.0):.1f} %; film from one place and with"
+            " fixed focus and zoom"
+        )
     time, filmed, decoded, repeated, shakes = _read_regions(film, found, sample.count, steady, progress)
     candidates = filmed if shakes is None else [_unshaken(r, move) for r, move in zip(filmed, shakes, strict=True)]
     images = [_stabilised(image, move) for image, move in zip(images, moves, strict=True)] if moves else images
@@ -119,6 +131,19 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
         truncated=film.why_truncated(sample),
         notes=tuple(notes),
     )
+
+
+def _with_known_motion(
+    path: Path, images: Sequence[Image], moves: Sequence[CameraMove]
+) -> tuple[list[Image], list[CameraMove]]:
+    """Return the sampled frames in which the camera's motion is known; refuse a clip in which it mostly is not."""
+    known = [k for k, move in enumerate(moves) if move.known]
+    if len(known) < _LEAST_KNOWN * len(moves):
+        raise InputError(
+            f"{path}: the camera moves, and how can be seen in {len(known)} of {len(moves)} sampled frames only; film"
+            " with a fixed camera, or so that the same scenery stays in the picture"
+        )
+    return [images[k] for k in known], [moves[k] for k in known]
 
 
 def _follow(
