@@ -1,10 +1,10 @@
-"""Measures films that are meant to mislead: is a wrong angle ever given with status ok?
+"""Measures films that are meant to mislead, and whether a wrong angle is ever given with status ok.
 
     .venv/bin/python -m benchmarks.hostile_films [--only WORD ...] [--json FILE]
 
-Two groups, drawn by `benchmarks.hostile` with plain NumPy. In the first nothing turns about a fixed pivot, or nothing is
-to be seen: no film may get an angle. In the second something turns by a known angle and one trait misleads: what is ok
-must be right within its sigma. anglecam is given the film alone.
+Two groups, drawn by `benchmarks.hostile` with plain NumPy. In the first nothing turns about a fixed pivot, or nothing
+is to be seen: no film may get an angle. In the second something turns by a known angle and one trait misleads: what is
+ok must be right within its sigma. anglecam is given the film alone.
 """
 
 from __future__ import annotations

@@ -45,8 +45,8 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict
-        The clip's figures for the index, how it is ``truncated``, and any other ``doubt``; or the ``cause`` of the failure, whether the
-        ``call_is_wrong``, and whether the failure is ``transient``: the next attempt may succeed.
+        The clip's figures for the index, how it is ``truncated``, and any other ``doubt``; or the ``cause`` of the
+        failure, whether the ``call_is_wrong``, and whether the failure is ``transient``: the next attempt may succeed.
     """
     clip, into = Path(request["clip"]), Path(request["into"])
     found: dict[str, Any] = {}

@@ -1,9 +1,10 @@
 """Frames that show the one before again: a camera or a converter that had no new picture repeats the last one.
 
 Bit for bit equal pictures are no proof, because a codec repeats what does not change. Nor are different pictures proof
-of the contrary: a converter encodes the repeated picture anew, and a filter adds new noise to it. So the motion decides:
-the angle stands still, within its noise, between frames in which it moves. A mechanism that pauses for one frame only
-is taken for a repeated frame as well, because no picture can tell the two apart; nothing is then stated for the frame.
+of the contrary: a converter encodes the repeated picture anew, and a filter adds new noise to it. So the motion
+decides: the angle stands still, within its noise, between frames in which it moves. A mechanism that pauses for one
+frame only is taken for a repeated frame as well, because no picture can tell the two apart; nothing is then stated for
+the frame.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ def frames(path: Path) -> Iterator[tuple[float, np.ndarray]]:
 
 
 def blob(path: Path, mask: Callable[[np.ndarray], np.ndarray], pivot: tuple[float, float] | None = None) -> Tracked:
-    """Follow the largest region of a mask; without a pivot, its path's circle gives one (algebraic fit, Taubin's use)."""
+    """Follow the largest region of a mask; without a pivot, its path's circle gives one."""
     times, places = [], []
     for time, image in frames(path):
         chosen = mask(image).astype(np.uint8)

@@ -58,8 +58,9 @@ _SIGNIFICANT = 3.0
 _PICTURE_PX = 300.0
 """Distance from the origin within which a centre of roll is expected, px."""
 _SURROUNDING_AREA, _SURROUNDING_SHARE = 0.4, 0.6
-"""Least share of the picture that the windows' hull covers, and of all windows that belong to them, for the group to be
-scenery even if it only rolls around a fixed point. A body that turns leaves scenery beside it, which has the windows."""
+"""Least share of the picture that the windows' hull covers, and of all windows that belong to them, for the group to
+be scenery even if it only rolls around a fixed point. A body that turns leaves scenery beside it, which has the
+windows."""
 _ROUNDS = 8
 _MIN_INFORMATION = 0.5
 """Least share of the windows' information, in every direction, that a frame must show; less may agree by chance."""

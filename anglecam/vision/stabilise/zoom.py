@@ -1,8 +1,8 @@
 """Whether the camera zooms, or comes nearer: the distances between all parts of the scenery grow alike.
 
 A shift and a roll leave distances as they are, so a zoom is not part of the camera's motion that is corrected
-(`anglecam.vision.stabilise.background_motion`): it has to be detected. Small windows are tracked from the first of a few
-frames into the others, and a similarity (shift, roll and scale) is fitted to most of them.
+(`anglecam.vision.stabilise.background_motion`): it has to be detected. Small windows are tracked from the first of a
+few frames into the others, and a similarity (shift, roll and scale) is fitted to most of them.
 """
 
 from __future__ import annotations
