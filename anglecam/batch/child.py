@@ -45,8 +45,8 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict
-        The clip's figures for the index and how it is ``truncated``; or the ``cause`` of the failure, whether the
-        ``call_is_wrong``, and whether the failure is ``transient``: the next attempt may succeed.
+        The clip's figures for the index, how it is ``truncated``, and any other ``doubt``; or the ``cause`` of the
+        failure, whether the ``call_is_wrong``, and whether the failure is ``transient``: the next attempt may succeed.
     """
     clip, into = Path(request["clip"]), Path(request["into"])
     found: dict[str, Any] = {}
@@ -57,7 +57,7 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
             if film is not None:
                 found |= {"width_px": film.width, "height_px": film.height, "codec": film.codec}
             measurement = measure_source(source)
-        found |= _figures(measurement) | {"truncated": measurement.truncated}
+        found |= _figures(measurement) | {"truncated": measurement.truncated, "doubt": measurement.doubt}
         with blame(clip):
             try:
                 write_measurement(measurement, source.command, into)

@@ -13,7 +13,7 @@ from anglecam.batch.lock import is_current
 from anglecam.batch.measuring_process import MeasuringProcess, ProcessLost
 from anglecam.batch.publish import Finished, finish, workspace
 from anglecam.batch.records import ClipRecord
-from anglecam.batch.row import OK, TRUNCATED, Row, cannot_write
+from anglecam.batch.row import DOUBTFUL, OK, TRUNCATED, Row, cannot_write
 from anglecam.batch.worker import Settings, clip_time_limit, fetch_beside, message_of, require_same_batch
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.io.command_csv import COMMAND_ENDING
@@ -146,8 +146,8 @@ def _measured(
         made[settings.folder.cached_series(job.address)] = cached
     row = replace(
         record.row,
-        status=TRUNCATED if answer["truncated"] else OK,
-        cause=answer["truncated"],
+        status=TRUNCATED if answer["truncated"] else DOUBTFUL if answer["doubt"] else OK,
+        cause=answer["doubt"],
         series=printable(f"{job.output_path}.angles.csv"),
     )
     return replace(record, row=row), made

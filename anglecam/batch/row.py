@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-OK, TRUNCATED, FAILED = "ok", "truncated", "failed"
+OK, TRUNCATED, DOUBTFUL, FAILED = "ok", "truncated", "doubtful", "failed"
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Row:
     configuration: str | None = None
     """SHA-256 of rig file, calibration and command."""
     status: str = FAILED
-    """``ok``, ``truncated`` or ``failed``."""
+    """``ok``, ``truncated``, ``doubtful`` or ``failed``."""
     cause: str | None = None
     series: str | None = None
     """``NAME.angles.csv``, relative to the output folder."""

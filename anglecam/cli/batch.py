@@ -40,6 +40,7 @@ def batch(
     ] = None,
 ) -> None:
     """Measure folders of clips, each clip once, identify the sessions among them, and write an index of all clips."""
+    from anglecam.batch.row import DOUBTFUL, FAILED, OK, TRUNCATED
     from anglecam.batch.run import Options, run_batch  # imports fsspec and pyarrow, which no other command needs
 
     if dask is not None and dask != "local" and jobs is not None:
@@ -64,7 +65,8 @@ def batch(
         raise typer.Exit(130) from None
     if not quiet:
         counts = Counter(row.status for row in result.rows)
-        summary = ", ".join(f"{counts[status]} {status}" for status in ("ok", "truncated", "failed") if counts[status])
+        named = (f"{counts[status]} {status}" for status in (OK, TRUNCATED, DOUBTFUL, FAILED) if counts[status])
+        summary = ", ".join(named)
         screen.print(f"{len(result.rows)} clips{': ' if summary else ''}{summary}; {out / 'index.csv'}", soft_wrap=True)
     for problem in result.problems:
         errors.print(str(problem))

@@ -140,8 +140,8 @@ def _for_each(
         for clip in _expand(paths, problems, list_folder):
             try:
                 measurement = work(clip, bars)
-                if measurement.truncated:
-                    raise InputError(f"{clip}: {measurement.truncated}")
+                if measurement.doubt:
+                    raise InputError(f"{clip}: {measurement.doubt}")
             except AnglecamError as problem:
                 problems.append(problem)
             except OSError as problem:

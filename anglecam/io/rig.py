@@ -183,6 +183,9 @@ class Rig(Declared):
     """Radii within which the mark may lie, px; each gives a worst-case error of the angle."""
     held_out: tuple[str, ...] = ()
     """Names of the recordings that are only predicted and never fitted to."""
+    least_measured: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.5
+    """Share of a recording's frames that must be measured for it to be trusted and fitted to. With half of them, what
+    was measured is what happened for most of the time."""
     camera: RigCamera = RigCamera()
     frames: RigFrames = RigFrames()
     """Which frames of a film are measured."""

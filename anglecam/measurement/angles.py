@@ -73,6 +73,14 @@ class Angles:
         """(n,) distance from pivot to mark, px."""
         return np.asarray(np.hypot(*(self.mark_px - self.pivot.centre_px).T))
 
+    def frame_noise(self, ok: NDArray[np.bool_]) -> Floats:
+        """Return (n,) standard deviation of what differs between neighbouring frames, rad; ``ok`` are the n frames."""
+        by_mark = np.hypot(self.errors.noise_px, self.errors.pose_px) / self.lever_px
+        if self.registered is None:
+            return np.asarray(by_mark)
+        by_body = self.registered.sigma[ok]
+        return np.where(np.isfinite(by_body), by_body, by_mark)
+
 
 def coarse_angles(
     detections: Detections, ok: NDArray[np.bool_], time: Floats, rig: Rig, command: Command | None

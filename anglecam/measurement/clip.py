@@ -24,18 +24,18 @@ from anglecam.io.session import recording_name
 from anglecam.measurement.angles import Angles, coarse_angles, turns
 from anglecam.measurement.clock_sync import DARK, note_on, offset_of, on_clip_clock, see_lamp
 from anglecam.measurement.detections import Detections
+from anglecam.measurement.duplicates import duplicate_frames
 from anglecam.measurement.fine_angles import fine_angles
 from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
 from anglecam.measurement.rigid_body_pass import detect_rigid_body
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
+from anglecam.measurement.trust import require_rotation, why_few
 from anglecam.video.film import Film
 from anglecam.vision.mark.outline_turn import outline_turn
 
 _CARRIED_PX = 1.0
 """Largest distance of a smeared mark from the position predicted by the body's rotation, px; beyond, it is hidden."""
-_MOVING = 5.0
-"""Change of the angle, in standard uncertainties, required on both sides of a repeated frame to call it a duplicate."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,8 @@ class Measurement:
 
     interlaced: str | None = None
     """Message where frames show two instants, of which one is measured."""
+    few: str | None = None
+    """Message where less than the required share of the frames is measured."""
 
     @property
     def pivot(self) -> str:
@@ -73,6 +75,11 @@ class Measurement:
     def truncated(self) -> str | None:
         """How much could be read of a file that ends too early; ``None`` for a complete file."""
         return self.detections.truncated
+
+    @property
+    def doubt(self) -> str | None:
+        """Why the clip as a whole is no success although frames of it are measured; ``None`` where it is one."""
+        return self.truncated or self.few
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -146,12 +153,13 @@ def measure_clip(
                 other = coarse_angles(body, rigid, body.time, rig, command)
                 if (other.sigma**2).mean() < (angles.sigma**2).mean():
                     detections, ok, time, angles = body, rigid, body.time, other
+    require_rotation(film.path, detections, ok, angles, rig)
     series = _series(film.path, rig, time, detections, ok, angles, lamp)
     zero = why_zero_is_elsewhere(rig, command, time[ok])
     dark = changes and lamp is None and rig.sync.lamp is not None
-    return Measurement(
-        series, detections, angles, why_coarse, zero, DARK if dark else note_on(offset), _interlaced(film)
-    )
+    clock = DARK if dark else note_on(offset)
+    few = why_few(series.status, rig.least_measured)
+    return Measurement(series, detections, angles, why_coarse, zero, clock, _interlaced(film), few)
 
 
 def _interlaced(film: Film) -> str | None:
@@ -251,9 +259,9 @@ def _series(
 ) -> AngleSeries:
     """Return the series of all frames, the duplicates marked."""
     status = [OK if k else s for k, s in zip(ok, detections.status, strict=True)]
-    lines, sigmas = np.full((2, len(time)), np.nan)
-    lines[ok], sigmas[ok] = angles.line, angles.sigma
-    for i in _duplicates(lines, sigmas, detections.repeated):
+    lines, noise = np.full((2, len(time)), np.nan)
+    lines[ok], noise[ok] = angles.line, angles.frame_noise(ok)
+    for i in duplicate_frames(lines, noise, detections.repeated):
         status[i] = "duplicate"
     marks = detections.in_picture(_in_all_frames(ok, angles.mark_px))
     pivots = detections.in_picture(np.broadcast_to(angles.pivot.centre_px, (len(time), 2)))
@@ -287,19 +295,3 @@ def _marker(detections: Detections) -> tuple[float, float] | None:
     else:  # a slanted view was corrected: the line then starts at the position of its centre in the picture
         x, y = detections.lens.distort(detections.pivot.centre_px)
     return float(x), float(y)
-
-
-def _duplicates(line: Floats, sigma: Floats, repeated: NDArray[np.bool_]) -> list[int]:
-    """List the frames that repeat the previous one while the mechanism moves before and after them."""
-    rows: list[int] = []
-    starts = np.flatnonzero(repeated & ~np.insert(repeated[:-1], 0, False))
-    for i in starts:
-        j = int(i)
-        while j + 1 < len(repeated) and repeated[j + 1]:
-            j += 1
-        if i < 2 or j + 1 >= len(line):
-            continue
-        steps = np.array([line[i - 1] - line[i - 2], line[j + 1] - line[j]])
-        if (np.abs(steps) > _MOVING * sigma[i - 1]).all():
-            rows.extend(range(int(i), j + 1))
-    return rows

@@ -33,9 +33,13 @@ from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.pivot.marker import RoundMarker
 from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
 from anglecam.vision.stabilise.learn import learn_background
+from anglecam.vision.stabilise.zoom import camera_zoom
 
 _CLEAR = 2.0
 """Ratio of the best score to the next best from which on the choice of the mark is clear."""
+_LEAST_KNOWN = 0.5
+"""Least share of the sampled frames in which the motion of a camera that moves is known. In fewer, what was taken for
+scenery is not what the camera stands before."""
 
 
 def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | None = None) -> Detections:
@@ -76,6 +80,12 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
             return body
         besides = "" if body is None else f"; nor can the body be followed without a mark: {body}"
         raise InputError(_no_mark(path, sample, rig) + besides)
+    zoom = camera_zoom(samples.images)
+    if zoom is not None:
+        raise InputError(
+            f"{path}: the camera zooms or comes nearer, by {100.0 * (zoom - 1.0):.1f} %; film from one place and with"
+            " fixed focus and zoom"
+        )
     time, filmed, decoded, repeated, shakes = _read_regions(film, found, sample.count, steady, progress)
     candidates = filmed if shakes is None else [_unshaken(r, move) for r, move in zip(filmed, shakes, strict=True)]
     lens, track, marker, pivot, disagreement = _follow(candidates, time, found, samples.stabilised, rig, lens)
@@ -130,6 +140,11 @@ def _samples(
         where = f"{film.path}: the camera's motion is unknown in frame {pointed.frame}"
         raise InputError(f"{where}; declare the mark in another frame")
     kept = [(time, image, move) for (time, image), move in zip(pictures, moves, strict=True) if move.known]
+    if len(kept) < _LEAST_KNOWN * len(moves):
+        raise InputError(
+            f"{film.path}: the camera moves, and how can be seen in {len(kept)} of {len(moves)} sampled frames only;"
+            " film with a fixed camera, or so that the same scenery stays in the picture"
+        )
     return Samples(
         images=[image for _, image, _ in kept],
         stabilised=[image if steady is None else _stabilised(image, move) for _, image, move in kept],

@@ -26,6 +26,7 @@ from anglecam.io.tracks.tracks import choose_pair
 from anglecam.measurement.angles import Angles, angles_of_places
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.measurement.sigma import PlaceErrors
+from anglecam.measurement.trust import why_few
 from anglecam.video.film import Film
 from anglecam.vision.pivot.estimate import PivotEstimate
 
@@ -51,11 +52,18 @@ class MeasuredTracks:
     """Messages to the user, a line each."""
     truncated: str | None = None
     """How much of the film could be read, where it ends too early."""
+    few: str | None = None
+    """Message where less than the required share of the frames is measured."""
 
     @property
     def pivot(self) -> str:
         """Source of the pivot's position."""
         return self.angles.pivot.source
+
+    @property
+    def doubt(self) -> str | None:
+        """Why the tracks as a whole are no success although frames of them are measured; ``None`` where they are."""
+        return self.truncated or self.few
 
     @property
     def contours_px(self) -> tuple[None, ...]:
@@ -131,7 +139,8 @@ def measure_tracks(path: Path, rig: Rig, command: Command | None = None, *, film
     evidence = CameraEvidence(picture_px=size, marker_px=marker, from_mark=True)
     series = series_of_angles(recording_name(path), time, status, ok, angles, mark, shown, rig, evidence)
     zero = why_zero_is_elsewhere(rig, command, time[ok])
-    return MeasuredTracks(series, angles, points.by, (*points.notes, *([zero] if zero else [])))
+    notes = (*points.notes, *([zero] if zero else []))
+    return MeasuredTracks(series, angles, points.by, notes, few=why_few(series.status, rig.least_measured))
 
 
 def _read_points(path: Path, rig: Rig, film: Film | None) -> tuple[RigKeypoints, _Points]:

@@ -20,7 +20,7 @@ from anglecam.io.rig import Rig
 from anglecam.io.series_csv import read_series, write_series
 from anglecam.io.session import SERIES_ENDING, Recording, Session
 from anglecam.measurement.clock_sync import note_on, offsets, on_clip_clock
-from anglecam.measurement.tracks import MeasuredTracks
+from anglecam.measurement.trust import why_few
 from anglecam.measurement.uncorrected import uncorrected
 from anglecam.workflow.clip import measure_source, open_recording
 
@@ -37,11 +37,11 @@ class MeasuredSession:
     session: Session
     series: tuple[AngleSeries, ...]
     records: tuple[Record, ...]
-    """One for each of ``series`` that has enough measured frames."""
+    """One for each of ``series`` that has enough measured frames, as the rig's ``least_measured`` defines it."""
     problems: tuple[InputError, ...]
     """The causes why recordings cannot be used."""
     notes: tuple[str, ...] = ()
-    """Messages to the user, a line each, such as which animal was followed in tracks."""
+    """Messages to the user, a line each, such as what `measure` notes about a clip."""
 
     def split(self, hold_out: Sequence[str] = ()) -> tuple[list[Record], list[Record]]:
         """Return the records to fit and those to predict only.
@@ -117,8 +117,7 @@ def measure_session(
         measurement = measure_source(source, progress=lambda done, total: progress(name, done, total))
         if out is not None:
             write_series(measurement.series, out / f"{name}{SERIES_ENDING}")
-        if isinstance(measurement, MeasuredTracks):
-            notes.extend(f"{recording.source}: {note}" for note in measurement.notes)
+        notes.extend(f"{recording.source}: {note}" for note in measurement.notes)
         return measurement.series, measurement.truncated
 
     gathered = gather_session(session, measured)
@@ -270,6 +269,9 @@ def close_session(
 
 
 def _record(series: AngleSeries, command: Command | None, clock_sigma: float, rig: Rig) -> Record:
+    few = why_few(series.status, rig.least_measured)
+    if few is not None:
+        raise InputError(f"{series.name}: no model is fitted to it: {few}")
     declared = rig.model.gravity_deg
     upright = None if declared is None else math.radians(declared)
     record = record_from_series(series, command, zero_known=rig.neutral != "auto", mass_from_upright=upright)

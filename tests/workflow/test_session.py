@@ -67,3 +67,16 @@ def test_the_loop_sees_the_series_themselves_where_no_film_was_measured(session)
     shown = loop_input(measured)
     assert not shown.differs
     assert shown.records == measured.records
+
+
+def test_a_recording_with_few_measured_frames_is_not_fitted_unless_the_rig_accepts_it(session):
+    path = session / "stairs.angles.csv"
+    lines = path.read_text().splitlines()
+    gone = [f"{line.split(',')[0]}," if i % 5 else line for i, line in enumerate(lines[1:])]
+    path.write_text("\n".join([lines[0], *gone]) + "\n")
+    measured = measure_session(read_session(session))
+    assert [record.name for record in measured.records] == ["chirp"]
+    assert len(measured.problems) == 1
+    assert "stairs: no model is fitted to it: only" in str(measured.problems[0])
+    (session / "rig.yaml").write_text("least_measured: 0.1\n")
+    assert len(measure_session(read_session(session)).records) == 2

@@ -12,6 +12,7 @@ import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,6 +57,10 @@ _SIGNIFICANT = 3.0
 """Standard uncertainties by which the displacement must exceed it."""
 _PICTURE_PX = 300.0
 """Distance from the origin within which a centre of roll is expected, px."""
+_SURROUNDING_AREA, _SURROUNDING_SHARE = 0.4, 0.6
+"""Least share of the picture that the windows' hull covers, and of all windows that belong to them, for the group to
+be scenery even if it only rolls around a fixed point. A body that turns leaves scenery beside it, which has the
+windows."""
 _ROUNDS = 8
 _MIN_INFORMATION = 0.5
 """Least share of the windows' information, in every direction, that a frame must show; less may agree by chance."""
@@ -81,10 +86,21 @@ class Scenery:
     """(frames,) counter-clockwise as seen, rad; NaN where the shift is."""
     scatter_px: float
     """Standard deviation of the windows from their expected places, px."""
+    surrounds: bool
+    """Whether the windows are most of those in the picture, and all around."""
 
     @property
     def shakes(self) -> bool:
-        """Whether every point of the picture moves significantly; a mere roll around a fixed point does not count."""
+        """Whether the picture moves significantly.
+
+        A mere roll around a fixed point counts only where the scenery surrounds whatever else moves: a body that turns
+        looks the same.
+        """
+        if self.surrounds:
+            arms = self.centres_px - self.origin_px
+            swept = float(np.nanstd(self.rolls) * np.sqrt((arms**2).sum(axis=1).mean()))
+            if swept > _STILL_PX + _SIGNIFICANT * self.scatter_px / np.sqrt(len(arms)):
+                return True
         seen = np.isfinite(self.rolls)
         shifts, rolls = self.shifts_px[seen], self.rolls[seen]
         corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -132,7 +148,10 @@ def find_scenery(pictures: Sequence[Image]) -> Scenery | None:
         return None
     close = off[group][off[group] < 1.0]
     scatter = TOLERANCE_PX * float(np.sqrt(close.mean()))
-    found = Scenery(centres[group], metric[group], information[group], origin, np.empty((0, 2)), rolls, scatter)
+    hull = cv2.contourArea(cv2.convexHull(centres[group].astype(np.float32)))
+    surrounds = group.mean() >= _SURROUNDING_SHARE and hull >= _SURROUNDING_AREA * pictures[0].size
+    nowhere = np.empty((0, 2))
+    found = Scenery(centres[group], metric[group], information[group], origin, nowhere, rolls, scatter, surrounds)
     each = [scenery_motion(found, moved[group, k]) for k in range(len(pictures))]
     found = replace(found, shifts_px=np.array([shift for shift, _ in each]), rolls=np.array([roll for _, roll in each]))
     seen = np.isfinite(found.rolls)

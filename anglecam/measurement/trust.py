@@ -1,0 +1,183 @@
+"""Whether what was measured is the angle of something that turns about a fixed pivot.
+
+A line can be drawn from any point to anything that moves, and it has a direction in every frame. It is the angle of a
+mechanism only if the mark keeps its distance from the pivot while it moves. A cart on a rail, a pendulum on a cart, a
+thrown ball, and scenery that a camera passes do not. Where the path is too short or too straight to show that, a round
+thing near it is no proof of a pivot: then somebody has to declare the pivot.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from anglecam.data.series import OK
+from anglecam.data.typing import Flags, Floats
+from anglecam.errors import InputError
+from anglecam.io.rig import Rig
+from anglecam.measurement.angles import Angles
+from anglecam.measurement.detections import Detections
+
+_MAX_OFF_CIRCLE = 0.02
+"""Largest systematic variation of the distance from the pivot, as a share of the mark's travel. An error along the
+lever has a like error across it, so the angle is then wrong by 2 % of its range. A wheel seen from 16° aside has as
+much."""
+_MAX_OFF_CENTRE = 0.1
+"""The same for a body whose rotation is seen on itself: the pivot's place then hardly enters the angle."""
+_FLOOR_PX = 0.25
+"""Variation that shows nothing, px: codecs and the pixel grid shift a centroid by up to this much, evenly in time."""
+_PIVOT_SIGMAS = 3.0
+"""Standard uncertainties of the pivot that may add to the variation."""
+_MAX_SCALE_SIGMA = 0.2
+"""Relative standard uncertainty of the path's radius from which on the path does not show its centre, as for a pivot
+(`anglecam.vision.pivot.estimate`)."""
+_BENT = 3.0
+"""Standard uncertainties of the path's curvature by which it must exceed that of a straight line, and may differ from
+that of a circle about a round marker."""
+_SLOW_PX, _SLOW_LENGTH_PX = 0.04, 8.0
+"""Standard deviation of the part of a centroid's error that varies slowly along the path, and the length on which it
+does, px (`anglecam.vision.pivot.circle`)."""
+_TRAVEL_PX = 0.5
+"""Least RMS travel of a mark that moves, px. Noise, rain and flicker shift the centroid of a thing at rest by 0.2."""
+
+
+def require_rotation(path: Path, detections: Detections, ok: Flags, angles: Angles, rig: Rig) -> None:
+    """Refuse a clip whose angles are not those of a rotation about a fixed pivot.
+
+    Parameters
+    ----------
+    path : Path
+        The clip, for the message.
+    detections : Detections
+        The coarse pass.
+    ok : ndarray
+        (frames,) the measured frames.
+    angles : Angles
+        Of these frames.
+    rig : Rig
+        Whether the pivot is declared.
+
+    Raises
+    ------
+    InputError
+        One line with the cause, and what can be declared.
+    """
+    cause = _why_no_rotation(detections, ok, angles, rig)
+    if cause is not None:
+        raise InputError(f"{path}: {cause}")
+
+
+def why_few(status: Sequence[str], least: float) -> str | None:
+    """Return a message where less than a share of the frames is measured.
+
+    Parameters
+    ----------
+    status : sequence of str
+        Of every frame.
+    least : float
+        The share that the rig requires: ``least_measured``.
+
+    Returns
+    -------
+    str or None
+        With the counts and causes, and how to accept fewer.
+    """
+    measured = sum(s == OK for s in status)
+    if measured >= least * len(status):
+        return None
+    causes = ", ".join(f"{cause} in {k}" for cause, k in Counter(s for s in status if s != OK).most_common())
+    return (
+        f"only {measured} of {len(status)} frames are measured ({causes}), less than a share of {least:g};"
+        " to accept fewer, declare least_measured: in rig.yaml"
+    )
+
+
+def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig) -> str | None:
+    declared = rig.pivot.expected is not None
+    lost = sum(s == "no_mouth" for s in detections.status)
+    if detections.moves and lost > (1.0 - rig.least_measured) * len(ok):
+        return (
+            f"in {lost} of {len(ok)} frames the mark is not found where a rotation about a fixed pivot would carry it;"
+            " it moves otherwise, or is another thing in the other frames"
+        )
+    travel = _travel(angles.mark_px)
+    at_rest = not detections.moves or travel < _TRAVEL_PX
+    if at_rest and not declared:
+        return "nothing is seen to turn; to measure a mechanism at rest, declare pivot: {near: [x, y]} in rig.yaml"
+    off, share = _off_circle(detections, angles), _MAX_OFF_CIRCLE
+    if detections.body is not None:
+        off, share = detections.body.pivot_scatter_px, _MAX_OFF_CENTRE
+    if not at_rest and off > max(share * travel, _FLOOR_PX):
+        return (
+            f"what moves does not turn about a fixed pivot: its distance from the centre varies by {off:.2g} px RMS"
+            f" while it travels {travel:.2g} px RMS"
+        )
+    seen_to_turn = detections.body is not None or angles.registered is not None
+    shown = _shows_its_centre(detections) or _bends_about_pivot(angles)
+    if not declared and not seen_to_turn and not shown:
+        return (
+            "the mark's path is too short or too straight to show about which point it turns; declare it:"
+            " pivot: {near: [x, y]} in rig.yaml"
+        )
+    return None
+
+
+def _travel(mark_px: Floats) -> float:
+    """Return the RMS distance of the mark from its mean position along the direction of most motion, px."""
+    return float(np.sqrt(max(np.linalg.eigvalsh(np.cov(mark_px.T))[-1], 0.0))) if len(mark_px) > 1 else 0.0
+
+
+def _off_circle(detections: Detections, angles: Angles) -> float:
+    """Return the systematic variation of the distance from the centre, RMS, px.
+
+    That is the part that neighbouring frames share: the mean product of a frame's deviation with the next one's is free
+    of noise. The centre is that of the path's circle. Where the path has none, it is the pivot, whose uncertainty then
+    accounts for a part.
+    """
+    if len(angles.mark_px) < 3:
+        return 0.0
+    circle = detections.circle
+    centre = angles.pivot.centre_px if circle is None else circle.centre_px
+    arm = angles.mark_px - centre
+    lever = np.hypot(*arm.T)
+    off = lever - lever.mean()
+    variance = float((off[1:] * off[:-1]).mean())
+    if circle is None:
+        directions = np.cov((arm / np.maximum(lever, 1e-9)[:, None]).T)
+        variance -= _PIVOT_SIGMAS**2 * float(np.trace(angles.pivot.covariance_px2 @ directions))
+    return float(np.sqrt(max(variance, 0.0)))
+
+
+def _shows_its_centre(detections: Detections) -> bool:
+    """Return whether the mark's path alone determines the radius."""
+    circle = detections.circle
+    return circle is not None and bool(circle.covariance_px2[2, 2] < (_MAX_SCALE_SIGMA * circle.radius_px) ** 2)
+
+
+def _bends_about_pivot(angles: Angles) -> bool:
+    """Return whether a path, even one too short to fit a circle, is bent as a circle about the pivot is.
+
+    With u along the path and v towards the pivot, v = a + b·u + κ·u²/2. Of n independent places, evenly spaced over a
+    length L with errors σ, the curvature has the standard uncertainty 2·σ·√(180/n)/L².
+    """
+    arm = angles.mark_px - angles.pivot.centre_px
+    towards = -arm.mean(axis=0)
+    lever = float(np.hypot(*towards))
+    v = arm @ towards / lever
+    u = arm @ np.array([-towards[1], towards[0]]) / lever
+    _, place = np.unique(np.round(u).astype(int), return_inverse=True)
+    count = np.bincount(place)
+    u, v = np.bincount(place, u) / count, np.bincount(place, v) / count
+    if len(u) < 4:
+        return False
+    shapes = np.column_stack([np.ones(len(u)), u, u**2 / 2.0])
+    fitted = np.linalg.lstsq(shapes, v, rcond=None)[0]
+    scatter = float(np.sqrt(((v - shapes @ fitted) ** 2).sum() / (len(u) - 3)))
+    length = float(np.ptp(u))
+    independent = max(length / _SLOW_LENGTH_PX, 3.0)
+    sigma = 2.0 * float(np.hypot(scatter, _SLOW_PX)) * np.sqrt(180.0 / independent) / length**2
+    curvature = float(fitted[2])
+    return curvature > _BENT * sigma and abs(curvature - 1.0 / lever) < _BENT * sigma

@@ -1,0 +1,71 @@
+"""Whether the camera zooms, or comes nearer: the distances between all parts of the scenery grow alike.
+
+A shift and a roll leave distances as they are, so a zoom is not part of the camera's motion that is corrected
+(`anglecam.vision.stabilise.background_motion`): it has to be detected. Small windows are tracked from the first of a
+few frames into the others, and a similarity (shift, roll and scale) is fitted to most of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from anglecam.data.typing import Floats, Image
+from anglecam.vision.image.noise import pixel_noise
+from anglecam.vision.stabilise.tile_cuts import brightness
+from anglecam.vision.stabilise.windows import TOLERANCE_PX, find_windows, follow_windows, subtract_local_mean
+
+_MIN_WINDOWS = 12
+"""Fewest windows from which a scale is estimated; through two of them it always fits."""
+_MIN_SHARE = 0.3
+"""Least share of the windows that must follow. A textured body may have most of the others."""
+_MIN_KNOWN = 0.25
+"""Least share of the frames in which a scale is found: a body may hide most of the scenery in the others."""
+_INNER = (0.05, 0.95)
+"""Quantiles taken for the smallest and the largest scale: single frames may be wrong."""
+_EDGE_PX = 1.0
+"""Displacement at the picture's corners, px, up to which a change of scale does no harm: at the mark it is less, and it
+acts along the lever, if the pivot is near the middle, more than across it."""
+
+
+def camera_zoom(images: Sequence[Image]) -> float | None:
+    """Return by which factor the scale of the picture varies.
+
+    Parameters
+    ----------
+    images : sequence of ndarray
+        (h, w, 3) blue, green, red, spread over a clip.
+
+    Returns
+    -------
+    float or None
+        The large scales divided by the small ones; ``None`` where the camera does not zoom, or too little scenery is
+        seen to tell.
+    """
+    if len(images) < 2:
+        return None
+    pictures = [subtract_local_mean(brightness(image)) for image in images]
+    centres, _ = find_windows(brightness(images[0]), pixel_noise(pictures))
+    if len(centres) < _MIN_WINDOWS:
+        return None
+    scales = [_scale(centres, follow_windows(pictures[0], picture, centres)) for picture in pictures[1:]]
+    known = [1.0, *(scale for scale in scales if scale is not None)]
+    if len(known) < _MIN_KNOWN * len(images):
+        return None
+    low, high = np.quantile(known, _INNER)
+    zoom = float(high / low)
+    reach = float(np.hypot(*pictures[0].shape[:2])) / 2.0
+    return zoom if (zoom - 1.0) * reach > _EDGE_PX else None
+
+
+def _scale(centres: Floats, moved: Floats) -> float | None:
+    """Return the scale of the similarity that most windows follow; ``None`` where fewer do."""
+    cv2.setRNGSeed(0)
+    matrix, follows = cv2.estimateAffinePartial2D(
+        centres, centres + moved, method=cv2.RANSAC, ransacReprojThreshold=2.0 * TOLERANCE_PX, maxIters=500
+    )
+    if matrix is None or follows.mean() < _MIN_SHARE or follows.sum() < _MIN_WINDOWS:
+        return None
+    return float(np.hypot(matrix[0, 0], matrix[1, 0]))

@@ -1,0 +1,176 @@
+"""Measures real films that nobody here made, each beside a plain tracker, and against what is known of them.
+
+    .venv/bin/python -m benchmarks.real_films FOLDER [--only WORD ...]
+
+FOLDER (or the environment variable ANGLECAM_REAL) holds ``films/NAME`` and ``pendulum-red-ball``; the films are not
+part of this project. Every film is measured without a rig file first and, where that is no success, with the one hint
+of the table. Both angles are compared at equal time stamps, after their medians are subtracted. The scale is that of
+anglecam's angle over the tracker's: on a shallow arc neither knows the pivot well.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import date
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from anglecam.errors import AnglecamError
+from anglecam.io.rig import Rig
+from anglecam.workflow.clip import measure_source, open_source
+from benchmarks.real.trackers import Tracked, blob, gear, polar, thread
+
+SAME_S = 0.002
+"""Time stamps closer than this are one frame's; containers round to a millisecond."""
+
+
+@dataclass(frozen=True)
+class RealFilm:
+    """A film, how to track it plainly, and what is known of it."""
+
+    path: str
+    track: Callable[[Path], Tracked]
+    hint: dict[str, Any] = field(default_factory=dict)
+    known: str = ""
+    periodic: bool = True
+
+
+def _redder(image: np.ndarray) -> np.ndarray:
+    b, g, r = (image[..., k].astype(int) for k in range(3))
+    return r - np.maximum(b, g) > 120
+
+
+def _bauble(image: np.ndarray) -> np.ndarray:
+    b, g, r = (image[..., k].astype(int) for k in range(3))
+    return r - np.maximum(b, g) > 60
+
+
+def _bluer(image: np.ndarray) -> np.ndarray:
+    return image[..., 0].astype(int) - image[..., 2] > 10
+
+
+def _yellow_left(image: np.ndarray) -> np.ndarray:
+    """Return the gilded ball of the left pendulum."""
+    b, g, r = (image[..., k].astype(int) for k in range(3))
+    chosen = (np.minimum(r, g) - b > 40) & (np.indices(b.shape)[0] > 240)
+    chosen[:, 440:] = False
+    return chosen
+
+
+FILMS = {
+    "red ball": RealFilm(
+        "pendulum-red-ball/esempio.avi",
+        lambda path: blob(path, _redder, (650.0, -709.0)),
+        {"mouth": {"rgb": [200, 40, 30]}},
+        "T 1.84 to 1.91 s",
+    ),
+    "bauble": RealFilm("films/bauble/pendulum.mp4", lambda path: blob(path, _bauble), {}, "T 2.629 s, L 1.70 m"),
+    "blue ball": RealFilm(
+        "films/blue-ball/film2_vga.mp4",
+        lambda path: blob(path, _bluer),
+        {"mouth": {"rgb": [40, 90, 150]}},
+        "T 1.601 s, L 0.636 m",
+    ),
+    "stopwatch": RealFilm(
+        "films/stopwatch/video1.mp4",
+        lambda path: thread(path, (570.0, 107.0), (150.0, 470.0), 38.0),
+        {"pivot": {"near": [570, 107]}},
+        "T 1.333 s",
+    ),
+    "clock pendula": RealFilm(
+        "films/clock-pendula/pendula.mp4",
+        lambda path: blob(path, _yellow_left, (375.0, 14.0)),
+        {"pivot": {"near": [375, 14]}},
+        "T 1.142 s",
+    ),
+    "stepper hand": RealFilm(
+        "films/stepper-hand/moving_timer.mp4",
+        lambda path: polar(path, (511.0, 741.0), (190.0, 420.0), handheld=False, subtract=True),
+        {"pivot": {"near": [511, 741]}},
+        periodic=False,
+    ),
+    "servo, 60 Hz": RealFilm(
+        "films/servo-60fps/servo.mp4",
+        lambda path: polar(path, (389.0, 567.0), (20.0, 85.0), handheld=True, subtract=True),
+        {"pivot": {"near": [389, 567]}},
+        periodic=False,
+    ),
+    "servo on a desk": RealFilm(
+        "films/servo-desk/servo.mp4",
+        lambda path: polar(path, (158.0, 231.0), (12.0, 75.0), handheld=True, subtract=True),
+        {"pivot": {"near": [158, 231]}},
+        periodic=False,
+    ),
+    "wooden gear": RealFilm(
+        "films/wooden-gears/WorkingGears.MOV",
+        lambda path: gear(path, (1236.0, 464.0), (428.0, 375.0), 13.0),
+        {"pivot": {"near": [1193, 410]}},
+        periodic=False,
+    ),
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, nargs="?", default=os.environ.get("ANGLECAM_REAL"))
+    parser.add_argument("--only", nargs="*", default=[], help="films whose name contains one of these words")
+    arguments = parser.parse_args()
+    if arguments.folder is None:
+        parser.error("give the folder of the films, or set ANGLECAM_REAL")
+    print(f"anglecam {version('anglecam')}, {date.today():%d %B %Y}\n")
+    print("| film | given | ok rows | RMS difference ° | scale | the same, scaled ° | sigma ° | period s | known |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    for name, film in FILMS.items():
+        if arguments.only and not any(word in name for word in arguments.only):
+            continue
+        path = Path(arguments.folder) / film.path
+        times, angle = film.track(path)
+        for hint in ({}, film.hint) if film.hint else ({},):
+            row, success = _compared(path, hint, times, angle, film)
+            print(f"| {name} | {hint or 'nothing'} | {row} | {film.known} |", flush=True)
+            if success:
+                break
+
+
+def _compared(
+    path: Path, hint: dict[str, Any], times: np.ndarray, angle: np.ndarray, film: RealFilm
+) -> tuple[str, bool]:
+    """Return the cells of one measurement, and whether it was a success."""
+    try:
+        measured = measure_source(open_source(path, Rig.model_validate(hint)))
+    except AnglecamError as problem:
+        return f"{str(problem).replace(f'{path}: ', '')} | | | | | ", False
+    series = measured.series
+    nearest = np.abs(times[None, :] - series.time[:, None]).argmin(axis=1)
+    both = series.ok & (np.abs(times[nearest] - series.time) < SAME_S) & np.isfinite(angle[nearest])
+    found, other = np.degrees(series.angle[both]), angle[nearest][both]
+    found, other = found - np.median(found), other - np.median(other)
+    scale = float(found @ other / (other @ other))
+    cells = [
+        f"{series.ok.sum()}/{len(series.ok)}",
+        f"{np.sqrt(((found - other) ** 2).mean()):.3f}",
+        f"{scale:.3f}",
+        f"{np.std(found - scale * other):.3f}",
+        f"{np.degrees(np.median(series.sigma[series.ok])):.3f}",
+        f"{_period(series.time[series.ok], series.angle[series.ok]):.4f}" if film.periodic else "",
+    ]
+    return " | ".join(cells), measured.doubt is None
+
+
+def _period(time: np.ndarray, angle: np.ndarray) -> float:
+    """Return the mean time between upward crossings of the middle, s; crossings closer than 0.3 s are noise."""
+    swing = angle - (np.quantile(angle, 0.9) + np.quantile(angle, 0.1)) / 2.0
+    up = np.flatnonzero((swing[:-1] < 0.0) & (swing[1:] >= 0.0))
+    cross = time[up] - swing[up] * (time[up + 1] - time[up]) / (swing[up + 1] - swing[up])
+    cross = cross[np.insert(np.diff(cross) > 0.3, 0, True)] if len(cross) else cross
+    return float((cross[-1] - cross[0]) / (len(cross) - 1)) if len(cross) > 1 else float("nan")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,85 @@
+"""What does not turn about a fixed pivot gets no angle, and too few measured frames are no success."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from anglecam.errors import InputError
+from anglecam.io.rig import Rig, RigPivot
+from anglecam.measurement.clip import measure_clip
+from anglecam.measurement.trust import why_few
+from anglecam.video.film import open_film
+
+SIZE = (240, 180)
+TIME = np.arange(45) / 30.0
+MIDDLE = np.array([120.0, 90.0])
+
+
+def _film(folder, places, marker=None):
+    """Draw a red ball at (n, 2) places before a wall with boxes; write it without loss."""
+    rng = np.random.default_rng(1)
+    wall = np.full((SIZE[1], SIZE[0], 3), (160, 170, 175), np.uint8)
+    for x, y in rng.uniform((0, 0), SIZE, (9, 2)).astype(int):
+        cv2.rectangle(wall, (x, y), (x + 25, y + 15), [rng.uniform(80, 200)] * 3, -1)
+    if marker is not None:
+        cv2.circle(wall, marker, 7, (30, 30, 30), -1, cv2.LINE_AA)
+    path = folder / "clip.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"FFV1"), 30, SIZE)
+    y, x = np.indices(wall.shape[:2])
+    for px, py in places:
+        cover = np.clip(9.5 - np.hypot(x - px, y - py), 0.0, 1.0)[..., None]
+        picture = wall + cover * (np.array((35, 30, 190)) - wall) + rng.normal(0.0, 2.0, wall.shape)
+        writer.write(np.clip(picture.round(), 0, 255).astype(np.uint8))
+    writer.release()
+    return open_film(path)
+
+
+def _swing(amplitude_deg, lever=70.0, pivot=(120.0, 30.0)):
+    angle = np.radians(amplitude_deg) * np.sin(2 * np.pi * 0.9 * TIME)
+    return np.array(pivot) + lever * np.column_stack([np.sin(angle), np.cos(angle)])
+
+
+TURN = 2 * np.pi * TIME / 1.2
+OTHERWISE = {
+    "a cart on a rail beside a round thing": (MIDDLE + np.outer(np.sin(5 * TIME), (60.0, 5.0)), (60, 40)),
+    "an ellipse": (MIDDLE + np.column_stack([80 * np.cos(TURN), 60 * np.sin(TURN)]), None),
+    "a pendulum on a cart": (_swing(20.0) + np.outer(np.sin(3 * TIME + 1.0), (25.0, 0.0)), None),
+    "at rest beside a round thing": (np.tile((170.0, 120.0), (len(TIME), 1)), (60, 60)),
+}
+
+
+@pytest.mark.parametrize("name", OTHERWISE)
+def test_what_does_not_turn_about_a_fixed_pivot_is_one_line(tmp_path, name):
+    places, marker = OTHERWISE[name]
+    with pytest.raises(InputError) as error:
+        measure_clip(_film(tmp_path, places, marker), Rig())
+    assert "\n" not in str(error.value)
+    assert "internal error" not in str(error.value)
+
+
+def test_a_pendulum_is_measured(tmp_path):
+    measured = measure_clip(_film(tmp_path, _swing(20.0)), Rig())
+    found = np.degrees(measured.series.angle)
+    truth = 20.0 * np.sin(2 * np.pi * 0.9 * TIME)
+    assert measured.series.ok.all()
+    assert measured.doubt is None
+    assert np.std(found - truth) < 0.15
+
+
+def test_a_swing_too_small_to_show_its_pivot_needs_a_declared_one(tmp_path):
+    film = _film(tmp_path, _swing(2.5, lever=100.0), marker=(120, 30))
+    with pytest.raises(InputError, match=r"declare it: pivot: \{near: \[x, y\]\}"):
+        measure_clip(film, Rig())
+    series = measure_clip(film, Rig(pivot=RigPivot(near=(120.0, 30.0)))).series
+    truth = 2.5 * np.sin(2 * np.pi * 0.9 * TIME)
+    assert np.std(np.degrees(series.angle) - truth) < 0.1
+
+
+def test_few_measured_frames_are_counted_with_their_causes():
+    status = ("ok",) * 9 + ("occluded",) * 6 + ("no_mouth",) * 5
+    assert why_few(status, 0.45) is None
+    message = why_few(status, 0.5)
+    assert message is not None
+    assert message.startswith("only 9 of 20 frames are measured (occluded in 6, no_mouth in 5)")
