@@ -115,6 +115,13 @@ def test_bad_commands_are_one_line(tmp_path):
         ("moth: auto", "unknown key moth"),
         ("pivot: {near: [1, 2], marker: auto, radius: 3}", "unknown key pivot.radius"),
         ("mouth: {rgb: [1, 2, 300]}", "mouth.rgb"),
+        ("mark: auto\nmouth: auto", "mark and mouth are two names of one key"),
+        ("mark: {rgb: [1, 2, 3], at: [4, 5]}", "declare only one of them"),
+        ("mark: {frame: 3}", "frame says in which frame at or box is"),
+        ("mark: {box: [9, 5, 4, 8]}", "left < right"),
+        ("mark: {at: [4, 5], frame: -1}", "mouth.frame"),
+        ("pivot: {at: [1, 2], near: [1, 2]}", "declare only one of them"),
+        ("pivot: {sigma_px: 2}", "sigma_px is the uncertainty of at"),
         ("facing: up", "facing"),
         ("pixel_error_px: [6, -1]", "pixel_error_px"),
         ("- a\n- b", "expected keys and values"),
@@ -194,6 +201,18 @@ def test_a_command_that_changes_after_the_recording_costs_that_recording(tmp_pat
     assert [record.name for record in measured.records] == ["two"]
     said = "one: its command first changes at 500 s, after the last measured frame at 1.967 s"
     assert [str(problem).partition(";")[0] for problem in measured.problems] == [said]
+
+
+def test_mark_is_another_name_of_mouth_and_points_at_it(tmp_path):
+    path = tmp_path / "rig.yaml"
+    path.write_text("mark: {at: [12, 30.5], frame: 7}\npivot: {at: [100, -300], sigma_px: 2}")
+    rig = read_rig(path)
+    assert rig.pointed_mark.as_box == (12.0, 30.5, 12.0, 30.5)
+    assert rig.pointed_mark.frame == 7
+    assert rig.pivot.expected == (100.0, -300.0)
+    path.write_text("mark: {rgb: [40, 40, 40]}")
+    assert read_rig(path).mark_rgb == (40, 40, 40)
+    assert read_rig(path).pointed_mark is None
 
 
 def test_tracks_replace_their_clip_if_the_rig_names_their_points(tmp_path):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from anglecam.vision.pivot.circle import fit_circle
-from anglecam.vision.pivot.estimate import combine_pivot
+from anglecam.vision.pivot.estimate import PivotEstimate, combine_pivot
 from anglecam.vision.pivot.marker import RoundMarker
 
 
@@ -34,3 +34,51 @@ def test_a_marker_off_the_centre_of_rotation_is_reported_and_not_used():
 
 def test_without_marker_and_motion_there_is_no_pivot():
     assert combine_pivot(None, None) == (None, None)
+
+
+HINT = PivotEstimate(np.array([50.0, 60.0]), 100.0 * np.eye(2), "hint")
+SCREWS = 10.0 / (640 * 480)
+"""Ten round things in the picture, 1/px²."""
+
+
+def _marker(x, y):
+    return RoundMarker(np.array([x, y]), 0.05**2 * np.eye(2), 9.0)
+
+
+def test_a_round_thing_far_from_the_hint_is_an_uncertain_pivot():
+    pivot, note = combine_pivot(_marker(50.0, 80.0), None, HINT, SCREWS)
+    assert "may be something else" in note
+    assert np.sqrt(np.trace(pivot.covariance_px2) / 2.0) > 5.0
+
+
+def test_a_declared_marker_at_the_hint_is_a_certain_pivot():
+    pivot, note = combine_pivot(_marker(53.0, 60.0), None, HINT)
+    assert note is None
+    np.testing.assert_allclose(pivot.centre_px, [53.0, 60.0], atol=0.01)
+    assert np.sqrt(np.trace(pivot.covariance_px2) / 2.0) < 0.1
+
+
+def test_a_marker_nearer_to_the_camera_does_not_bind_a_pivot_that_the_path_shows():
+    circle = fit_circle(_path((50, 60)))
+    nearer, _ = combine_pivot(_marker(53.0, 64.0), circle, None, SCREWS, np.outer([4.0, 5.0], [4.0, 5.0]))
+    assert np.hypot(*(nearer.centre_px - [50.0, 60.0])) < 3.0 * np.sqrt(np.trace(circle.centre_covariance_px2))
+    off = nearer.centre_px - [50.0, 60.0]
+    assert off @ np.linalg.solve(nearer.covariance_px2, off) < 9.21
+
+
+def test_of_many_pivots_three_cases_cover_the_truth_as_often_as_their_covariance_says():
+    """A round thing is the marker, a marker at another depth, or a screw; the hint is off by 10 px RMS."""
+    rng, D = np.random.default_rng(4), np.diag([36.0, 1e-6])
+    squared = []
+    for _ in range(400):
+        truth = HINT.centre_px + 10.0 * rng.standard_normal(2)
+        case = rng.choice(3, p=[0.7, 0.2, 0.1])
+        place = truth + 0.05 * rng.standard_normal(2)
+        if case == 1:
+            place = place + [6.0 * rng.standard_normal(), 0.0]
+        if case == 2:
+            place = HINT.centre_px + rng.uniform(-40.0, 40.0, 2)
+        pivot, _ = combine_pivot(_marker(*place), None, HINT, 0.1 / 80.0**2, D)
+        off = pivot.centre_px - truth
+        squared.append(off @ np.linalg.solve(pivot.covariance_px2, off) / 2.0)
+    assert np.mean(np.array(squared) < 9.21 / 2.0) > 0.93
