@@ -147,8 +147,10 @@ def _compared(
     except AnglecamError as problem:
         return f"{str(problem).replace(f'{path}: ', '')} | | | | | ", False
     series = measured.series
-    nearest = np.abs(times[None, :] - series.time[:, None]).argmin(axis=1)
-    both = series.ok & (np.abs(times[nearest] - series.time) < SAME_S) & np.isfinite(angle[nearest])
+    # FFmpeg states times of reordered frames in AVI late by the decoder's delay; each count starts at its first frame.
+    times, own = times - times[0], series.time - series.time[0]
+    nearest = np.abs(times[None, :] - own[:, None]).argmin(axis=1)
+    both = series.ok & (np.abs(times[nearest] - own) < SAME_S) & np.isfinite(angle[nearest])
     found, other = np.degrees(series.angle[both]), angle[nearest][both]
     found, other = found - np.median(found), other - np.median(other)
     scale = float(found @ other / (other @ other))
