@@ -34,12 +34,7 @@ _PIVOT_SIGMAS = 3.0
 _MAX_SCALE_SIGMA = 0.2
 """Relative standard uncertainty of the path's radius from which on the path does not show its centre, as for a pivot
 (`anglecam.vision.pivot.estimate`)."""
-_BENT = 3.0
-"""Standard uncertainties of the path's curvature by which it must exceed that of a straight line, and may differ from
-that of a circle about a round marker."""
-_SLOW_PX, _SLOW_LENGTH_PX = 0.04, 8.0
-"""Standard deviation of the part of a centroid's error that varies slowly along the path, and the length on which it
-does, px (`anglecam.vision.pivot.circle`)."""
+_DECLARE = "pivot: {at: [x, y], sigma_px: s} in rig.yaml"
 _TRAVEL_PX = 0.5
 """Least RMS travel of a mark that moves, px. Noise, rain and flicker shift the centroid of a thing at rest by 0.2."""
 
@@ -106,7 +101,7 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
     travel = _travel(angles.mark_px)
     at_rest = not detections.moves or travel < _TRAVEL_PX
     if at_rest and not declared:
-        return "nothing is seen to turn; to measure a mechanism at rest, declare pivot: {near: [x, y]} in rig.yaml"
+        return f"nothing is seen to turn; to measure a mechanism at rest, declare {_DECLARE}"
     off, share = _off_circle(detections, angles), _MAX_OFF_CIRCLE
     if detections.body is not None:
         off, share = detections.body.pivot_scatter_px, _MAX_OFF_CENTRE
@@ -116,11 +111,9 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
             f" while it travels {travel:.2g} px RMS"
         )
     seen_to_turn = detections.body is not None or angles.registered is not None
-    shown = _shows_its_centre(detections) or _bends_about_pivot(angles)
-    if not declared and not seen_to_turn and not shown:
+    if not declared and not seen_to_turn and not _shows_its_centre(detections):
         return (
-            "the mark's path is too short or too straight to show about which point it turns; declare it:"
-            " pivot: {near: [x, y]} in rig.yaml"
+            f"the mark's path is too short or too straight to show about which point it turns; declare it: {_DECLARE}"
         )
     return None
 
@@ -152,32 +145,6 @@ def _off_circle(detections: Detections, angles: Angles) -> float:
 
 
 def _shows_its_centre(detections: Detections) -> bool:
-    """Return whether the mark's path alone determines the radius."""
+    """Return whether the mark's path alone determines its centre."""
     circle = detections.circle
     return circle is not None and bool(circle.covariance_px2[2, 2] < (_MAX_SCALE_SIGMA * circle.radius_px) ** 2)
-
-
-def _bends_about_pivot(angles: Angles) -> bool:
-    """Return whether a path, even one too short to fit a circle, is bent as a circle about the pivot is.
-
-    With u along the path and v towards the pivot, v = a + b·u + κ·u²/2. Of n independent places, evenly spaced over a
-    length L with errors σ, the curvature has the standard uncertainty 2·σ·√(180/n)/L².
-    """
-    arm = angles.mark_px - angles.pivot.centre_px
-    towards = -arm.mean(axis=0)
-    lever = float(np.hypot(*towards))
-    v = arm @ towards / lever
-    u = arm @ np.array([-towards[1], towards[0]]) / lever
-    _, place = np.unique(np.round(u).astype(int), return_inverse=True)
-    count = np.bincount(place)
-    u, v = np.bincount(place, u) / count, np.bincount(place, v) / count
-    if len(u) < 4:
-        return False
-    shapes = np.column_stack([np.ones(len(u)), u, u**2 / 2.0])
-    fitted = np.linalg.lstsq(shapes, v, rcond=None)[0]
-    scatter = float(np.sqrt(((v - shapes @ fitted) ** 2).sum() / (len(u) - 3)))
-    length = float(np.ptp(u))
-    independent = max(length / _SLOW_LENGTH_PX, 3.0)
-    sigma = 2.0 * float(np.hypot(scatter, _SLOW_PX)) * np.sqrt(180.0 / independent) / length**2
-    curvature = float(fitted[2])
-    return curvature > _BENT * sigma and abs(curvature - 1.0 / lever) < _BENT * sigma

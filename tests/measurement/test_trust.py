@@ -70,7 +70,7 @@ def test_a_pendulum_is_measured(tmp_path):
 
 def test_a_swing_too_small_to_show_its_pivot_needs_a_declared_one(tmp_path):
     film = _film(tmp_path, _swing(2.5, lever=100.0), marker=(120, 30))
-    with pytest.raises(InputError, match=r"declare it: pivot: \{near: \[x, y\]\}"):
+    with pytest.raises(InputError, match=r"declare it: pivot: \{at: \[x, y\], sigma_px: s\}"):
         measure_clip(film, Rig())
     series = measure_clip(film, Rig(pivot=RigPivot(near=(120.0, 30.0)))).series
     truth = 2.5 * np.sin(2 * np.pi * 0.9 * TIME)
