@@ -19,7 +19,7 @@ from anglecam.data.typing import Floats, Image
 from anglecam.video.film import Film
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.estimate import PivotEstimate
-from anglecam.vision.registration.learn import learn_appearance
+from anglecam.vision.registration.learn import covariance_at_unknown_height, learn_appearance
 from anglecam.vision.registration.tiles import FrameView, choose_tiles, motion_plane
 from anglecam.vision.registration.turn import NO_TURN, BodyAppearance, TurnEstimate, find_turn, refine_doubtful_turn
 
@@ -87,7 +87,7 @@ class Registered:
     pivot_px: Floats
     """(2,) centre of rotation estimated from the whole body, px."""
     pivot_covariance_px2: Floats
-    """(2, 2) px²."""
+    """(2, 2) of the centre through which the rotations depend on the pivot, px²."""
     appearance: BodyAppearance
     """The appearance that was learnt."""
 
@@ -124,7 +124,7 @@ def register_clip(
     n, known = len(start.turn), np.flatnonzero(np.isfinite(start.sigma))
     if len(known) < _FEWEST:
         return f"the mark is seen in {len(known)} frames only"
-    plane = motion_plane(lens, film.size)
+    plane = motion_plane(lens, film.size, start.pivot.centre_px)
     planes = 1 if film.coarse_colour else 3
     most = int(np.clip(_BYTES // (planes * film.width * film.height), _FEWEST, _LEARNT))
     wanted = _spread_out(start.turn, known, most)
@@ -144,7 +144,9 @@ def register_clip(
     if appearance.absorbed_share > _YIELDING:
         return "the body is seen in too few poses, or too obliquely, to be learnt"
     apart = appearance.pivot_px - start.pivot.centre_px
-    if apart @ np.linalg.solve(appearance.pivot_covariance_px2 + start.pivot.covariance_px2, apart) > _ASTRAY:
+    lever = float(np.hypot(*(appearance.middle_px - appearance.pivot_px)))
+    expected = covariance_at_unknown_height(start.pivot, plane, lever)
+    if apart @ np.linalg.solve(appearance.pivot_covariance_px2 + expected, apart) > _ASTRAY:
         return "the rigid part of the picture does not rotate about the pivot"
     centred = replace(start, pivots_px=start.pivots_px + apart)
     found, rows = [NO_TURN] * n, start.row.copy()
@@ -204,6 +206,6 @@ def _gathered(found: list[TurnEstimate], rows: Floats, appearance: BodyAppearanc
         pivot_sensitivity=np.array([one.pivot_sensitivity for one in found]),
         row=rows,
         pivot_px=appearance.pivot_px,
-        pivot_covariance_px2=appearance.pivot_covariance_px2,
+        pivot_covariance_px2=appearance.centre_covariance_px2,
         appearance=appearance,
     )

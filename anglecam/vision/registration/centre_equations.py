@@ -112,6 +112,21 @@ def solve_centres(
     return covariance @ right, covariance
 
 
+def effective_centre(normal: Floats, parallax: Floats) -> Floats:
+    """Return the matrix (2, size) from the errors of pivot and heights to the error of the effective centre.
+
+    An error of the tiles' centres acts on a frame's angle through the sum over tiles of n·(1 − R)·(e + p·h), with the
+    cross terms n of angle and place. As complex numbers, factors commute: the sum equals that of a common centre whose
+    error is e + Σ conj(n)·p·h / Σ conj(n), in every frame.
+    """
+    if not parallax.any():
+        return np.eye(2)
+    cross = normal[..., 0, 1:].sum(axis=1)
+    against = cross[:, 0] - 1j * cross[:, 1]
+    share = against / against.sum() * (parallax[0] + 1j * parallax[1])
+    return np.hstack([np.eye(2), np.stack([share.real, share.imag])])
+
+
 def disagreement_of_groups(covariance: Floats, scores: Floats, groups: NDArray[np.intp]) -> float:
     """Return the pivot's variance from the disagreement of groups of tiles over that expected from noise alone.
 

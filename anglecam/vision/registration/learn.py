@@ -2,9 +2,13 @@
 
 The three depend on one another and are found alternately: the appearance for given angles, then centre and angles for a
 given appearance. An appearance with a small error agrees with the angles from which it was learnt, so the steps shrink
-slowly, each by nearly the same ratio. After the first rounds, every second step is therefore extended by Aitken
-extrapolation (Aitken 1926). The ratio is the share of an error of the centre that the appearance absorbs. It is
-measured at the end by displacing the converged centre, and enlarges the centre's covariance.
+slowly, each error by the share of it that the appearance absorbs. After the first rounds the steps are therefore
+extended by Anderson's acceleration (Anderson 1965). The share absorbed of an error of the centre is measured at the end
+by displacing the converged centre, and enlarges the centre's covariance.
+
+Parts of the body at different heights rotate about different image points. The heights are drawn from a normal
+distribution, whose variance is estimated from the heights themselves (MacKay 1992): a flat body thereby keeps a common
+centre.
 """
 
 from __future__ import annotations
@@ -32,6 +36,7 @@ from anglecam.vision.registration.centre_equations import (
     CentrePrior,
     centre_equations,
     disagreement_of_groups,
+    effective_centre,
     excess_displacement,
     solve_centres,
 )
@@ -56,8 +61,15 @@ _MIN_VARIANCE = 0.5
 noise."""
 _NO_MISFIT = 1e-9
 """Replaces the usual misfit, zero, of a tile that is outside most pictures."""
-_DEPTH = 0.15
-"""Standard deviation of the heights of a body's parts, relative to their distance from the pivot."""
+_DEPTH = 0.3
+"""Standard deviation of the heights of a body's parts, and of mark and marker from them, relative to their distance from
+the pivot: the initial value for the parts, the only one for mark and marker, whose height nothing shows."""
+_LEAST_HEIGHT_PX = 0.3
+"""Least standard deviation of the heights: a body is never known to be flatter, px."""
+_LEAST_SHARE = 1e-3
+"""Singular values of the steps' differences below this share of the largest are noise."""
+_MEMORY = 4
+"""Rounds that the acceleration remembers."""
 
 
 @dataclass(frozen=True)
@@ -70,11 +82,13 @@ class _State:
     """(tiles,) px."""
     turns: Floats
     """(frames,) rad."""
+    height_variance: float
+    """Of the distribution of the heights, px²."""
 
-    def moved(self, step: Floats, lever: float) -> _State:
+    def moved(self, step: Floats, lever: float, height_variance: float) -> _State:
         """Return the state after a step whose components are all in px."""
         error, heights, turns = np.split(step, [2, 2 + len(self.heights)])
-        return _State(self.error + error, self.heights + heights, self.turns + turns / lever)
+        return _State(self.error + error, self.heights + heights, self.turns + turns / lever, height_variance)
 
     def step_to(self, other: _State, lever: float) -> Floats:
         """Return the step from this state to another, all components in px."""
@@ -92,7 +106,8 @@ class _Data:
     start_px: Floats
     """(2,) the initial pivot."""
     parallax: Floats
-    prior: CentrePrior
+    pivot_information: Floats
+    """(2, 2) prior information on the pivot, 1/px²."""
 
     def centres(self, state: _State) -> Floats:
         """Return the centre of rotation of each tile, (tiles, 2) px."""
@@ -144,12 +159,13 @@ def learn_appearance(
     """
     start = pivot.centre_px
     lever = float(np.median(np.hypot(*(tiles.corners - start).T)))
-    prior = np.asarray(np.linalg.inv(pivot.covariance_px2), dtype=float)
+    prior = np.asarray(np.linalg.inv(covariance_at_unknown_height(pivot, plane, lever)), dtype=float)
     views = [
         view_tiles(c[None], h[None], frames, plane, start)[0] for c, h in zip(tiles.corners, tiles.heights, strict=True)
     ]
-    data = _Data(tiles, views, start, plane.lens.parallax, CentrePrior(prior, 1.0 / (_DEPTH * lever) ** 2))
-    last = _iterate(data, _State(np.zeros(2), tiles.heights, np.array([f.turn for f in frames])), lever)
+    data = _Data(tiles, views, start, plane.parallax, prior)
+    turns = np.array([f.turn for f in frames])
+    last = _iterate(data, _State(np.zeros(2), tiles.heights, turns, (_DEPTH * lever) ** 2), lever)
     state, covariance = last.state, last.covariance / (1.0 - _absorbed_of_pivot(data, last))
     fits = _compare_all(last.appearance, data.seen(state), state.turns, data.centres(state)).without(last.hidden)
     normal, gradient = fits.weighted(last.variance)
@@ -163,6 +179,7 @@ def learn_appearance(
     birge = max(1.0, float(np.sqrt(max(estimates))))
     scores = centre_equations(normal, gradient, state.turns, data.parallax).scores
     variance_ratio = max(birge**2, disagreement_of_groups(last.covariance, scores, groups))
+    acting = effective_centre(normal, data.parallax)
     information = normal[:, :, 0, 0].sum(axis=1)
     return BodyAppearance(
         tiles=join_tiles(last.appearance),
@@ -170,12 +187,19 @@ def learn_appearance(
         plane=plane,
         pivot_px=start + state.error,
         pivot_covariance_px2=variance_ratio * covariance[:2, :2],
+        centre_covariance_px2=variance_ratio * acting @ covariance @ acting.T,
         variance=last.variance,
         groups=groups,
         birge=birge,
         absorbed_share=_absorbed_of_turns(data, last),
         middle_px=information @ (tiles.corners + TILE_SIDE_PX / 2) / information.sum(),
     )
+
+
+def covariance_at_unknown_height(pivot: PivotEstimate, plane: MotionPlane, lever_px: float) -> Floats:
+    """Return the covariance (2, 2) of a pivot that was found at another height than that of the body, px²."""
+    along = _DEPTH * lever_px * plane.parallax
+    return np.asarray(pivot.covariance_px2 + np.outer(along, along))
 
 
 def _iterate(data: _Data, state: _State, lever: float) -> _Round:
@@ -185,19 +209,31 @@ def _iterate(data: _Data, state: _State, lever: float) -> _Round:
         for c, v, o in zip(data.tiles.corners, data.views, data.centres(state), strict=True)
     ]
     now = _round(data, state, appearance, None)
-    before: Floats | None = None
+    states: list[Floats] = []
+    steps: list[Floats] = []
+    origin = state
     for done in range(1, _MAX_ROUNDS):
-        step = state.step_to(now.state, lever)
         if np.hypot(*(data.centres(now.state) - data.centres(state)).T).max() < _SETTLED_PX:
             break
-        # In a tilted view the heights converge at different rates, so no single ratio exists to extrapolate with.
-        extrapolate = done > _HIDDEN_ROUNDS and before is not None and not data.parallax.any()
-        factor = _aitken_factor(before, step) if extrapolate and before is not None else 1.0
-        state = state.moved(step * factor, lever)
-        # After an extrapolation the ratio is estimated anew, from the next two steps.
-        before = None if extrapolate else step
+        states, steps = [*states, origin.step_to(state, lever)], [*steps, state.step_to(now.state, lever)]
+        if done <= _HIDDEN_ROUNDS:
+            states, steps = states[-1:], steps[-1:]
+        step = _accelerated(states[-_MEMORY:], steps[-_MEMORY:])
+        state = state.moved(step, lever, now.state.height_variance)
         now = _round(data, state, now.appearance, now.hidden if done >= _HIDDEN_ROUNDS else None, now.fits)
     return now
+
+
+def _accelerated(states: Sequence[Floats], steps: Sequence[Floats]) -> Floats:
+    """Return Anderson's step from the last state: the one that would vanish if the steps were linear in the states."""
+    last = steps[-1]
+    if len(steps) == 1:
+        return last
+    of_steps, of_states = np.diff(steps, axis=0).T, np.diff(states, axis=0).T
+    share = np.linalg.lstsq(of_steps, last, rcond=_LEAST_SHARE)[0]
+    whole = last - (of_states + of_steps) @ share
+    most = float(np.linalg.norm(last)) / (1.0 - _MAX_ABSORBED)
+    return np.asarray(whole * min(1.0, most / max(float(np.linalg.norm(whole)), 1e-12)))
 
 
 def _round(
@@ -220,17 +256,21 @@ def _round(
     variance = fits.squares.sum(axis=1) / np.maximum(fits.count.sum(axis=1), 1)
     variance = np.maximum(variance, _MIN_VARIANCE * np.median(variance))
     equations = centre_equations(*fits.weighted(variance), state.turns, data.parallax)
-    step, covariance = solve_centres(equations, data.prior, state.error, state.heights)
+    prior = CentrePrior(data.pivot_information, 1.0 / state.height_variance)
+    step, covariance = solve_centres(equations, prior, state.error, state.heights)
     height_steps = step[2:] if len(step) > 2 else np.zeros(len(state.heights))
     turn_steps = (equations.turn_scores - equations.cross @ step) / equations.turn_information
-    following = _State(state.error + step[:2], state.heights + height_steps, state.turns + turn_steps)
+    heights = state.heights + height_steps
+    scatter = _height_variance(heights, covariance, state.height_variance) if len(step) > 2 else state.height_variance
+    following = _State(state.error + step[:2], heights, state.turns + turn_steps, scatter)
     return _Round(appearance, out, variance, covariance, following, all_fits)
 
 
-def _aitken_factor(before: Floats, step: Floats) -> float:
-    """Return the factor 1/(1 − r) from a step to the sum of all that follow, each r times its predecessor."""
-    ratio = float(before[:2] @ step[:2]) / max(float(before[:2] @ before[:2]), 1e-12)
-    return 1.0 / (1.0 - min(ratio, _MAX_ABSORBED)) if ratio > 0.0 else 1.0
+def _height_variance(heights: Floats, covariance: Floats, before: float) -> float:
+    """Return the variance of the heights' distribution by MacKay's fixed point: Σh² over the number determined."""
+    determined = float((1.0 - np.diag(covariance)[2:] / before).clip(0.0, 1.0).sum())
+    variance = float(heights @ heights) / max(determined, 1.0)
+    return float(np.clip(variance, _LEAST_HEIGHT_PX**2, before * 4.0))
 
 
 def _absorbed_of_turns(data: _Data, now: _Round) -> float:

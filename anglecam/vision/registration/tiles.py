@@ -1,8 +1,8 @@
 """The tiles of the body that are rigid and have edges, and their views in frames.
 
-All places are in the plane of motion (`anglecam.camera.lens`), in which the body rotates without changing its shape. In
-a tilted view, a point of the body that is z nearer to the camera than the pivot rotates around a different centre,
-displaced from the pivot by z·parallax. Each tile therefore has a height.
+All places are in the plane of motion (`anglecam.camera.lens`), in which the body rotates without changing its shape. A
+point of the body that is z nearer to the camera than the pivot rotates around a different centre, where the axis of
+rotation is seen at the height z: displaced from the pivot by z·parallax. Each tile therefore has a height.
 """
 
 from __future__ import annotations
@@ -63,6 +63,8 @@ class MotionPlane:
     """(height, width, 2) place of each pixel in the plane, px."""
     stretch: float
     """Largest number of picture pixels that one unit of length in the plane covers."""
+    parallax: Floats
+    """(2,) displacement of the centre of rotation for each px of height."""
 
 
 @dataclass(frozen=True)
@@ -75,12 +77,35 @@ class Tiles:
     """(tiles,) towards the camera, px; zero in a view that is not tilted."""
 
 
-def motion_plane(lens: Lens, size: tuple[int, int]) -> MotionPlane:
-    """Map the pixels of a picture of (width, height) to the plane of motion."""
+def motion_plane(lens: Lens, size: tuple[int, int], pivot_px: Floats) -> MotionPlane:
+    """Map the pixels of a picture to the plane of motion.
+
+    Parameters
+    ----------
+    lens : Lens
+        From the picture to the plane.
+    size : tuple of int
+        Width and height of the picture, px.
+    pivot_px : ndarray
+        (2,) in the plane, px. Off the principal point, an axis parallel to the line of sight is seen as a line, too:
+        it leads from the pivot away from the principal point.
+    """
     x, y = np.meshgrid(np.arange(size[0], dtype=float), np.arange(size[1], dtype=float))
     ground = np.ascontiguousarray(lens.rectify(np.stack([x, y], axis=-1)))
     steps = [np.hypot(*np.moveaxis(np.diff(ground, axis=axis), -1, 0)).min() for axis in (0, 1)]
-    return MotionPlane(lens, ground, 1.0 / max(min(steps), 0.1))
+    parallax = lens.parallax if lens.tilt != 0.0 else _parallax_of_perspective(lens, size, pivot_px)
+    return MotionPlane(lens, ground, 1.0 / max(min(steps), 0.1), parallax)
+
+
+def _parallax_of_perspective(lens: Lens, size: tuple[int, int], pivot_px: Floats) -> Floats:
+    """Return the parallax in a square view: (pivot − principal point)/focal length.
+
+    An undeclared focal length is taken to equal the picture's width: it only scales the heights.
+    """
+    if lens.calibration is not None:
+        return np.asarray((pivot_px - lens.calibration.camera_matrix[:2, 2]) / lens.calibration.focal_px)
+    middle = (np.array(size) - 1.0) / 2.0
+    return np.asarray((pivot_px - middle) / (lens.focal_px or float(size[0])))
 
 
 def choose_tiles(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats, noise: float) -> Tiles:
@@ -149,7 +174,7 @@ def view_tiles(
         (views, 2) the tiles' middles in the picture, px.
     """
     offsets, values, starts, centres = [], [], [0], []
-    parallax = heights[:, None] * plane.lens.parallax
+    parallax = heights[:, None] * plane.parallax
     reach = (0.71 * TILE_SIDE_PX + 1.5) * plane.stretch
     for f in frames:
         arm = corners + TILE_SIDE_PX / 2 - pivot_px - parallax
@@ -187,7 +212,7 @@ def _each_rotated(arms: Floats, turns: Floats) -> Floats:
 def _find_heights(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats) -> Floats:
     """Find the height, px, at which each tile of the picture varies least between frames rotated back."""
     height, width = frames[0].image.shape[:2]
-    slope = float(np.hypot(*plane.lens.parallax))
+    slope = float(np.hypot(*plane.parallax))
     if slope == 0.0:
         return np.zeros((height // TILE_SIDE_PX, width // TILE_SIDE_PX))
     grey = [replace(f, image=f.image.mean(axis=2, keepdims=True).astype(np.uint8)) for f in frames[::2]]
@@ -218,7 +243,7 @@ def _stack(
     """
     height, width = frames[0].image.shape[:2]
     x, y = np.meshgrid(np.arange(0.0, width, step), np.arange(0.0, height, step))
-    parallax = np.reshape(heights, (-1, 1)) * plane.lens.parallax
+    parallax = np.reshape(heights, (-1, 1)) * plane.parallax
     arms = np.stack([x, y], axis=-1).reshape(-1, 2) - pivot_px - parallax
     pile, whole = [], np.ones(x.shape, bool)
     for f in frames:

@@ -51,6 +51,8 @@ class BodyAppearance:
     """(2,) centre of rotation in the reference frame, px."""
     pivot_covariance_px2: Floats
     """(2, 2) px²."""
+    centre_covariance_px2: Floats
+    """(2, 2) covariance of the tiles' effective common centre, through which the angles depend on all centres, px²."""
     variance: Floats
     """(tiles,) mean squared residual of each tile, grey levels squared."""
     groups: NDArray[np.intp]
@@ -106,7 +108,7 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
         With the uncertainty caused by noise, scatter between tiles, and copies.
     """
     views, places = view_tiles(body.tiles.corners, body.heights, [view], body.plane, body.pivot_px)
-    centres = body.pivot_px + body.heights[:, None] * body.plane.lens.parallax
+    centres = body.pivot_px + body.heights[:, None] * body.plane.parallax
     turn = view.turn
     for _ in range(_MAX_STEPS):
         fit = compare_tiles(body.tiles, views, np.full(len(body.tiles), turn), centres)
@@ -181,7 +183,7 @@ def refine_doubtful_turn(body: BodyAppearance, view: FrameView, reach_px: float)
     FrameView
         With the angle that fits best, or unchanged where no other fits distinctly better.
     """
-    centres = body.pivot_px + body.heights[:, None] * body.plane.lens.parallax
+    centres = body.pivot_px + body.heights[:, None] * body.plane.parallax
     step = 1.0 / float(np.hypot(*(body.middle_px - body.pivot_px)))
     tries = [replace(view, turn=view.turn + k * step) for k in range(-int(reach_px), int(reach_px) + 1)]
 
