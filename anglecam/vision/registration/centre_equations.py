@@ -1,7 +1,8 @@
 """Normal equations of a body's tiles for the centre of rotation and the tiles' heights.
 
-A rotated tile appears displaced by t = (1 − R)·(e + p·h), with the error e of the pivot, the parallax p and the tile's
-height h. Every frame's angle is free and is eliminated.
+A rotated tile appears displaced by t = (1 − R)·(e + (p + φ·p')·h), with the error e of the pivot, the parallax p, its
+error of direction φ (p' is p turned by a right angle), and the tile's height h. Every frame's angle is free and is
+eliminated. The unknowns are in the order e, φ, h.
 """
 
 from __future__ import annotations
@@ -13,23 +14,19 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
 from anglecam.vision.image.transforms import rotation
+from anglecam.vision.registration.tiles import AxisView
 
 NO_INFORMATION = 1e-9
 """Information of a frame in which every tile is hidden."""
 
 
-@dataclass(frozen=True)
-class CentrePrior:
-    """Prior information on the centres of rotation, 1/px²."""
-
-    pivot: Floats
-    """(2, 2)."""
-    height: float
+PIVOT, DIRECTION, HEIGHTS = slice(0, 2), 2, slice(3, None)
+"""Places of the unknowns."""
 
 
 @dataclass(frozen=True)
 class CentreEquations:
-    """Normal equations for the errors of pivot and heights (size 2 or 2 + tiles), every frame's angle eliminated."""
+    """Normal equations for the errors of the centres (size 3 + tiles), every frame's angle eliminated."""
 
     information: Floats
     """(size, size)."""
@@ -43,8 +40,10 @@ class CentreEquations:
     """(frames,) score of the angle."""
 
 
-def centre_equations(normal: Floats, gradient: Floats, turns: Floats, parallax: Floats) -> CentreEquations:
-    """Assemble the normal equations. Without parallax the heights have no effect and are left out.
+def centre_equations(
+    normal: Floats, gradient: Floats, turns: Floats, axis: AxisView, heights: Floats
+) -> CentreEquations:
+    """Assemble the normal equations.
 
     Parameters
     ----------
@@ -52,79 +51,75 @@ def centre_equations(normal: Floats, gradient: Floats, turns: Floats, parallax: 
         (tiles, frames, 3, 3) and (tiles, frames, 3) for angle, x and y, divided by the variances.
     turns : ndarray
         (frames,) rad.
-    parallax : ndarray
-        (2,) displacement of the centre of rotation for each px of height.
-
-    Returns
-    -------
-    CentreEquations
-        Of size 2, or 2 + tiles with parallax.
-    """
-    displacement = np.eye(2) - rotation(turns)
-    place = np.einsum("kai,tkab,kbj->tij", displacement, normal[..., 1:, 1:], displacement)
-    cross_place = np.einsum("kai,tka->tki", displacement, normal[..., 1:, 0])
-    score = np.einsum("kai,tka->ti", displacement, gradient[..., 1:])
-    turn_information, tiles = np.maximum(normal[..., 0, 0].sum(axis=0), NO_INFORMATION), len(normal)
-    size = 2 + (tiles if parallax.any() else 0)
-    information, scores, cross = np.zeros((size, size)), np.zeros((tiles, size)), np.zeros((len(turns), size))
-    information[:2, :2], scores[:, :2], cross[:, :2] = place.sum(axis=0), score, cross_place.sum(axis=0)
-    if size > 2:
-        place_height = place @ parallax
-        information[2:, :2], information[:2, 2:] = place_height, place_height.T
-        information[2:, 2:] = np.diag(place_height @ parallax)
-        scores[:, 2:] = np.diag(score @ parallax)
-        cross[:, 2:] = (cross_place @ parallax).T
-    information -= (cross.T / turn_information) @ cross
-    scores -= (gradient[..., 0] / turn_information) @ cross
-    return CentreEquations(information, scores, cross, turn_information, gradient[..., 0].sum(axis=0))
-
-
-def solve_centres(
-    equations: CentreEquations, prior: CentrePrior, error: Floats, heights: Floats
-) -> tuple[Floats, Floats]:
-    """Solve for the steps of pivot and heights.
-
-    Parameters
-    ----------
-    equations : CentreEquations
-        From the data.
-    prior : CentrePrior
-        Prior information; the prior mean is zero for the error of the pivot and for the heights.
-    error : ndarray
-        (2,) current error of the pivot, px.
+    axis : AxisView
+        Current parallax.
     heights : ndarray
         (tiles,) current heights, px.
 
     Returns
     -------
+    CentreEquations
+        Linear in the steps of all unknowns.
+    """
+    displacement = np.eye(2) - rotation(turns)
+    by_unknown = centre_derivatives(axis, heights)
+    place = np.einsum("kai,tkab,kbj->tij", displacement, normal[..., 1:, 1:], displacement)
+    cross_place = np.einsum("kai,tka->tki", displacement, normal[..., 1:, 0])
+    score = np.einsum("kai,tka->ti", displacement, gradient[..., 1:])
+    turn_information = np.maximum(normal[..., 0, 0].sum(axis=0), NO_INFORMATION)
+    information = np.einsum("tiu,tij,tjv->uv", by_unknown, place, by_unknown, optimize=True)
+    scores = np.einsum("ti,tiu->tu", score, by_unknown)
+    cross = np.einsum("tki,tiu->ku", cross_place, by_unknown)
+    information -= (cross.T / turn_information) @ cross
+    scores -= (gradient[..., 0] / turn_information) @ cross
+    return CentreEquations(information, scores, cross, turn_information, gradient[..., 0].sum(axis=0))
+
+
+def centre_derivatives(axis: AxisView, heights: Floats) -> Floats:
+    """Return (tiles, 2, size) the derivatives of the tiles' centres by the unknowns."""
+    tiles = len(heights)
+    derivatives = np.zeros((tiles, 2, 3 + tiles))
+    derivatives[:, :, PIVOT] = np.eye(2)
+    derivatives[:, :, DIRECTION] = heights[:, None] * axis.aside
+    derivatives[np.arange(tiles), :, 3 + np.arange(tiles)] = axis.parallax
+    return derivatives
+
+
+def solve_centres(equations: CentreEquations, prior: Floats, error: Floats) -> tuple[Floats, Floats]:
+    """Solve for the steps of all unknowns.
+
+    Parameters
+    ----------
+    equations : CentreEquations
+        From the data.
+    prior : ndarray
+        (size, size) prior information; the prior mean is zero for all.
+    error : ndarray
+        (size,) current values.
+
+    Returns
+    -------
     step : ndarray
-        (size,) px.
+        (size,).
     covariance : ndarray
         (size, size) in units of the pixels' noise.
     """
-    information, right = equations.information.copy(), equations.scores.sum(axis=0)
-    information[:2, :2] += prior.pivot
-    right[:2] -= prior.pivot @ error
-    if len(information) > 2:
-        information[2:, 2:] += prior.height * np.eye(len(heights))
-        right[2:] -= prior.height * heights
-    covariance = np.asarray(np.linalg.inv(information), dtype=float)
-    return covariance @ right, covariance
+    covariance = np.asarray(np.linalg.inv(equations.information + prior), dtype=float)
+    return covariance @ (equations.scores.sum(axis=0) - prior @ error), covariance
 
 
-def effective_centre(normal: Floats, parallax: Floats) -> Floats:
-    """Return the matrix (2, size) from the errors of pivot and heights to the error of the effective centre.
+def effective_centre(normal: Floats, axis: AxisView, heights: Floats) -> Floats:
+    """Return the matrix (2, size) from the errors of all unknowns to the error of the effective centre.
 
-    An error of the tiles' centres acts on a frame's angle through the sum over tiles of n·(1 − R)·(e + p·h), with the
-    cross terms n of angle and place. As complex numbers, factors commute: the sum equals that of a common centre whose
-    error is e + Σ conj(n)·p·h / Σ conj(n), in every frame.
+    Errors d of the tiles' centres act on a frame's angle through the sum over tiles of n·(1 − R)·d, with the cross
+    terms n of angle and place. As complex numbers, factors commute: the sum equals that of a common centre whose error
+    is Σ conj(n)·d / Σ conj(n), in every frame.
     """
-    if not parallax.any():
-        return np.eye(2)
     cross = normal[..., 0, 1:].sum(axis=1)
     against = cross[:, 0] - 1j * cross[:, 1]
-    share = against / against.sum() * (parallax[0] + 1j * parallax[1])
-    return np.hstack([np.eye(2), np.stack([share.real, share.imag])])
+    derivatives = centre_derivatives(axis, heights)
+    share = (against / against.sum()) @ (derivatives[:, 0] + 1j * derivatives[:, 1])
+    return np.stack([share.real, share.imag])
 
 
 def disagreement_of_groups(covariance: Floats, scores: Floats, groups: NDArray[np.intp]) -> float:

@@ -33,14 +33,16 @@ from anglecam.vision.registration.appearance import (
     learn_tile,
 )
 from anglecam.vision.registration.centre_equations import (
-    CentrePrior,
+    DIRECTION,
+    HEIGHTS,
+    PIVOT,
     centre_equations,
     disagreement_of_groups,
     effective_centre,
     excess_displacement,
     solve_centres,
 )
-from anglecam.vision.registration.tiles import TILE_SIDE_PX, FrameView, MotionPlane, Tiles, view_tiles
+from anglecam.vision.registration.tiles import TILE_SIDE_PX, AxisView, FrameView, MotionPlane, Tiles, view_tiles
 from anglecam.vision.registration.turn import BodyAppearance, covered_views, group_scatter
 
 _GROUPS = 6
@@ -64,8 +66,8 @@ _NO_MISFIT = 1e-9
 _DEPTH = 0.3
 """Standard deviation of the heights of a body's parts, and of mark and marker from them, relative to their distance from
 the pivot: the initial value for the parts, the only one for mark and marker, whose height nothing shows."""
-_LEAST_HEIGHT_PX = 0.3
-"""Least standard deviation of the heights: a body is never known to be flatter, px."""
+_LEAST_SPREAD_PX = 0.003
+"""Least standard deviation of the centres of rotation that heights cause: a body is never known to be flatter, px."""
 _LEAST_SHARE = 1e-3
 """Singular values of the steps' differences below this share of the largest are noise."""
 _MEMORY = 4
@@ -76,24 +78,23 @@ _MEMORY = 4
 class _State:
     """The unknowns besides the appearance."""
 
-    error: Floats
-    """(2,) of the initial pivot, px."""
-    heights: Floats
-    """(tiles,) px."""
+    centre: Floats
+    """(3 + tiles,) error of the initial pivot, px, of the parallax's direction, rad, and heights, px."""
     turns: Floats
     """(frames,) rad."""
     height_variance: float
     """Of the distribution of the heights, px²."""
+    scale: Floats
+    """(3 + tiles + frames,) px of each unknown's unit."""
 
-    def moved(self, step: Floats, lever: float, height_variance: float) -> _State:
-        """Return the state after a step whose components are all in px."""
-        error, heights, turns = np.split(step, [2, 2 + len(self.heights)])
-        return _State(self.error + error, self.heights + heights, self.turns + turns / lever, height_variance)
+    def moved(self, step: Floats, height_variance: float) -> _State:
+        """Return the state after a step as from `step_to`."""
+        centre, turns = np.split(step / self.scale, [len(self.centre)])
+        return replace(self, centre=self.centre + centre, turns=self.turns + turns, height_variance=height_variance)
 
-    def step_to(self, other: _State, lever: float) -> Floats:
+    def step_to(self, other: _State) -> Floats:
         """Return the step from this state to another, all components in px."""
-        parts = other.error - self.error, other.heights - self.heights, lever * (other.turns - self.turns)
-        return np.concatenate(parts)
+        return np.concatenate([other.centre - self.centre, other.turns - self.turns]) * self.scale
 
 
 @dataclass(frozen=True)
@@ -105,18 +106,30 @@ class _Data:
     """One for each tile."""
     start_px: Floats
     """(2,) the initial pivot."""
-    parallax: Floats
-    pivot_information: Floats
-    """(2, 2) prior information on the pivot, 1/px²."""
+    axis: AxisView
+    """As initially assumed."""
+    prior: Floats
+    """(3, 3) prior information on pivot and direction, 1/px² and 1/rad²."""
+
+    def axis_in(self, state: _State) -> AxisView:
+        """Return how the axis is seen in a state."""
+        return self.axis.turned(float(state.centre[DIRECTION]))
 
     def centres(self, state: _State) -> Floats:
         """Return the centre of rotation of each tile, (tiles, 2) px."""
-        return self.start_px + state.error + state.heights[:, None] * self.parallax
+        heights = state.centre[HEIGHTS]
+        return np.asarray(self.start_px + state.centre[PIVOT] + heights[:, None] * self.axis_in(state).parallax)
 
     def seen(self, state: _State) -> list[TileViews]:
         """Return the views with offsets from those centres."""
-        off = state.error + (state.heights - self.tiles.heights)[:, None] * self.parallax
+        off = self.centres(state) - (self.start_px + self.tiles.heights[:, None] * self.axis.parallax)
         return [replace(v, offsets=v.offsets - shift) for v, shift in zip(self.views, off, strict=True)]
+
+    def prior_in(self, state: _State) -> Floats:
+        """Return the prior information on all that determines the centres, (3 + tiles, 3 + tiles)."""
+        whole = np.eye(len(state.centre)) / state.height_variance
+        whole[:3, :3] = self.prior
+        return whole
 
 
 @dataclass(frozen=True)
@@ -159,14 +172,16 @@ def learn_appearance(
     """
     start = pivot.centre_px
     lever = float(np.median(np.hypot(*(tiles.corners - start).T)))
-    prior = np.asarray(np.linalg.inv(covariance_at_unknown_height(pivot, plane, lever)), dtype=float)
+    prior = np.zeros((3, 3))
+    prior[PIVOT, PIVOT] = np.linalg.inv(covariance_at_unknown_height(pivot, plane, lever))
+    prior[DIRECTION, DIRECTION] = plane.axis.direction_sigma**-2
     views = [
         view_tiles(c[None], h[None], frames, plane, start)[0] for c, h in zip(tiles.corners, tiles.heights, strict=True)
     ]
-    data = _Data(tiles, views, start, plane.parallax, prior)
-    turns = np.array([f.turn for f in frames])
-    last = _iterate(data, _State(np.zeros(2), tiles.heights, turns, (_DEPTH * lever) ** 2), lever)
+    data = _Data(tiles, views, start, plane.axis, prior)
+    last = _iterate(data, _first_state(frames, tiles, plane, lever))
     state, covariance = last.state, last.covariance / (1.0 - _absorbed_of_pivot(data, last))
+    heights, axis = state.centre[HEIGHTS], data.axis_in(state)
     fits = _compare_all(last.appearance, data.seen(state), state.turns, data.centres(state)).without(last.hidden)
     normal, gradient = fits.weighted(last.variance)
     groups = group_neighbours(tiles.corners, _GROUPS)
@@ -177,16 +192,16 @@ def learn_appearance(
     if frames[0].pivot_covariance_px2 is None:
         estimates.append(excess_displacement(normal.sum(axis=0), gradient.sum(axis=0)))
     birge = max(1.0, float(np.sqrt(max(estimates))))
-    scores = centre_equations(normal, gradient, state.turns, data.parallax).scores
+    scores = centre_equations(normal, gradient, state.turns, axis, heights).scores
     variance_ratio = max(birge**2, disagreement_of_groups(last.covariance, scores, groups))
-    acting = effective_centre(normal, data.parallax)
+    acting = effective_centre(normal, axis, heights)
     information = normal[:, :, 0, 0].sum(axis=1)
     return BodyAppearance(
         tiles=join_tiles(last.appearance),
-        heights=state.heights,
-        plane=plane,
-        pivot_px=start + state.error,
-        pivot_covariance_px2=variance_ratio * covariance[:2, :2],
+        heights=heights,
+        plane=replace(plane, axis=axis),
+        pivot_px=start + state.centre[PIVOT],
+        pivot_covariance_px2=variance_ratio * covariance[PIVOT, PIVOT],
         centre_covariance_px2=variance_ratio * acting @ covariance @ acting.T,
         variance=last.variance,
         groups=groups,
@@ -198,11 +213,20 @@ def learn_appearance(
 
 def covariance_at_unknown_height(pivot: PivotEstimate, plane: MotionPlane, lever_px: float) -> Floats:
     """Return the covariance (2, 2) of a pivot that was found at another height than that of the body, px²."""
-    along = _DEPTH * lever_px * plane.parallax
+    along = _DEPTH * lever_px * plane.axis.parallax
     return np.asarray(pivot.covariance_px2 + np.outer(along, along))
 
 
-def _iterate(data: _Data, state: _State, lever: float) -> _Round:
+def _first_state(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, lever: float) -> _State:
+    """Return the state before anything is learnt."""
+    scatter = _DEPTH * lever
+    across = scatter * float(np.hypot(*plane.axis.parallax))
+    scale = np.repeat([1.0, across, 1.0, lever], [2, 1, len(tiles.heights), len(frames)])
+    centre = np.concatenate([np.zeros(3), tiles.heights])
+    return _State(centre, np.array([f.turn for f in frames]), scatter**2, scale)
+
+
+def _iterate(data: _Data, state: _State) -> _Round:
     """Alternate between appearance and state until the centres of rotation settle; return the last round."""
     appearance = [
         learn_tile(c, TILE_SIDE_PX, v, state.turns, o)
@@ -215,11 +239,11 @@ def _iterate(data: _Data, state: _State, lever: float) -> _Round:
     for done in range(1, _MAX_ROUNDS):
         if np.hypot(*(data.centres(now.state) - data.centres(state)).T).max() < _SETTLED_PX:
             break
-        states, steps = [*states, origin.step_to(state, lever)], [*steps, state.step_to(now.state, lever)]
+        states, steps = [*states, origin.step_to(state)], [*steps, state.step_to(now.state)]
         if done <= _HIDDEN_ROUNDS:
             states, steps = states[-1:], steps[-1:]
         step = _accelerated(states[-_MEMORY:], steps[-_MEMORY:])
-        state = state.moved(step, lever, now.state.height_variance)
+        state = state.moved(step, now.state.height_variance)
         now = _round(data, state, now.appearance, now.hidden if done >= _HIDDEN_ROUNDS else None, now.fits)
     return now
 
@@ -255,22 +279,21 @@ def _round(
     fits = all_fits.without(out)
     variance = fits.squares.sum(axis=1) / np.maximum(fits.count.sum(axis=1), 1)
     variance = np.maximum(variance, _MIN_VARIANCE * np.median(variance))
-    equations = centre_equations(*fits.weighted(variance), state.turns, data.parallax)
-    prior = CentrePrior(data.pivot_information, 1.0 / state.height_variance)
-    step, covariance = solve_centres(equations, prior, state.error, state.heights)
-    height_steps = step[2:] if len(step) > 2 else np.zeros(len(state.heights))
-    turn_steps = (equations.turn_scores - equations.cross @ step) / equations.turn_information
-    heights = state.heights + height_steps
-    scatter = _height_variance(heights, covariance, state.height_variance) if len(step) > 2 else state.height_variance
-    following = _State(state.error + step[:2], heights, state.turns + turn_steps, scatter)
+    axis = data.axis_in(state)
+    equations = centre_equations(*fits.weighted(variance), state.turns, axis, state.centre[HEIGHTS])
+    step, covariance = solve_centres(equations, data.prior_in(state), state.centre)
+    centre = state.centre + step
+    turns = state.turns + (equations.turn_scores - equations.cross @ step) / equations.turn_information
+    scatter = _height_variance(centre[HEIGHTS], covariance, state.height_variance, float(np.hypot(*axis.parallax)))
+    following = replace(state, centre=centre, turns=turns, height_variance=scatter)
     return _Round(appearance, out, variance, covariance, following, all_fits)
 
 
-def _height_variance(heights: Floats, covariance: Floats, before: float) -> float:
+def _height_variance(heights: Floats, covariance: Floats, before: float, parallax: float) -> float:
     """Return the variance of the heights' distribution by MacKay's fixed point: Σh² over the number determined."""
-    determined = float((1.0 - np.diag(covariance)[2:] / before).clip(0.0, 1.0).sum())
+    determined = float((1.0 - np.diag(covariance)[HEIGHTS] / before).clip(0.0, 1.0).sum())
     variance = float(heights @ heights) / max(determined, 1.0)
-    return float(np.clip(variance, _LEAST_HEIGHT_PX**2, before * 4.0))
+    return max(variance, (_LEAST_SPREAD_PX / parallax) ** 2)
 
 
 def _absorbed_of_turns(data: _Data, now: _Round) -> float:
@@ -283,10 +306,11 @@ def _absorbed_of_turns(data: _Data, now: _Round) -> float:
 
 def _absorbed_of_pivot(data: _Data, now: _Round) -> float:
     """Return the share of an error of the pivot, in its least certain direction, that the appearance absorbs."""
-    axis = np.linalg.eigh(now.covariance[:2, :2])[1][:, -1]
-    nudged = replace(now.state, error=now.state.error + _NUDGE_PX * axis)
-    after = _round(data, nudged, now.appearance, now.hidden, now.fits)
-    remaining = float((after.state.error - now.state.error) @ axis) / _NUDGE_PX
+    axis = np.linalg.eigh(now.covariance[PIVOT, PIVOT])[1][:, -1]
+    nudge = np.zeros(len(now.state.centre))
+    nudge[PIVOT] = _NUDGE_PX * axis
+    after = _round(data, replace(now.state, centre=now.state.centre + nudge), now.appearance, now.hidden, now.fits)
+    remaining = float((after.state.centre - now.state.centre)[PIVOT] @ axis) / _NUDGE_PX
     return float(np.clip(remaining, 0.0, _MAX_ABSORBED))
 
 

@@ -33,6 +33,12 @@ _MIN_STEADIER = 1.5
 """Least ratio of squared spreads, as filmed over rotated back, of a tile that belongs to the body."""
 _MAX_HEIGHT = 0.3
 """Largest height of a part of the body, as a share of half the picture's diagonal."""
+_OFF_CENTRE = 0.03
+"""Standard uncertainty of the principal point of a camera that is not calibrated, as a share of the picture's width."""
+_CALIBRATED = 0.005
+"""The same of a calibrated camera, as a share of its focal length."""
+_TILT_AXIS = 0.02
+"""Standard uncertainty of the direction of a declared tilt, rad."""
 _HEIGHT_STEP_PX = 1.0
 """Displacement between neighbouring heights that are tried, px."""
 
@@ -54,6 +60,25 @@ class FrameView:
     """(2, 2) covariance of the pivot between frames, px²; ``None`` where the camera does not move."""
 
 
+@dataclass(frozen=True)
+class AxisView:
+    """The axis of rotation, as the camera sees it: a line, on which each height has its centre of rotation."""
+
+    parallax: Floats
+    """(2,) displacement of the centre of rotation for each px of height."""
+    direction_sigma: float
+    """Standard uncertainty of the line's direction, rad."""
+
+    @property
+    def aside(self) -> Floats:
+        """(2,) displacement for each px of height and each rad of the line's direction."""
+        return np.array([-self.parallax[1], self.parallax[0]])
+
+    def turned(self, direction: float) -> AxisView:
+        """Return the view with the line's direction changed by a small angle, rad."""
+        return replace(self, parallax=self.parallax + direction * self.aside)
+
+
 @dataclass(frozen=True, eq=False)
 class MotionPlane:
     """The plane of motion as seen by the pixels of one clip."""
@@ -63,8 +88,8 @@ class MotionPlane:
     """(height, width, 2) place of each pixel in the plane, px."""
     stretch: float
     """Largest number of picture pixels that one unit of length in the plane covers."""
-    parallax: Floats
-    """(2,) displacement of the centre of rotation for each px of height."""
+    axis: AxisView
+    """How the axis of rotation is seen."""
 
 
 @dataclass(frozen=True)
@@ -87,25 +112,33 @@ def motion_plane(lens: Lens, size: tuple[int, int], pivot_px: Floats) -> MotionP
     size : tuple of int
         Width and height of the picture, px.
     pivot_px : ndarray
-        (2,) in the plane, px. Off the principal point, an axis parallel to the line of sight is seen as a line, too:
-        it leads from the pivot away from the principal point.
+        (2,) in the plane, px.
     """
     x, y = np.meshgrid(np.arange(size[0], dtype=float), np.arange(size[1], dtype=float))
     ground = np.ascontiguousarray(lens.rectify(np.stack([x, y], axis=-1)))
     steps = [np.hypot(*np.moveaxis(np.diff(ground, axis=axis), -1, 0)).min() for axis in (0, 1)]
-    parallax = lens.parallax if lens.tilt != 0.0 else _parallax_of_perspective(lens, size, pivot_px)
-    return MotionPlane(lens, ground, 1.0 / max(min(steps), 0.1), parallax)
+    axis = _square_view(lens, size, pivot_px) if lens.tilt == 0.0 else AxisView(lens.parallax, _TILT_AXIS)
+    return MotionPlane(lens, ground, 1.0 / max(min(steps), 0.1), axis)
 
 
-def _parallax_of_perspective(lens: Lens, size: tuple[int, int], pivot_px: Floats) -> Floats:
-    """Return the parallax in a square view: (pivot − principal point)/focal length.
+def _square_view(lens: Lens, size: tuple[int, int], pivot_px: Floats) -> AxisView:
+    """Return how an axis parallel to the line of sight is seen: as a line from the pivot to the principal point.
 
-    An undeclared focal length is taken to equal the picture's width: it only scales the heights.
+    Points at the height z appear larger by the factor f/(f − z), so the centre is displaced by (pivot − principal
+    point)·z/f. An undeclared focal length is taken to equal the picture's width: it only scales the heights.
     """
     if lens.calibration is not None:
-        return np.asarray((pivot_px - lens.calibration.camera_matrix[:2, 2]) / lens.calibration.focal_px)
-    middle = (np.array(size) - 1.0) / 2.0
-    return np.asarray((pivot_px - middle) / (lens.focal_px or float(size[0])))
+        focal, principal = lens.calibration.focal_px, lens.calibration.camera_matrix[:2, 2]
+        sigma = _CALIBRATED * focal
+    else:
+        focal, principal = lens.focal_px or float(size[0]), (np.array(size) - 1.0) / 2.0
+        sigma = _OFF_CENTRE * size[0]
+    arm = np.asarray(pivot_px - principal, dtype=float)
+    length = float(np.hypot(*arm))
+    along = arm / length if length > 0.0 else np.array([1.0, 0.0])
+    # near the principal point the line is as long as the error of that point makes it
+    apparent = float(np.hypot(length, sigma))
+    return AxisView(along * apparent / focal, sigma / apparent)
 
 
 def choose_tiles(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats, noise: float) -> Tiles:
@@ -174,7 +207,7 @@ def view_tiles(
         (views, 2) the tiles' middles in the picture, px.
     """
     offsets, values, starts, centres = [], [], [0], []
-    parallax = heights[:, None] * plane.parallax
+    parallax = heights[:, None] * plane.axis.parallax
     reach = (0.71 * TILE_SIDE_PX + 1.5) * plane.stretch
     for f in frames:
         arm = corners + TILE_SIDE_PX / 2 - pivot_px - parallax
@@ -212,7 +245,7 @@ def _each_rotated(arms: Floats, turns: Floats) -> Floats:
 def _find_heights(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats) -> Floats:
     """Find the height, px, at which each tile of the picture varies least between frames rotated back."""
     height, width = frames[0].image.shape[:2]
-    slope = float(np.hypot(*plane.parallax))
+    slope = float(np.hypot(*plane.axis.parallax))
     if slope == 0.0:
         return np.zeros((height // TILE_SIDE_PX, width // TILE_SIDE_PX))
     grey = [replace(f, image=f.image.mean(axis=2, keepdims=True).astype(np.uint8)) for f in frames[::2]]
@@ -243,7 +276,7 @@ def _stack(
     """
     height, width = frames[0].image.shape[:2]
     x, y = np.meshgrid(np.arange(0.0, width, step), np.arange(0.0, height, step))
-    parallax = np.reshape(heights, (-1, 1)) * plane.parallax
+    parallax = np.reshape(heights, (-1, 1)) * plane.axis.parallax
     arms = np.stack([x, y], axis=-1).reshape(-1, 2) - pivot_px - parallax
     pile, whole = [], np.ones(x.shape, bool)
     for f in frames:

@@ -108,7 +108,7 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
         With the uncertainty caused by noise, scatter between tiles, and copies.
     """
     views, places = view_tiles(body.tiles.corners, body.heights, [view], body.plane, body.pivot_px)
-    centres = body.pivot_px + body.heights[:, None] * body.plane.parallax
+    centres = body.pivot_px + body.heights[:, None] * body.plane.axis.parallax
     turn = view.turn
     for _ in range(_MAX_STEPS):
         fit = compare_tiles(body.tiles, views, np.full(len(body.tiles), turn), centres)
@@ -183,7 +183,7 @@ def refine_doubtful_turn(body: BodyAppearance, view: FrameView, reach_px: float)
     FrameView
         With the angle that fits best, or unchanged where no other fits distinctly better.
     """
-    centres = body.pivot_px + body.heights[:, None] * body.plane.parallax
+    centres = body.pivot_px + body.heights[:, None] * body.plane.axis.parallax
     step = 1.0 / float(np.hypot(*(body.middle_px - body.pivot_px)))
     tries = [replace(view, turn=view.turn + k * step) for k in range(-int(reach_px), int(reach_px) + 1)]
 
