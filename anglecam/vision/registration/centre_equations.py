@@ -1,8 +1,8 @@
 """Normal equations of a body's tiles for the centre of rotation and the tiles' heights.
 
 A rotated tile appears displaced by t = (1 − R)·(e + (p + φ·p')·h), with the error e of the pivot, the parallax p, its
-error of direction φ (p' is p turned by a right angle), and the tile's height h. Every frame's angle is free and is
-eliminated. The unknowns are in the order e, φ, h.
+error of direction φ (p' is p turned by a right angle), and the tile's height h, which may vary over the tile. Every
+frame's angle is free and is eliminated.
 """
 
 from __future__ import annotations
@@ -20,13 +20,51 @@ NO_INFORMATION = 1e-9
 """Information of a frame in which every tile is hidden."""
 
 
-PIVOT, DIRECTION, HEIGHTS = slice(0, 2), 2, slice(3, None)
-"""Places of the unknowns."""
+@dataclass(frozen=True)
+class Centres:
+    """All that determines about which image points the tiles rotate, or a step or an error of it."""
+
+    values: Floats
+    """(3 + 3·tiles,) pivot (px), direction of the parallax (rad), heights (px), and leans x and y of every tile."""
+
+    @property
+    def pivot(self) -> Floats:
+        """(2,) px."""
+        return self.values[PIVOT]
+
+    @property
+    def direction(self) -> float:
+        """Of the parallax, rad."""
+        return float(self.values[DIRECTION])
+
+    @property
+    def heights(self) -> Floats:
+        """(tiles,) px."""
+        return self.values[heights_of(len(self.values))]
+
+    @property
+    def leans(self) -> Floats:
+        """(tiles, 2) gradients of the height."""
+        return self.values[leans_of(len(self.values))].reshape(-1, 2)
+
+
+PIVOT, DIRECTION = slice(0, 2), 2
+"""Places of pivot and direction among the unknowns."""
+
+
+def heights_of(size: int) -> slice:
+    """Return the places of the heights among ``size`` unknowns."""
+    return slice(3, 3 + (size - 3) // 3)
+
+
+def leans_of(size: int) -> slice:
+    """Return the places of the leans among ``size`` unknowns."""
+    return slice(3 + (size - 3) // 3, size)
 
 
 @dataclass(frozen=True)
 class CentreEquations:
-    """Normal equations for the errors of the centres (size 3 + tiles), every frame's angle eliminated."""
+    """Normal equations for the errors of the centres (size 3 + 3·tiles), every frame's angle eliminated."""
 
     information: Floats
     """(size, size)."""
@@ -48,7 +86,7 @@ def centre_equations(
     Parameters
     ----------
     normal, gradient : ndarray
-        (tiles, frames, 3, 3) and (tiles, frames, 3) for angle, x and y, divided by the variances.
+        (tiles, frames, 5, 5) and (tiles, frames, 5) from `TileFit`, divided by the variances.
     turns : ndarray
         (frames,) rad.
     axis : AxisView
@@ -61,7 +99,8 @@ def centre_equations(
     CentreEquations
         Linear in the steps of all unknowns.
     """
-    displacement = np.eye(2) - rotation(turns)
+    displacement = np.tile(np.eye(4), (len(turns), 1, 1))
+    displacement[:, :2, :2] -= rotation(turns)
     by_unknown = centre_derivatives(axis, heights)
     place = np.einsum("kai,tkab,kbj->tij", displacement, normal[..., 1:, 1:], displacement)
     cross_place = np.einsum("kai,tka->tki", displacement, normal[..., 1:, 0])
@@ -76,12 +115,15 @@ def centre_equations(
 
 
 def centre_derivatives(axis: AxisView, heights: Floats) -> Floats:
-    """Return (tiles, 2, size) the derivatives of the tiles' centres by the unknowns."""
+    """Return (tiles, 4, size) the derivatives of the tiles' centres (x, y) and leans (x, y) by the unknowns."""
     tiles = len(heights)
-    derivatives = np.zeros((tiles, 2, 3 + tiles))
-    derivatives[:, :, PIVOT] = np.eye(2)
-    derivatives[:, :, DIRECTION] = heights[:, None] * axis.aside
-    derivatives[np.arange(tiles), :, 3 + np.arange(tiles)] = axis.parallax
+    each = np.arange(tiles)
+    derivatives = np.zeros((tiles, 4, 3 + 3 * tiles))
+    derivatives[:, :2, PIVOT] = np.eye(2)
+    derivatives[:, :2, DIRECTION] = heights[:, None] * axis.aside
+    derivatives[each, :2, 3 + each] = axis.parallax
+    for k in range(2):
+        derivatives[each, 2 + k, 3 + tiles + 2 * each + k] = 1.0
     return derivatives
 
 
@@ -115,7 +157,7 @@ def effective_centre(normal: Floats, axis: AxisView, heights: Floats) -> Floats:
     terms n of angle and place. As complex numbers, factors commute: the sum equals that of a common centre whose error
     is Σ conj(n)·d / Σ conj(n), in every frame.
     """
-    cross = normal[..., 0, 1:].sum(axis=1)
+    cross = normal[..., 0, 1:3].sum(axis=1)
     against = cross[:, 0] - 1j * cross[:, 1]
     derivatives = centre_derivatives(axis, heights)
     share = (against / against.sum()) @ (derivatives[:, 0] + 1j * derivatives[:, 1])
@@ -137,6 +179,6 @@ def excess_displacement(normal: Floats, gradient: Floats) -> float:
     """Return the mean square of the displacement that a body on a fixed pivot cannot have, in units of its noise."""
     seen = normal[:, 0, 0] > NO_INFORMATION
     normal, gradient = normal[seen], gradient[seen]
-    place = normal[:, 1:, 1:] - normal[:, 1:, :1] * normal[:, :1, 1:] / normal[:, :1, :1]
-    shift = gradient[:, 1:] - normal[:, 1:, 0] * (gradient[:, :1] / normal[:, :1, 0])
+    place = normal[:, 1:3, 1:3] - normal[:, 1:3, :1] * normal[:, :1, 1:3] / normal[:, :1, :1]
+    shift = gradient[:, 1:3] - normal[:, 1:3, 0] * (gradient[:, :1] / normal[:, :1, 0])
     return float(np.einsum("ni,nij,nj->n", shift, np.linalg.pinv(place, hermitian=True), shift).mean() / 2.0)

@@ -34,12 +34,14 @@ from anglecam.vision.registration.appearance import (
 )
 from anglecam.vision.registration.centre_equations import (
     DIRECTION,
-    HEIGHTS,
     PIVOT,
+    Centres,
     centre_equations,
     disagreement_of_groups,
     effective_centre,
     excess_displacement,
+    heights_of,
+    leans_of,
     solve_centres,
 )
 from anglecam.vision.registration.tiles import TILE_SIDE_PX, AxisView, FrameView, MotionPlane, Tiles, view_tiles
@@ -66,6 +68,8 @@ _NO_MISFIT = 1e-9
 _DEPTH = 0.3
 """Standard deviation of the heights of a body's parts, and of mark and marker from them, relative to their distance from
 the pivot: the initial value for the parts, the only one for mark and marker, whose height nothing shows."""
+_LEAN = 0.3
+"""Initial standard deviation of the gradient of a body's height."""
 _LEAST_SPREAD_PX = 0.003
 """Least standard deviation of the centres of rotation that heights cause: a body is never known to be flatter, px."""
 _LEAST_SHARE = 1e-3
@@ -78,23 +82,26 @@ _MEMORY = 4
 class _State:
     """The unknowns besides the appearance."""
 
-    centre: Floats
-    """(3 + tiles,) error of the initial pivot, px, of the parallax's direction, rad, and heights, px."""
+    centres: Centres
+    """Pivot and direction relative to the initial ones."""
     turns: Floats
     """(frames,) rad."""
     height_variance: float
     """Of the distribution of the heights, px²."""
+    lean_variance: float
+    """Of the distribution of the leans."""
     scale: Floats
-    """(3 + tiles + frames,) px of each unknown's unit."""
+    """(3 + 3·tiles + frames,) px of each unknown's unit."""
 
-    def moved(self, step: Floats, height_variance: float) -> _State:
-        """Return the state after a step as from `step_to`."""
-        centre, turns = np.split(step / self.scale, [len(self.centre)])
-        return replace(self, centre=self.centre + centre, turns=self.turns + turns, height_variance=height_variance)
+    def moved(self, step: Floats, following: _State) -> _State:
+        """Return the state after a step as from `step_to`, with the distributions of another state."""
+        centres, turns = np.split(step / self.scale, [len(self.centres.values)])
+        return replace(following, centres=Centres(self.centres.values + centres), turns=self.turns + turns)
 
     def step_to(self, other: _State) -> Floats:
         """Return the step from this state to another, all components in px."""
-        return np.concatenate([other.centre - self.centre, other.turns - self.turns]) * self.scale
+        step = other.centres.values - self.centres.values
+        return np.asarray(np.concatenate([step, other.turns - self.turns]) * self.scale)
 
 
 @dataclass(frozen=True)
@@ -113,12 +120,12 @@ class _Data:
 
     def axis_in(self, state: _State) -> AxisView:
         """Return how the axis is seen in a state."""
-        return self.axis.turned(float(state.centre[DIRECTION]))
+        return self.axis.turned(state.centres.direction)
 
     def centres(self, state: _State) -> Floats:
         """Return the centre of rotation of each tile, (tiles, 2) px."""
-        heights = state.centre[HEIGHTS]
-        return np.asarray(self.start_px + state.centre[PIVOT] + heights[:, None] * self.axis_in(state).parallax)
+        along = state.centres.heights[:, None] * self.axis_in(state).parallax
+        return np.asarray(self.start_px + state.centres.pivot + along)
 
     def seen(self, state: _State) -> list[TileViews]:
         """Return the views with offsets from those centres."""
@@ -126,9 +133,12 @@ class _Data:
         return [replace(v, offsets=v.offsets - shift) for v, shift in zip(self.views, off, strict=True)]
 
     def prior_in(self, state: _State) -> Floats:
-        """Return the prior information on all that determines the centres, (3 + tiles, 3 + tiles)."""
-        whole = np.eye(len(state.centre)) / state.height_variance
+        """Return the prior information on all that determines the centres, (3 + 3·tiles, 3 + 3·tiles)."""
+        size = len(state.centres.values)
+        whole = np.eye(size)
         whole[:3, :3] = self.prior
+        whole[heights_of(size), heights_of(size)] /= state.height_variance
+        whole[leans_of(size), leans_of(size)] /= state.lean_variance
         return whole
 
 
@@ -181,7 +191,7 @@ def learn_appearance(
     data = _Data(tiles, views, start, plane.axis, prior)
     last = _iterate(data, _first_state(frames, tiles, plane, lever))
     state, covariance = last.state, last.covariance / (1.0 - _absorbed_of_pivot(data, last))
-    heights, axis = state.centre[HEIGHTS], data.axis_in(state)
+    heights, axis = state.centres.heights, data.axis_in(state)
     fits = _compare_all(last.appearance, data.seen(state), state.turns, data.centres(state)).without(last.hidden)
     normal, gradient = fits.weighted(last.variance)
     groups = group_neighbours(tiles.corners, _GROUPS)
@@ -200,7 +210,7 @@ def learn_appearance(
         tiles=join_tiles(last.appearance),
         heights=heights,
         plane=replace(plane, axis=axis),
-        pivot_px=start + state.centre[PIVOT],
+        pivot_px=start + state.centres.pivot,
         pivot_covariance_px2=variance_ratio * covariance[PIVOT, PIVOT],
         centre_covariance_px2=variance_ratio * acting @ covariance @ acting.T,
         variance=last.variance,
@@ -219,19 +229,17 @@ def covariance_at_unknown_height(pivot: PivotEstimate, plane: MotionPlane, lever
 
 def _first_state(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, lever: float) -> _State:
     """Return the state before anything is learnt."""
-    scatter = _DEPTH * lever
+    scatter, tiles_in_all = _DEPTH * lever, len(tiles.heights)
     across = scatter * float(np.hypot(*plane.axis.parallax))
-    scale = np.repeat([1.0, across, 1.0, lever], [2, 1, len(tiles.heights), len(frames)])
-    centre = np.concatenate([np.zeros(3), tiles.heights])
-    return _State(centre, np.array([f.turn for f in frames]), scatter**2, scale)
+    bent = TILE_SIDE_PX / 2 * float(np.hypot(*plane.axis.parallax))
+    scale = np.repeat([1.0, across, 1.0, bent, lever], [2, 1, tiles_in_all, 2 * tiles_in_all, len(frames)])
+    centres = Centres(np.concatenate([np.zeros(3), tiles.heights, np.zeros(2 * tiles_in_all)]))
+    return _State(centres, np.array([f.turn for f in frames]), scatter**2, _LEAN**2, scale)
 
 
 def _iterate(data: _Data, state: _State) -> _Round:
     """Alternate between appearance and state until the centres of rotation settle; return the last round."""
-    appearance = [
-        learn_tile(c, TILE_SIDE_PX, v, state.turns, o)
-        for c, v, o in zip(data.tiles.corners, data.views, data.centres(state), strict=True)
-    ]
+    appearance = _learn_all(data, data.views, state)
     now = _round(data, state, appearance, None)
     states: list[Floats] = []
     steps: list[Floats] = []
@@ -243,7 +251,7 @@ def _iterate(data: _Data, state: _State) -> _Round:
         if done <= _HIDDEN_ROUNDS:
             states, steps = states[-1:], steps[-1:]
         step = _accelerated(states[-_MEMORY:], steps[-_MEMORY:])
-        state = state.moved(step, now.state.height_variance)
+        state = state.moved(step, now.state)
         now = _round(data, state, now.appearance, now.hidden if done >= _HIDDEN_ROUNDS else None, now.fits)
     return now
 
@@ -271,29 +279,45 @@ def _round(
     views, centres = data.seen(state), data.centres(state)
     before = _compare_all(appearance, views, state.turns, centres) if before is None else before
     out = _hidden(before) if hidden is None else hidden
-    appearance = [
-        learn_tile(t.corners[0], TILE_SIDE_PX, equalise_brightness(v, light).without(o), state.turns, c, t.gains[0])
-        for t, v, c, light, o in zip(appearance, views, centres, before.light, out, strict=True)
-    ]
+    kept = [equalise_brightness(v, light).without(o) for v, light, o in zip(views, before.light, out, strict=True)]
+    appearance = _learn_all(data, kept, state, [t.gains[0] for t in appearance])
     all_fits = _compare_all(appearance, views, state.turns, centres)
     fits = all_fits.without(out)
     variance = fits.squares.sum(axis=1) / np.maximum(fits.count.sum(axis=1), 1)
     variance = np.maximum(variance, _MIN_VARIANCE * np.median(variance))
     axis = data.axis_in(state)
-    equations = centre_equations(*fits.weighted(variance), state.turns, axis, state.centre[HEIGHTS])
-    step, covariance = solve_centres(equations, data.prior_in(state), state.centre)
-    centre = state.centre + step
+    axis = data.axis_in(state)
+    equations = centre_equations(*fits.weighted(variance), state.turns, axis, state.centres.heights)
+    step, covariance = solve_centres(equations, data.prior_in(state), state.centres.values)
+    centres = Centres(state.centres.values + step)
     turns = state.turns + (equations.turn_scores - equations.cross @ step) / equations.turn_information
-    scatter = _height_variance(centre[HEIGHTS], covariance, state.height_variance, float(np.hypot(*axis.parallax)))
-    following = replace(state, centre=centre, turns=turns, height_variance=scatter)
+    error = np.diag(covariance)
+    least = _LEAST_SPREAD_PX / float(np.hypot(*axis.parallax))
+    following = replace(
+        state,
+        centres=centres,
+        turns=turns,
+        height_variance=_variance(centres.heights, error[heights_of(len(error))], state.height_variance, least),
+        lean_variance=_variance(
+            centres.leans.ravel(), error[leans_of(len(error))], state.lean_variance, 2.0 * least / TILE_SIDE_PX
+        ),
+    )
     return _Round(appearance, out, variance, covariance, following, all_fits)
 
 
-def _height_variance(heights: Floats, covariance: Floats, before: float, parallax: float) -> float:
-    """Return the variance of the heights' distribution by MacKay's fixed point: Σh² over the number determined."""
-    determined = float((1.0 - np.diag(covariance)[HEIGHTS] / before).clip(0.0, 1.0).sum())
-    variance = float(heights @ heights) / max(determined, 1.0)
-    return max(variance, (_LEAST_SPREAD_PX / parallax) ** 2)
+def _variance(values: Floats, error: Floats, before: float, least: float) -> float:
+    """Return the variance of normally distributed values by MacKay's fixed point: Σx² over the number determined."""
+    determined = float((1.0 - error / before).clip(0.0, 1.0).sum())
+    return max(float(values @ values) / max(determined, 1.0), least**2)
+
+
+def _learn_all(
+    data: _Data, views: Sequence[TileViews], state: _State, gains: Sequence[Floats | None] | None = None
+) -> list[TileAppearance]:
+    """Learn every tile in a state from views with offsets from its centres."""
+    parallax, gains = data.axis_in(state).parallax, [None] * len(views) if gains is None else gains
+    each = zip(data.tiles.corners, views, data.centres(state), state.centres.leans, gains, strict=True)
+    return [learn_tile(c, TILE_SIDE_PX, v, state.turns, o, parallax, lean, g) for c, v, o, lean, g in each]
 
 
 def _absorbed_of_turns(data: _Data, now: _Round) -> float:
@@ -307,10 +331,11 @@ def _absorbed_of_turns(data: _Data, now: _Round) -> float:
 def _absorbed_of_pivot(data: _Data, now: _Round) -> float:
     """Return the share of an error of the pivot, in its least certain direction, that the appearance absorbs."""
     axis = np.linalg.eigh(now.covariance[PIVOT, PIVOT])[1][:, -1]
-    nudge = np.zeros(len(now.state.centre))
+    nudge = np.zeros(len(now.state.centres.values))
     nudge[PIVOT] = _NUDGE_PX * axis
-    after = _round(data, replace(now.state, centre=now.state.centre + nudge), now.appearance, now.hidden, now.fits)
-    remaining = float((after.state.centre - now.state.centre)[PIVOT] @ axis) / _NUDGE_PX
+    nudged = replace(now.state, centres=Centres(now.state.centres.values + nudge))
+    after = _round(data, nudged, now.appearance, now.hidden, now.fits)
+    remaining = float((after.state.centres.pivot - now.state.centres.pivot) @ axis) / _NUDGE_PX
     return float(np.clip(remaining, 0.0, _MAX_ABSORBED))
 
 

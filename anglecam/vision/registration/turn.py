@@ -119,7 +119,7 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
         if not clear.any() or not np.isfinite(usual):
             return NO_TURN
         each = fit.weighted(np.where(clear, body.variance * max(usual, 1.0), np.inf))
-        normal, gradient = each[0].sum(axis=0), each[1].sum(axis=0)
+        normal, gradient = each[0].sum(axis=0)[:3, :3], each[1].sum(axis=0)[:3]
         noise_share = 1.0
         if view.pivot_covariance_px2 is not None:
             normal, gradient, noise_share = _eliminate_pivot(normal, gradient, view.pivot_covariance_px2)
