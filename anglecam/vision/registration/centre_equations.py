@@ -99,8 +99,7 @@ def centre_equations(
     CentreEquations
         Linear in the steps of all unknowns.
     """
-    displacement = np.tile(np.eye(4), (len(turns), 1, 1))
-    displacement[:, :2, :2] -= rotation(turns)
+    displacement = _displacements(turns)
     by_unknown = centre_derivatives(axis, heights)
     place = np.einsum("kai,tkab,kbj->tij", displacement, normal[..., 1:, 1:], displacement)
     cross_place = np.einsum("kai,tka->tki", displacement, normal[..., 1:, 0])
@@ -148,6 +147,43 @@ def solve_centres(equations: CentreEquations, prior: Floats, error: Floats) -> t
     """
     covariance = np.asarray(np.linalg.inv(equations.information + prior), dtype=float)
     return covariance @ (equations.scores.sum(axis=0) - prior @ error), covariance
+
+
+def _displacements(turns: Floats) -> Floats:
+    """Return (frames, 4, 4) the derivatives of the displacement by centre and lean."""
+    displacement = np.tile(np.eye(4), (len(turns), 1, 1))
+    displacement[:, :2, :2] -= rotation(turns)
+    return displacement
+
+
+def remaining_gradient(
+    normal: Floats, gradient: Floats, turns: Floats, axis: AxisView, heights: Floats, step: Floats, turn_steps: Floats
+) -> Floats:
+    """Return the gradient (tiles, frames, 5) after a step of the unknowns (size,) and of the turns (frames,), rad."""
+    place = np.einsum("kai,tiu,u->tka", _displacements(turns), centre_derivatives(axis, heights), step, optimize=True)
+    whole = np.concatenate([np.broadcast_to(turn_steps[:, None], (*place.shape[:2], 1)), place], axis=2)
+    return np.asarray(gradient - np.einsum("tkab,tkb->tka", normal, whole))
+
+
+def displacement_scatter(normal: Floats, gradient: Floats, variance: Floats) -> Floats:
+    """Return each tile's mean square of its displacements over frames, in units of the noise.
+
+    Parameters
+    ----------
+    normal, gradient : ndarray
+        (tiles, frames, 5, 5) and (tiles, frames, 5) from `TileFit`.
+    variance : ndarray
+        (tiles,) of the pixels' noise.
+
+    Returns
+    -------
+    ndarray
+        (tiles,): 1 for a tile whose errors are those of the noise alone.
+    """
+    place, score = normal[..., 1:3, 1:3], gradient[..., 1:3]
+    square = np.einsum("tka,tkab,tkb->tk", score, np.linalg.pinv(place, hermitian=True), score) / 2.0
+    seen = normal[..., 0, 0] > NO_INFORMATION
+    return np.asarray((square * seen).sum(axis=1) / np.maximum(seen.sum(axis=1), 1) / variance)
 
 
 def effective_centre(normal: Floats, axis: AxisView, heights: Floats) -> Floats:

@@ -38,10 +38,12 @@ from anglecam.vision.registration.centre_equations import (
     Centres,
     centre_equations,
     disagreement_of_groups,
+    displacement_scatter,
     effective_centre,
     excess_displacement,
     heights_of,
     leans_of,
+    remaining_gradient,
     solve_centres,
 )
 from anglecam.vision.registration.tiles import TILE_SIDE_PX, AxisView, FrameView, MotionPlane, Tiles, view_tiles
@@ -54,6 +56,8 @@ _SETTLED_PX = 0.002
 """Change of the centres of rotation below which the iteration ends, px."""
 _HIDDEN_ROUNDS = 3
 """Rounds after which the set of hidden views is no longer changed."""
+_WEIGHING_ROUNDS = 6
+"""Rounds after which the tiles' weights are no longer changed."""
 _NUDGE_PX = 0.2
 """Displacement of a converged centre by which its absorbed share is measured, px."""
 _STRETCH = 1e-3
@@ -152,6 +156,10 @@ class _Round:
     """(tiles, frames) views in which something covers the tile."""
     variance: Floats
     """(tiles,) mean squared residual, grey levels squared."""
+    excess: Floats
+    """(tiles,) factor of the variances with which the state was found."""
+    scatter: Floats
+    """(tiles,) mean square of the displacements that remain, in units of the noise."""
     covariance: Floats
     """Of pivot and heights for a known appearance, in units of the pixels' noise."""
     state: _State
@@ -193,7 +201,7 @@ def learn_appearance(
     state, covariance = last.state, last.covariance / (1.0 - _absorbed_of_pivot(data, last))
     heights, axis = state.centres.heights, data.axis_in(state)
     fits = _compare_all(last.appearance, data.seen(state), state.turns, data.centres(state)).without(last.hidden)
-    normal, gradient = fits.weighted(last.variance)
+    normal, gradient = fits.weighted(last.variance * last.excess)
     groups = group_neighbours(tiles.corners, _GROUPS)
     total, freedom = group_scatter(normal, gradient, groups)
     # Two estimates of the Birge ratio: disagreement of groups about the angle and, where the camera does not move, the
@@ -214,6 +222,7 @@ def learn_appearance(
         pivot_covariance_px2=variance_ratio * covariance[PIVOT, PIVOT],
         centre_covariance_px2=variance_ratio * acting @ covariance @ acting.T,
         variance=last.variance,
+        excess=last.excess,
         groups=groups,
         birge=birge,
         absorbed_share=_absorbed_of_turns(data, last),
@@ -240,7 +249,7 @@ def _first_state(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, 
 def _iterate(data: _Data, state: _State) -> _Round:
     """Alternate between appearance and state until the centres of rotation settle; return the last round."""
     appearance = _learn_all(data, data.views, state)
-    now = _round(data, state, appearance, None)
+    now = _round(data, state, appearance, None, np.ones(len(appearance)))
     states: list[Floats] = []
     steps: list[Floats] = []
     origin = state
@@ -252,7 +261,9 @@ def _iterate(data: _Data, state: _State) -> _Round:
             states, steps = states[-1:], steps[-1:]
         step = _accelerated(states[-_MEMORY:], steps[-_MEMORY:])
         state = state.moved(step, now.state)
-        now = _round(data, state, now.appearance, now.hidden if done >= _HIDDEN_ROUNDS else None, now.fits)
+        hidden = now.hidden if done >= _HIDDEN_ROUNDS else None
+        excess = np.maximum(now.scatter, 1.0) if done < _WEIGHING_ROUNDS else now.excess
+        now = _round(data, state, now.appearance, hidden, excess, now.fits)
     return now
 
 
@@ -273,6 +284,7 @@ def _round(
     state: _State,
     appearance: Sequence[TileAppearance],
     hidden: NDArray[np.bool_] | None,
+    excess: Floats,
     before: TileFit | None = None,
 ) -> _Round:
     """Learn the appearance for a state, then the state for that appearance."""
@@ -287,22 +299,24 @@ def _round(
     variance = np.maximum(variance, _MIN_VARIANCE * np.median(variance))
     axis = data.axis_in(state)
     axis = data.axis_in(state)
-    equations = centre_equations(*fits.weighted(variance), state.turns, axis, state.centres.heights)
+    equations = centre_equations(*fits.weighted(variance * excess), state.turns, axis, state.centres.heights)
     step, covariance = solve_centres(equations, data.prior_in(state), state.centres.values)
     centres = Centres(state.centres.values + step)
-    turns = state.turns + (equations.turn_scores - equations.cross @ step) / equations.turn_information
+    turn_steps = (equations.turn_scores - equations.cross @ step) / equations.turn_information
+    remaining = remaining_gradient(fits.normal, fits.gradient, state.turns, axis, state.centres.heights, step, turn_steps)
     error = np.diag(covariance)
     least = _LEAST_SPREAD_PX / float(np.hypot(*axis.parallax))
     following = replace(
         state,
         centres=centres,
-        turns=turns,
+        turns=state.turns + turn_steps,
         height_variance=_variance(centres.heights, error[heights_of(len(error))], state.height_variance, least),
         lean_variance=_variance(
             centres.leans.ravel(), error[leans_of(len(error))], state.lean_variance, 2.0 * least / TILE_SIDE_PX
         ),
     )
-    return _Round(appearance, out, variance, covariance, following, all_fits)
+    scatter = displacement_scatter(fits.normal, remaining, variance)
+    return _Round(appearance, out, variance, excess, scatter, covariance, following, all_fits)
 
 
 def _variance(values: Floats, error: Floats, before: float, least: float) -> float:
@@ -324,7 +338,7 @@ def _absorbed_of_turns(data: _Data, now: _Round) -> float:
     """Return the share of an error of the angles, proportional to the angle, that the appearance absorbs."""
     stretch = _STRETCH * (now.state.turns - np.median(now.state.turns))
     stretched = replace(now.state, turns=now.state.turns + stretch)
-    after = _round(data, stretched, now.appearance, now.hidden, now.fits)
+    after = _round(data, stretched, now.appearance, now.hidden, now.excess, now.fits)
     return float((after.state.turns - now.state.turns) @ stretch / max(float(stretch @ stretch), 1e-18))
 
 
@@ -334,7 +348,7 @@ def _absorbed_of_pivot(data: _Data, now: _Round) -> float:
     nudge = np.zeros(len(now.state.centres.values))
     nudge[PIVOT] = _NUDGE_PX * axis
     nudged = replace(now.state, centres=Centres(now.state.centres.values + nudge))
-    after = _round(data, nudged, now.appearance, now.hidden, now.fits)
+    after = _round(data, nudged, now.appearance, now.hidden, now.excess, now.fits)
     remaining = float((after.state.centres.pivot - now.state.centres.pivot) @ axis) / _NUDGE_PX
     return float(np.clip(remaining, 0.0, _MAX_ABSORBED))
 
