@@ -200,15 +200,26 @@ def effective_centre(normal: Floats, axis: AxisView, heights: Floats) -> Floats:
     return np.stack([share.real, share.imag])
 
 
-def disagreement_of_groups(covariance: Floats, scores: Floats, groups: NDArray[np.intp]) -> float:
-    """Return the pivot's variance from the disagreement of groups of tiles over that expected from noise alone.
+def disagreement_of_groups(covariance: Floats, scores: Floats, groups: NDArray[np.intp], acting: Floats) -> float:
+    """Return the effective centre's variance from the disagreement of groups of tiles over that expected from noise.
 
     The cluster-robust sandwich (Liang & Zeger 1986), with one cluster for each group.
+
+    Parameters
+    ----------
+    covariance : ndarray
+        (size, size) of all unknowns.
+    scores : ndarray
+        (tiles, size).
+    groups : ndarray
+        (tiles,) group of each tile.
+    acting : ndarray
+        (2, size) from `effective_centre`.
     """
     names = np.unique(groups)
-    influence = np.stack([scores[groups == group].sum(axis=0) for group in names]) @ covariance
-    variance = float((influence[:, :2] ** 2).sum()) * len(names) / max(len(names) - 2, 1)
-    return variance / float(np.trace(covariance[:2, :2]))
+    influence = np.stack([scores[groups == group].sum(axis=0) for group in names]) @ covariance @ acting.T
+    variance = float((influence**2).sum()) * len(names) / max(len(names) - 2, 1)
+    return variance / float(np.trace(acting @ covariance @ acting.T))
 
 
 def excess_displacement(normal: Floats, gradient: Floats) -> float:

@@ -70,10 +70,12 @@ noise."""
 _NO_MISFIT = 1e-9
 """Replaces the usual misfit, zero, of a tile that is outside most pictures."""
 _DEPTH = 0.3
-"""Standard deviation of the heights of a body's parts, and of mark and marker from them, relative to their distance from
+"""Standard deviation of the heights of a body's parts, and of mark and marker from them, relative to the distance from
 the pivot: the initial value for the parts, the only one for mark and marker, whose height nothing shows."""
 _LEAN = 0.3
 """Initial standard deviation of the gradient of a body's height."""
+_MEDIAN_OF_SQUARES = 0.455
+"""Median of the square of a standard normal variable."""
 _LEAST_SPREAD_PX = 0.003
 """Least standard deviation of the centres of rotation that heights cause: a body is never known to be flatter, px."""
 _LEAST_SHARE = 1e-3
@@ -211,8 +213,8 @@ def learn_appearance(
         estimates.append(excess_displacement(normal.sum(axis=0), gradient.sum(axis=0)))
     birge = max(1.0, float(np.sqrt(max(estimates))))
     scores = centre_equations(normal, gradient, state.turns, axis, heights).scores
-    variance_ratio = max(birge**2, disagreement_of_groups(last.covariance, scores, groups))
     acting = effective_centre(normal, axis, heights)
+    variance_ratio = max(birge**2, disagreement_of_groups(last.covariance, scores, groups, acting))
     information = normal[:, :, 0, 0].sum(axis=1)
     return BodyAppearance(
         tiles=join_tiles(last.appearance),
@@ -303,7 +305,8 @@ def _round(
     step, covariance = solve_centres(equations, data.prior_in(state), state.centres.values)
     centres = Centres(state.centres.values + step)
     turn_steps = (equations.turn_scores - equations.cross @ step) / equations.turn_information
-    remaining = remaining_gradient(fits.normal, fits.gradient, state.turns, axis, state.centres.heights, step, turn_steps)
+    before_step = fits.normal, fits.gradient, state.turns, axis, state.centres.heights
+    remaining = remaining_gradient(*before_step, step, turn_steps)
     error = np.diag(covariance)
     least = _LEAST_SPREAD_PX / float(np.hypot(*axis.parallax))
     following = replace(
@@ -320,9 +323,14 @@ def _round(
 
 
 def _variance(values: Floats, error: Floats, before: float, least: float) -> float:
-    """Return the variance of normally distributed values by MacKay's fixed point: Σx² over the number determined."""
-    determined = float((1.0 - error / before).clip(0.0, 1.0).sum())
-    return max(float(values @ values) / max(determined, 1.0), least**2)
+    """Return the variance of normally distributed values by MacKay's fixed point: Σx² over the number determined.
+
+    The sum is that of a normal distribution with the same median of squares: a tile with a single edge, or half on the
+    body, determines its height and lean badly and would make every other tile's as uncertain.
+    """
+    determined = float((1.0 - error / before).clip(0.0, 1.0).mean())
+    variance = float(np.median(values**2)) / _MEDIAN_OF_SQUARES / max(determined, 1.0 / len(values))
+    return max(variance, least**2)
 
 
 def _learn_all(
