@@ -70,7 +70,9 @@ def _material(bsdf: dict[str, Any]) -> dict[str, Any]:
     return made
 
 
-def radiance(scene: Scene, moving: list[dict[str, Any]], still: list[dict[str, Any]], folder: Path, angle_deg: float, seed: int) -> np.ndarray:  # fmt: skip
+def radiance(
+    scene: Scene, moving: list[dict[str, Any]], still: list[dict[str, Any]], folder: Path, angle_deg: float, seed: int
+) -> np.ndarray:
     """Render one frame: linear radiance (h, w, 3)."""
     camera, axis = scene.camera, scene.camera.place(scene.pivot_px)
     width, height = camera.size
@@ -85,7 +87,13 @@ def radiance(scene: Scene, moving: list[dict[str, Any]], still: list[dict[str, A
         "fov_axis": "x",
         "fov": float(np.degrees(2 * np.arctan(width / 2 / camera.focal_px))),
         "to_world": mi.ScalarTransform4f().look_at([0, 0, camera.distance], [0, 0, 0], [0, 1, 0]),
-        "film": {"type": "hdrfilm", "width": width, "height": height, "rfilter": {"type": "box"}, "component_format": "float32"},  # fmt: skip
+        "film": {
+            "type": "hdrfilm",
+            "width": width,
+            "height": height,
+            "rfilter": {"type": "box"},
+            "component_format": "float32",
+        },
         "sampler": {"type": "multijitter", "sample_count": scene.samples},
     }
     picture = np.array(mi.render(mi.load_dict(world), seed=seed))

@@ -73,7 +73,9 @@ def swing(amplitude_deg: float, hertz: float, decay_s: float) -> Callable[[np.nd
     return lambda t: amplitude_deg * np.cos(2 * np.pi * hertz * t) * np.exp(-t / decay_s)
 
 
-def steps(*levels: tuple[float, float], hertz: float = 1.3, damping: float = 0.13) -> Callable[[np.ndarray], np.ndarray]:  # fmt: skip
+def steps(
+    *levels: tuple[float, float], hertz: float = 1.3, damping: float = 0.13
+) -> Callable[[np.ndarray], np.ndarray]:
     """Return the underdamped response to steps, given as (time in s, level in °); it starts at rest at zero."""
 
     def response(t: np.ndarray) -> np.ndarray:
@@ -125,7 +127,12 @@ def _head(complexion: surfaces.Complexion, gloss: bool) -> Callable[[Path], list
         neck = _painted(surfaces.mottled(256, 512, complexion.skin, 0.06, 11))
         return [
             {**_at("ply", middle, (1, 1, 1), skin), "filename": "head.ply"},
-            {**_at("ply", (0.1, -0.2, 0.1), (1.5, 2.2, 0.8), _diffuse(complexion.skin)), "filename": "ball.ply", "place": (0.2, 6.6, 6.3), "turn_deg": 12.0},  # fmt: skip
+            {
+                **_at("ply", (0.1, -0.2, 0.1), (1.5, 2.2, 0.8), _diffuse(complexion.skin)),
+                "filename": "ball.ply",
+                "place": (0.2, 6.6, 6.3),
+                "turn_deg": 12.0,
+            },  # fmt: skip
             {**_at("ply", (-0.6, 1.2, 0.0), (4.2, 5.0, 4.0), neck), "filename": "ball.ply"},
             _at("cylinder", (0, 0, -9.0), (1.5, 1.5, 13.8), _diffuse((0.55, 0.55, 0.56))),
             _at("disk", (0, 0, 4.8), (1.5, 1.5, 1), _diffuse((0.72, 0.72, 0.70))),
@@ -156,7 +163,7 @@ def _stand(wall: Shape) -> Callable[[np.ndarray, Path], list[Shape]]:
 _NODS = steps((0.3, 13.0), (1.4, -9.0), (2.4, 4.0))
 _ABOVE = (_lamp((-8, 62, 38), (0, 0, 0), 9.0, 70.0), _fill(0.16))
 _SIDE = (_lamp((58, 14, 36), (0, 0, 0), 9.0, 62.0), _fill(0.14))
-_FACE = (250, 130, 350, 240)
+_FACE = (180, 70, 340, 240)
 _HEAD_ABOVE = Scene(
     "head_above", 100, _NODS, (236.0, 318.0), _head_mouth(), _head(surfaces.Complexion(), gloss=False),
     _stand(_wall(-22.0, (0.34, 0.40, 0.36), 0.18, 21)), _ABOVE, _FACE,
@@ -197,7 +204,9 @@ def _pattern() -> Shape:
     return _painted(surfaces.patterned(surfaces.sphere_directions(512, 1024), (0.7, 0.62, 0.2), (0.1, 0.16, 0.4)))
 
 
-def _ball_scene(name: str, colour: Callable[[], Shape], radius: float, pivot_px: tuple[float, float], seed: int) -> Scene:  # fmt: skip
+def _ball_scene(
+    name: str, colour: Callable[[], Shape], radius: float, pivot_px: tuple[float, float], seed: int
+) -> Scene:
     body, mark = _ball(colour, radius, 15.0)
     camera = Camera(distance=110.0)
     x, y = pivot_px[0], pivot_px[1] + 15.0 * camera.px_per_cm
@@ -212,16 +221,16 @@ def _stick(_: Path) -> list[Shape]:
     return [_at("cube", (0.0, 6.5, 0.0), (0.55, 7.5, 0.4), _diffuse((0.33, 0.33, 0.34)))]
 
 
+def _on_ring(radius: float, around: float, scale: Sequence[float], rgb: Sequence[float]) -> Shape:
+    """Return a block at an angle ``around`` (rad, clockwise from the top), turned to face the hub."""
+    place = (radius * np.sin(around), radius * np.cos(around), 0.0)
+    return _at("cube", place, scale, _diffuse(rgb), -float(np.degrees(around)))
+
+
 def _wheel(_: Path) -> list[Shape]:
-    spokes = [
-        _at("cube", (4.0 * np.sin(a), 4.0 * np.cos(a), 0.0), (0.28, 3.9, 0.2), _diffuse((0.5, 0.5, 0.52)), -np.degrees(a))
-        for a in 2 * np.pi * np.arange(5) / 5
-    ]
-    rim = [
-        _at("cube", (8.0 * np.sin(a), 8.0 * np.cos(a), 0.0), (0.75, 0.45, 0.6), _diffuse((0.06, 0.06, 0.07)), -np.degrees(a))
-        for a in 2 * np.pi * np.arange(36) / 36
-    ]
-    valve = _at("cube", (7.0 * np.sin(0.3), 7.0 * np.cos(0.3), 0.0), (0.18, 0.6, 0.2), _diffuse((0.6, 0.55, 0.3)), -np.degrees(0.3))
+    spokes = [_on_ring(4.0, a, (0.28, 3.9, 0.2), (0.5, 0.5, 0.52)) for a in 2 * np.pi * np.arange(5) / 5]
+    rim = [_on_ring(8.0, a, (0.75, 0.45, 0.6), (0.06, 0.06, 0.07)) for a in 2 * np.pi * np.arange(36) / 36]
+    valve = _on_ring(7.0, 0.3, (0.18, 0.6, 0.2), (0.6, 0.55, 0.3))
     hub = _at("cylinder", (0, 0, -1.5), (1.3, 1.3, 2.2), _diffuse((0.28, 0.28, 0.30)))
     return [*spokes, *rim, valve, hub, _at("disk", (0, 0, 0.7), (1.3, 1.3, 1), _diffuse((0.28, 0.28, 0.30)))]
 

@@ -63,10 +63,12 @@ def head_colour(directions: Array, complexion: Complexion) -> Array:
     colour = np.array(complexion.skin) * (1.0 + mottle - freckles)[..., None]
     lips = np.maximum(_bump(directions, UPPER_LIP, (0.3, 0.05, 0.24)), _bump(directions, LOWER_LIP, (0.3, 0.055, 0.22)))
     colour = _over(colour, np.array(complexion.lips) * (1 + 0.1 * cloud(directions, 20.0, 4))[..., None], lips > 0.45)
+    white, iris = np.array([0.75, 0.74, 0.72]), np.array([0.03, 0.03, 0.04])
     for side in (-0.5, 0.5):
-        colour = _over(colour, np.array([0.75, 0.74, 0.72]), _bump(directions, (0.83, 0.18, side), (0.09, 0.05, 0.09)) > 0.5)  # fmt: skip
-        colour = _over(colour, np.array([0.03, 0.03, 0.04]), _bump(directions, (0.85, 0.18, side * 0.9), (0.04, 0.04, 0.04)) > 0.5)  # fmt: skip
-        colour = _over(colour, np.array(complexion.hair), _bump(directions, (0.83, 0.36, side), (0.15, 0.035, 0.22)) > 0.5)  # fmt: skip
+        colour = _over(colour, white, _bump(directions, (0.83, 0.18, side), (0.09, 0.05, 0.09)) > 0.5)
+        colour = _over(colour, iris, _bump(directions, (0.85, 0.18, 0.9 * side), (0.04, 0.04, 0.04)) > 0.5)
+        brow = _bump(directions, (0.83, 0.36, side), (0.15, 0.035, 0.22)) > 0.5
+        colour = _over(colour, np.array(complexion.hair), brow)
     strands = cloud(directions * [1.0, 0.25, 1.0], 40.0, 5)
     hair = np.array(complexion.hair) * np.clip(1.0 + 0.5 * strands, 0.2, None)[..., None]
     return _over(colour, hair, directions @ [-0.55, 0.83, 0.0] > 0.18 + 0.04 * cloud(directions, 9.0, 6))

@@ -165,6 +165,10 @@ class TileFit:
             count=self.count * kept,
         )
 
+    def rigid(self) -> TileFit:
+        """Return a copy for angle, x and y alone."""
+        return replace(self, normal=self.normal[..., :3, :3], gradient=self.gradient[..., :3])
+
     def weighted(self, variance: Floats) -> tuple[Floats, Floats]:
         """Return normal matrix and gradient divided by the residuals' variances, given along the first axis."""
         whole = (slice(None), *(None,) * (self.gradient.ndim - 1))

@@ -303,7 +303,7 @@ def _round(
     axis = data.axis_in(state)
     equations = centre_equations(*fits.weighted(variance * excess), state.turns, axis, state.centres.heights)
     step, covariance = solve_centres(equations, data.prior_in(state), state.centres.values)
-    centres = Centres(state.centres.values + step)
+    found = Centres(state.centres.values + step)
     turn_steps = (equations.turn_scores - equations.cross @ step) / equations.turn_information
     before_step = fits.normal, fits.gradient, state.turns, axis, state.centres.heights
     remaining = remaining_gradient(*before_step, step, turn_steps)
@@ -311,11 +311,11 @@ def _round(
     least = _LEAST_SPREAD_PX / float(np.hypot(*axis.parallax))
     following = replace(
         state,
-        centres=centres,
+        centres=found,
         turns=state.turns + turn_steps,
-        height_variance=_variance(centres.heights, error[heights_of(len(error))], state.height_variance, least),
+        height_variance=_variance(found.heights, error[heights_of(len(error))], state.height_variance, least),
         lean_variance=_variance(
-            centres.leans.ravel(), error[leans_of(len(error))], state.lean_variance, 2.0 * least / TILE_SIDE_PX
+            found.leans.ravel(), error[leans_of(len(error))], state.lean_variance, 2.0 * least / TILE_SIDE_PX
         ),
     )
     scatter = displacement_scatter(fits.normal, remaining, variance)

@@ -114,7 +114,7 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
     centres = body.pivot_px + body.heights[:, None] * body.plane.axis.parallax
     turn = view.turn
     for _ in range(_MAX_STEPS):
-        fit = compare_tiles(body.tiles, views, np.full(len(body.tiles), turn), centres)
+        fit = compare_tiles(body.tiles, views, np.full(len(body.tiles), turn), centres).rigid()
         mean_square = np.where(fit.count > 0, fit.squares / np.maximum(fit.count, 1), np.inf)
         # Motion blur and the like affect all tiles alike, a hand or a hair only some.
         usual = float(np.median(mean_square / body.variance))
@@ -123,7 +123,7 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
             return NO_TURN
         variance = np.where(clear, body.variance * max(usual, 1.0), np.inf)
         each = fit.weighted(variance * body.excess)
-        normal, gradient = each[0].sum(axis=0)[:3, :3], each[1].sum(axis=0)[:3]
+        normal, gradient = each[0].sum(axis=0), each[1].sum(axis=0)
         noise_share = 1.0
         if view.pivot_covariance_px2 is not None:
             normal, gradient, noise_share = _eliminate_pivot(normal, gradient, view.pivot_covariance_px2)
