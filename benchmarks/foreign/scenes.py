@@ -127,12 +127,7 @@ def _head(complexion: surfaces.Complexion, gloss: bool) -> Callable[[Path], list
         neck = _painted(surfaces.mottled(256, 512, complexion.skin, 0.06, 11))
         return [
             {**_at("ply", middle, (1, 1, 1), skin), "filename": "head.ply"},
-            {
-                **_at("ply", (0.1, -0.2, 0.1), (1.5, 2.2, 0.8), _diffuse(complexion.skin)),
-                "filename": "ball.ply",
-                "place": (0.2, 6.6, 6.3),
-                "turn_deg": 12.0,
-            },  # fmt: skip
+            {**_at("ply", (0.2, 6.6, 6.3), (1.5, 2.2, 0.8), _diffuse(complexion.skin), 12.0), "filename": "ball.ply"},
             {**_at("ply", (-0.6, 1.2, 0.0), (4.2, 5.0, 4.0), neck), "filename": "ball.ply"},
             _at("cylinder", (0, 0, -9.0), (1.5, 1.5, 13.8), _diffuse((0.55, 0.55, 0.56))),
             _at("disk", (0, 0, 4.8), (1.5, 1.5, 1), _diffuse((0.72, 0.72, 0.70))),
