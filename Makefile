@@ -65,8 +65,9 @@ demo: setup ## render a rig with a hidden effect, measure it, find the effect, w
 	$(BIN)/anglecam close $(DEMO)/session --out $(DEMO)/result
 	$(BIN)/synth score $(DEMO)/result --truth $(DEMO)/truth
 
+# Many tests start processes; they start in three quarters of the time where bytecode of anglecam is kept.
 test: venv-module mesa $(DEV) ## everything that must pass
-	$(BIN)/python -m pytest
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest
 
 check: venv-module $(DEV) ## style, types, docstrings and the direction of imports, in seconds
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy && $(BIN)/lint-imports --no-logo

@@ -84,9 +84,9 @@ def error_sources(measured: Measurement, rig: Rig) -> ErrorSources:
 
 
 def _pivot_dof(source: str, poses: float) -> float:
-    """Return the pivot's degrees of freedom; of two sources the smaller number, as both together have no fewer."""
+    """Return the pivot's degrees of freedom: the smallest of its sources; a declaration has infinitely many."""
     dof = [_MARKER_DOF] if "marker" in source else []
-    return min([*dof, poses] if "centre" in source else dof)
+    return min([*dof, poses] if "centre" in source else dof, default=math.inf)
 
 
 def _neutral(angles: Angles, resting: Flags, pose: NDArray[np.int64], mirrored: bool) -> Neutral:

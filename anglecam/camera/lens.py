@@ -198,7 +198,7 @@ def lens_from_rig(rig: Rig, size: tuple[int, int], clip: Path) -> Lens:
     Parameters
     ----------
     rig : Rig
-        Its ``camera``, ``facing`` and ``pivot.near`` are used; ``facing: left`` also mirrors the tilt's axis.
+        Its ``camera``, ``facing`` and ``pivot`` are used; ``facing: left`` also mirrors the tilt's axis.
     size : tuple of int
         Width and height of the clip, px.
     clip : Path
@@ -207,7 +207,7 @@ def lens_from_rig(rig: Rig, size: tuple[int, int], clip: Path) -> Lens:
     Returns
     -------
     Lens
-        The identity if nothing is declared. The tilted view is centred on ``pivot.near``, else on the middle of the
+        The identity if nothing is declared. The tilted view is centred on the expected pivot, else on the middle of the
         picture; `Lens.looking_at` replaces this centre.
 
     Raises
@@ -235,7 +235,7 @@ def lens_from_rig(rig: Rig, size: tuple[int, int], clip: Path) -> Lens:
         focal_px=camera.focal_px if calibration is None else calibration.focal_px,
     )
     middle = ((size[0] - 1) / 2.0, (size[1] - 1) / 2.0)
-    return lens.looking_at(middle if rig.pivot.near is None else rig.pivot.near)
+    return lens.looking_at(middle if rig.pivot.expected is None else rig.pivot.expected)
 
 
 def _check_border(lens: Lens, size: tuple[int, int], path: Path) -> None:

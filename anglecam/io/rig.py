@@ -14,19 +14,57 @@ SlantDeg = Annotated[float, Field(gt=-80, lt=80, allow_inf_nan=False)]
 
 
 class RigMark(Declared):
-    """The mark on the body, at the far end of the lever."""
+    """The mark on the body, at the far end of the lever: its colour, or where to see it."""
 
     rgb: tuple[Byte, Byte, Byte] | None = None
     """Its colour; ``None``: the colour is found from the clip."""
+    at: tuple[Finite, Finite] | None = None
+    """A point on it in frame ``frame``, px."""
+    box: tuple[Finite, Finite, Finite, Finite] | None = None
+    """A box around it in frame ``frame``: left, top, right, bottom, px."""
+    frame: Annotated[int, Field(ge=0)] = 0
+    """Number of that frame in the film, from 0."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> RigMark:
+        if sum(way is not None for way in (self.rgb, self.at, self.box)) > 1:
+            raise ValueError("rgb, at and box each name the mark; declare only one of them")
+        if "frame" in self.model_fields_set and self.at is None and self.box is None:
+            raise ValueError("frame says in which frame at or box is; declare one of them")
+        if self.box is not None and not (self.box[0] < self.box[2] and self.box[1] < self.box[3]):
+            raise ValueError("box is left, top, right, bottom, with left < right and top < bottom")
+        return self
+
+    @property
+    def as_box(self) -> tuple[float, float, float, float] | None:
+        """The box, or the point as a box without extent, px; ``None`` where neither is declared."""
+        return self.box if self.at is None else (*self.at, *self.at)
 
 
 class RigPivot(Declared):
     """Where the mechanism turns, and how that place is marked."""
 
     near: tuple[Finite, Finite] | None = None
-    """A point near the pivot, px."""
+    """A hint: a point within some 10 px of the pivot, px."""
+    at: tuple[Finite, Finite] | None = None
+    """The pivot itself, inside or outside the picture, px."""
+    sigma_px: Positive | None = None
+    """Standard uncertainty of each coordinate of ``at``, px; 1 px if it is not declared."""
     marker: Literal["auto", "disc", "ring", "none"] = "auto"
     """Shape of the marker on the shaft; ``none``: the pivot is the centre of rotation, fitted to the mark's path."""
+
+    @model_validator(mode="after")
+    def _one_place(self) -> RigPivot:
+        if self.at is not None and self.near is not None:
+            raise ValueError("at fixes the pivot and near hints at it; declare only one of them")
+        if self.sigma_px is not None and self.at is None:
+            raise ValueError("sigma_px is the uncertainty of at; declare both")
+        return self
+
+    @property
+    def expected(self) -> tuple[float, float] | None:
+        """Where the pivot is expected, px: ``at`` or ``near``."""
+        return self.near if self.at is None else self.at
 
 
 class RigCamera(Declared):
@@ -109,7 +147,7 @@ class Rig(Declared):
     """
 
     mouth: RigMark | Literal["auto"] = "auto"
-    """The mark; ``auto``: it is found from the clip."""
+    """The mark, also called ``mark`` in the file; ``auto``: it is found from the clip."""
     pivot: RigPivot = RigPivot()
     facing: Literal["right", "left"] = "right"
     """Side that the face looks to; with ``left``, angles are counted clockwise in the picture."""
@@ -125,6 +163,21 @@ class Rig(Declared):
     """For sessions whose recordings are tracks of points."""
     sync: RigSync = RigSync()
     model: RigModel = RigModel()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _mark_is_mouth(cls, content: object) -> object:
+        """Accept the key ``mark`` for ``mouth``."""
+        if not isinstance(content, dict) or "mark" not in content:
+            return content
+        if "mouth" in content:
+            raise ValueError("mark and mouth are two names of one key; declare only one of them")
+        return {"mouth" if key == "mark" else key: value for key, value in content.items()}
+
+    @property
+    def pointed_mark(self) -> RigMark | None:
+        """The mark where the rig names it by a point or a box; ``None`` otherwise."""
+        return None if self.mouth == "auto" or (self.mouth.at is None and self.mouth.box is None) else self.mouth
 
     @property
     def mark_rgb(self) -> tuple[int, int, int] | None:

@@ -161,7 +161,7 @@ def _display(film: Film) -> str | None:
 def _pivot_from_path_alone(detections: Detections, rig: Rig) -> bool:
     """Return whether the pivot is only the centre of the mark's path, and a rigid body could be followed instead."""
     followable = detections.body is None and detections.camera_moves is None and detections.lens.is_identity
-    return followable and detections.marker is None and rig.pivot.near is None
+    return followable and detections.marker is None and rig.pivot.expected is None
 
 
 def _in_all_frames(ok: NDArray[np.bool_], places_px: Floats) -> Floats:

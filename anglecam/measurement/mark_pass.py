@@ -19,21 +19,20 @@ from anglecam.camera.lens import Lens, lens_from_rig
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.errors import InputError
-from anglecam.io.rig import Rig
-from anglecam.measurement.detections import Detections, find_pivot, frames_to_keep
+from anglecam.io.rig import Rig, RigMark
+from anglecam.measurement.detections import Detections, frame_of_mark, frames_to_keep
+from anglecam.measurement.pivot import find_pivot
 from anglecam.measurement.rigid_body_pass import detect_rigid_body
-from anglecam.video.film import Film, Sample
+from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.image.noise import pixel_noise
-from anglecam.vision.mark.search import FoundMark, find_mark
-from anglecam.vision.mark.segment import Region, find_regions
+from anglecam.vision.mark.found_mark import FoundMark, Samples
+from anglecam.vision.mark.search import find_mark
+from anglecam.vision.mark.segment import SMALLEST_SHARE, Region, find_regions
 from anglecam.vision.mark.track import MarkTrack, follow_mark
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.pivot.marker import RoundMarker
 from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
 from anglecam.vision.stabilise.learn import learn_background
-
-_SMALLEST_SHARE = 0.25
-"""Of the mark's area; a smaller region is not the mark, even if partly hidden."""
 
 
 def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | None = None) -> Detections:
@@ -61,26 +60,22 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
     path = film.path
     lens = lens_from_rig(rig, film.size, path)
     sample = film.sample(frames_to_keep(film))
-    images = [f.image for f in sample.frames if f.image is not None]
-    noise = pixel_noise(images)
-    steady = learn_background(images)
-    moves = [] if steady is None else [steady.at(image) for image in images]
-    near = None if rig.pivot.near is None else lens.rectify(rig.pivot.near)
-
-    def placed(i: int, point: Floats) -> Floats:
-        return lens.rectify(moves[i].to_reference(point) if moves else point)
-
-    found = find_mark(images, rig.mark_rgb, near, placed) if images else None
+    noise = pixel_noise([f.image for f in sample.frames if f.image is not None])
+    steady = learn_background([f.image for f in sample.frames if f.image is not None])
+    pointed = rig.pointed_mark
+    frames = [*([] if pointed is None else [frame_of_mark(film, pointed)]), *sample.frames]
+    samples = _samples(film, frames, pointed, steady, lens)
+    near = None if rig.pivot.expected is None else lens.rectify(rig.pivot.expected)
+    found = find_mark(samples, rig.mark_rgb, near) if samples.images else None
     if found is None:
-        body = detect_rigid_body(film, rig) if rig.mark_rgb is None and images else None
+        body = detect_rigid_body(film, rig) if rig.mark_rgb is None and samples.images else None
         if isinstance(body, Detections):
             return body
         besides = "" if body is None else f"; nor can the body be followed without a mark: {body}"
         raise InputError(_no_mark(path, sample, rig) + besides)
     time, filmed, decoded, repeated, shakes = _read_regions(film, found, sample.count, steady, progress)
     candidates = filmed if shakes is None else [_unshaken(r, move) for r, move in zip(filmed, shakes, strict=True)]
-    images = [_stabilised(image, move) for image, move in zip(images, moves, strict=True)] if moves else images
-    lens, track, marker, pivot, disagreement = _follow(candidates, time, found, images, rig, lens)
+    lens, track, marker, pivot, disagreement = _follow(candidates, time, found, samples.stabilised, rig, lens)
     hidden = np.zeros(len(time), bool) if shakes is None else np.array([not move.known for move in shakes])
     status = tuple(
         "undecodable" if not d else "occluded" if h else s
@@ -91,7 +86,7 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
     if pivot is None:
         raise InputError(
             f"{path}: no pivot found: the mark's path is too short to determine its centre, and there is no round"
-            " marker near it; declare it: pivot: {near: [x, y]} in rig.yaml"
+            " marker near it; declare it: pivot: {at: [x, y], sigma_px: s} in rig.yaml, also outside the picture"
         )
     notes = [disagreement] if disagreement else []
     if shakes is not None:
@@ -118,6 +113,27 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
         size=film.size,
         truncated=film.why_truncated(sample),
         notes=tuple(notes),
+    )
+
+
+def _samples(
+    film: Film, frames: Sequence[Frame], pointed: RigMark | None, steady: BackgroundMotion | None, lens: Lens
+) -> Samples:
+    """Return the frames in which the mark is sought: those in which the camera's motion is known."""
+    pictures = [(frame.time, frame.image) for frame in frames if frame.image is not None]
+    still = CameraMove(np.zeros(2), np.zeros(2), 0.0, np.zeros((3, 3)))
+    moves = [still if steady is None else steady.at(image) for _, image in pictures]
+    if pointed is not None and not moves[0].known:
+        where = f"{film.path}: the camera's motion is unknown in frame {pointed.frame}"
+        raise InputError(f"{where}; declare the mark in another frame")
+    kept = [(time, image, move) for (time, image), move in zip(pictures, moves, strict=True) if move.known]
+    return Samples(
+        images=[image for _, image, _ in kept],
+        stabilised=[image if steady is None else _stabilised(image, move) for _, image, move in kept],
+        time=np.array([time for time, _, _ in kept]),
+        to_plane=lambda i, point: lens.rectify(kept[i][2].to_reference(point)),
+        in_plane=lambda i, region: _in_plane(_unshaken([region], kept[i][2])[0], lens),
+        pointed_px=None if pointed is None else np.array(pointed.as_box),
     )
 
 
@@ -152,8 +168,6 @@ def _unshaken(regions: Sequence[Region], move: CameraMove) -> list[Region]:
 
 def _stabilised(image: Image, move: CameraMove) -> Image:
     """Return a frame as a camera at rest would show it; used for the median of many frames."""
-    if not move.known:
-        return image
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     to_frame = move.to_frame(corners)
     matrix = np.column_stack([to_frame[1] - to_frame[0], to_frame[2] - to_frame[0], to_frame[0]])
@@ -203,7 +217,9 @@ def _read_regions(
         time.append(frame.time)
         decoded.append(image is not None)
         repeated.append(image is not None and before is not None and np.array_equal(image, before))
-        regions = [] if image is None else find_regions(image, found.model, _SMALLEST_SHARE * found.area_px2)
+        regions = (
+            [] if image is None else find_regions(image, found.model, SMALLEST_SHARE * found.area_px2, found.opening_px)
+        )
         candidates.append(regions)
         before = image
         if progress is not None:
@@ -212,13 +228,15 @@ def _read_regions(
 
 
 def _colour(rig: Rig) -> str:
+    if rig.pointed_mark is not None:
+        return f"of what is declared in frame {rig.pointed_mark.frame}"
     return "auto" if rig.mark_rgb is None else ",".join(map(str, rig.mark_rgb))
 
 
 def _no_mark(path: Path, sample: Sample, rig: Rig) -> str:
     if not sample.decoded:
         return f"{path}: none of its {sample.count} frames can be decoded"
-    hint = "" if rig.pivot.near is None else ", rotating about the hint at {:g},{:g}".format(*rig.pivot.near)
+    hint = "" if rig.pivot.expected is None else ", rotating about {:g},{:g}".format(*rig.pivot.expected)
     return (
         f"{path}: no mark found in {sample.count} of {sample.count} frames (colour {_colour(rig)}{hint});"
         " is it in the picture?"

@@ -7,7 +7,8 @@ import numpy as np
 from anglecam.camera.lens import lens_from_rig
 from anglecam.data.series import OK
 from anglecam.io.rig import Rig
-from anglecam.measurement.detections import Detections, find_pivot, frames_to_keep
+from anglecam.measurement.detections import Detections, frame_of_mark, frames_to_keep
+from anglecam.measurement.pivot import find_pivot
 from anglecam.video.film import Film
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.circle import Circle
@@ -37,8 +38,13 @@ def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
     lens = lens_from_rig(rig, film.size, film.path)
     sample = film.sample(frames_to_keep(film))
     images = [f.image for f in sample.frames if f.image is not None]
-    noise = pixel_noise(images)
-    body = follow_rigid_body(film.frames(), images, noise)
+    noise, pointed = pixel_noise(images), rig.pointed_mark
+    if pointed is None:
+        body = follow_rigid_body(film.frames(), images, noise)
+    else:
+        first = frame_of_mark(film, pointed).image
+        assert first is not None
+        body = follow_rigid_body(film.frames(), [first, *images], noise, np.array(pointed.as_box))
     if isinstance(body, str):
         return body
     stamps, repeated, before = [], [], None

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
 from anglecam.report.figures import STYLE, _svg
-from anglecam.vision.mark.colour import EMPTY_LEVEL, FULL_LEVEL, learn_colour
+from anglecam.vision.mark.colour import EMPTY_LEVEL, FULL_LEVEL, fit_discriminant
 
 RADII_PX = (6.0, 10.0)
 _TRUE, _SIX, _TEN, _PIVOT = "#d7191c", "#2b6cff", "#12a150", "#ffd400"
@@ -143,7 +143,7 @@ def _edges(crop: Image, filled: Image) -> Image:
     """Return Canny edges of the mark's fraction in each pixel, computed as in the measurement."""
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * _INNER_PX + 1,) * 2)
     inside, outside = cv2.erode(filled, disc) > 0, cv2.dilate(filled, disc) == 0
-    model = learn_colour(crop[inside], crop[outside], crop[outside])
+    model = fit_discriminant(crop[inside], crop[outside], crop[outside])
     smooth = cv2.GaussianBlur(model.fraction_map(crop), (3, 3), 0)
     step = (FULL_LEVEL - EMPTY_LEVEL) / 2.0
     return cv2.Canny(smooth, step, 2.0 * step) // 255

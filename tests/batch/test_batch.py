@@ -105,10 +105,10 @@ def test_the_log_is_a_line_of_json_for_every_clip(done):
     assert all(line.keys() >= {"time", "status", "cause", "wall_time_s"} for line in lines)
 
 
-def test_progress_is_plain_lines_without_a_terminal_and_nothing_with_quiet(done):
+def test_progress_is_plain_lines_without_a_terminal_and_nothing_with_quiet(done, batch_here):
     lab, out, call = done
     assert sum(" of 6: " in line for line in call.stderr.splitlines()) == 6
-    quiet = run(lab / "mon" / "a.avi", lab / "b.avi", "--out", out.parent / "quiet", "--quiet")
+    quiet = batch_here(lab / "mon" / "a.avi", lab / "b.avi", "--out", out.parent / "quiet", "--quiet")
     assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
 
 
@@ -163,10 +163,10 @@ def test_a_failed_clip_is_measured_again_on_request_or_after_a_change_and_has_no
     assert run_batch([str(clip)], out, Options(jobs=1, quiet=True, retry_failed=True)).rows[0].status == "ok"
 
 
-def test_a_wrong_rig_file_affects_its_folder_only_and_gives_exit_status_2(tmp_path):
+def test_a_wrong_rig_file_affects_its_folder_only_and_gives_exit_status_2(tmp_path, batch_here):
     lab = tiny_lab(tmp_path / "clips", ["good/a.avi", "wrong/b.avi"])
     (lab / "wrong" / "rig.yaml").write_text("pivott: {}\n")
-    call = run(lab, "--out", tmp_path / "out", "--quiet")
+    call = batch_here(lab, "--out", tmp_path / "out", "--quiet")
     assert call.returncode == 2
     assert call.stderr.splitlines() == [f"{lab}/wrong/b.avi: {lab}/wrong/rig.yaml: unknown key pivott"]
     assert (tmp_path / "out" / "good" / "a.angles.csv").exists()
@@ -197,11 +197,11 @@ def test_the_index_keeps_other_folders_and_drops_clips_that_are_gone(tmp_path):
     assert all((out / series).exists() for series in found)  # the output path of a removed clip stays taken
 
 
-def test_wrong_calls_are_exit_status_2_and_do_nothing(tmp_path):
+def test_wrong_calls_are_exit_status_2_and_do_nothing(tmp_path, batch_here):
     lab = tiny_lab(tmp_path / "clips", ["a.avi"])
     (tmp_path / "rig.yaml").write_text("facing: up\n")
     (tmp_path / "file").touch()
-    call = run(lab, "--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out")
+    call = batch_here(lab, "--rig", tmp_path / "rig.yaml", "--out", tmp_path / "out")
     assert call.returncode == 2
     assert call.stderr.splitlines() == [f"{tmp_path}/rig.yaml: facing: input should be 'right' or 'left' (got up)"]
     for out, options, says in (

@@ -17,6 +17,7 @@ from anglecam.errors import RigError
 from support.tiny import batch_command, children, is_alive, results, tiny_lab
 
 pytest.importorskip("distributed")
+pytestmark = pytest.mark.usefixtures("shared_processes")
 
 
 @pytest.fixture

@@ -15,6 +15,8 @@ from anglecam.batch.run import run_batch as run_here
 from anglecam.errors import RigError
 from support.tiny import batch_command, children, is_alive, results, tiny_clip, tiny_lab, unfinished
 
+pytestmark = pytest.mark.usefixtures("shared_processes")
+
 TWO = Options(jobs=2, quiet=True)
 NAMES = [f"{folder}/{k}.avi" for folder in ("mon", "tue") for k in range(3)]
 

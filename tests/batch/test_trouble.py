@@ -9,6 +9,8 @@ import signal
 import threading
 import time
 
+import pytest
+
 from anglecam.batch.run import Options, run_batch
 from support.tiny import children, command_line, tiny_clip, tiny_lab, unfinished
 from support.tiny import run_batch as run
@@ -50,6 +52,7 @@ def test_an_output_folder_that_cannot_be_written_to_is_reported_in_one_line(tmp_
     assert call.stderr.splitlines() == [f"--out {out}: cannot be written to (Permission denied)"]
 
 
+@pytest.mark.usefixtures("shared_processes")
 def test_a_full_disk_gives_one_line_per_clip_and_leaves_no_partial_results(tmp_path):
     lab, out = tiny_lab(tmp_path / "clips", ["a.avi", "b.avi"]), tmp_path / "out"
 
@@ -87,6 +90,7 @@ def test_a_clip_that_is_removed_or_rewritten_while_it_is_read_is_reported(tmp_pa
     assert [row.status for row in run_batch([str(lab)], out, QUIET).rows] == ["ok", "ok"]
 
 
+@pytest.mark.usefixtures("shared_processes")
 def test_a_clip_of_any_file_name_is_measured_and_listed(tmp_path):
     names = ["new\nline.avi", "Ⅳ θ 日本　語.avi", os.fsdecode(b"not-utf8-\xff.avi"), "-o.avi", "a'b;$x$_.avi"]
     lab, out = tiny_lab(tmp_path / "clips", names), tmp_path / "out"
@@ -106,10 +110,14 @@ def test_every_clip_that_takes_too_long_gives_one_line(tmp_path):
 
 def test_a_process_that_hangs_is_ended_by_its_time_limit(tmp_path):
     lab, out = tiny_lab(tmp_path / "clips", ["a.avi"]), tmp_path / "out"
+    others = children(os.getpid())  # measuring processes that other tests share
+
+    def is_new(child):
+        return child not in others and "anglecam.batch.child" in command_line(child)
 
     def stop():
         # not before it runs its program: stopping a fork of this process before its exec would stop this process, too
-        while not (mine := [c for c in children(os.getpid()) if "anglecam.batch.child" in command_line(c)]):
+        while not (mine := [c for c in children(os.getpid()) if is_new(c)]):
             time.sleep(0.001)
         os.kill(mine[0], signal.SIGSTOP)
 

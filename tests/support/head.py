@@ -127,10 +127,12 @@ class Head:
             (0.25 * jaw, black),
             (0.6 * nostril, black),
             (self._mask(HAIR), locks),
-            (self._mask(BROW), hair * np.ones_like(face)),
+            (self._mask(BROW), hair),
             (self._mask(EYE), eye),
             (self._mask(LIPS), lips),
         ]:
-            rgb += cover[..., None] * (colour - rgb)
-            alpha += cover * (1 - alpha)
+            x, y, w, h = cv2.boundingRect((cover > 0).view(np.uint8))  # most parts cover little of the head
+            box = slice(y, y + h), slice(x, x + w)
+            rgb[box] += cover[box][..., None] * (np.broadcast_to(colour, rgb.shape)[box] - rgb[box])
+            alpha[box] += cover[box] * (1 - alpha[box])
         return np.dstack([rgb[..., ::-1], alpha])

@@ -1,6 +1,6 @@
 """Track of one blob through sampled frames: on a circle, or at rest in a clip where nothing moves.
 
-A track is scored by the share of frames in which the blob is seen, by how constant its size is, by its hue contrast,
+A track is scored by the share of frames in which the blob is seen, by how constant its size is, by its contrast,
 and by whether its surroundings move with it.
 """
 
@@ -43,7 +43,7 @@ class BlobTrack:
     score: float
     """Larger is more like a mark."""
     level: float
-    """Hue contrast at which the blobs were thresholded."""
+    """Contrast at which the blobs were thresholded."""
     members: NDArray[np.int64]
     """Indices of its blobs."""
     blobs: Blobs
@@ -62,7 +62,15 @@ class _PathScore:
     """How distinctly the path is curved, 0 to 1."""
 
 
-def moving_track(blobs: Blobs, images: Sequence[Image], level: float, hint: Floats | None) -> BlobTrack | None:
+def moving_track(
+    blobs: Blobs,
+    images: Sequence[Image],
+    level: float,
+    hint: Floats | None,
+    *,
+    on_body: bool,
+    through: NDArray[np.intp] | None = None,
+) -> BlobTrack | None:
     """Find the circle on which one blob of constant size and colour travels, by random sampling of two or three poses.
 
     Parameters
@@ -72,9 +80,13 @@ def moving_track(blobs: Blobs, images: Sequence[Image], level: float, hint: Floa
     images : sequence of ndarray
         (h, w, 3) the frames.
     level : float
-        Hue contrast at which the blobs were thresholded.
+        Contrast at which the blobs were thresholded.
     hint : ndarray, optional
         (2,) approximate centre of the circle in the plane of motion, px.
+    on_body : bool
+        Prefer a blob whose surroundings move with it, as those of lips in a face do.
+    through : ndarray, optional
+        Indices of blobs of which the track must contain one.
 
     Returns
     -------
@@ -94,6 +106,8 @@ def moving_track(blobs: Blobs, images: Sequence[Image], level: float, hint: Floa
     for trial in range(_TRIALS):
         # A clip that hardly moves has only two distinct poses.
         some = rng.choice(poses, size=min(2 + (trial % 4 > 0), len(poses)), replace=False)
+        if through is not None and len(through):
+            some[0] = rng.choice(through)
         key = tuple(sorted(some))
         if key in tried or len(set(blobs.frame[some])) < len(some):
             continue
@@ -109,10 +123,13 @@ def moving_track(blobs: Blobs, images: Sequence[Image], level: float, hint: Floa
         track = _collect(blobs, frames, level, circle, typical, least, path_scores)
         if track is None or (best is not None and track.score <= best.score):
             continue
-        ends = _ends(track)
-        if ends not in co_motion:
-            co_motion[ends] = _co_motion(track, ends, images)
-        track = replace(track, score=track.score * co_motion[ends] ** _CO_MOTION_POWER)
+        if through is not None and not np.isin(track.members, through).any():
+            continue
+        if on_body:
+            ends = _ends(track)
+            if ends not in co_motion:
+                co_motion[ends] = _co_motion(track, ends, images)
+            track = replace(track, score=track.score * co_motion[ends] ** _CO_MOTION_POWER)
         if best is None or track.score > best.score:
             best = track
     return best
@@ -231,7 +248,7 @@ def _rms_off_line(place: Floats) -> float:
 
 
 def _score(blobs: Blobs, members: NDArray[np.int64], frames: int, extent: float) -> float:
-    """Score blobs by the share of frames that show them, hue contrast, constancy of size, size and travel."""
+    """Score blobs by the share of frames that show them, contrast, constancy of size, size and travel."""
     size = blobs.area[members]
     constancy = np.exp(-4.0 * float(np.std(np.log(size))))
     seen = len(set(blobs.frame[members])) / frames
@@ -239,7 +256,9 @@ def _score(blobs: Blobs, members: NDArray[np.int64], frames: int, extent: float)
     return float(seen**2 * np.median(blobs.contrast[members]) * constancy * np.median(size) ** 0.25 * (0.1 + travel))
 
 
-def resting_track(blobs: Blobs, images: Sequence[Image], level: float) -> BlobTrack | None:
+def resting_track(
+    blobs: Blobs, images: Sequence[Image], level: float, through: NDArray[np.intp] | None = None
+) -> BlobTrack | None:
     """Return the blob that stands out most, for a clip in which nothing moves.
 
     Parameters
@@ -249,7 +268,9 @@ def resting_track(blobs: Blobs, images: Sequence[Image], level: float) -> BlobTr
     images : sequence of ndarray
         (h, w, 3) the frames.
     level : float
-        Hue contrast at which the blobs were thresholded.
+        Contrast at which the blobs were thresholded.
+    through : ndarray, optional
+        Indices of the blobs of the first picture that may be the mark.
 
     Returns
     -------
@@ -259,7 +280,7 @@ def resting_track(blobs: Blobs, images: Sequence[Image], level: float) -> BlobTr
     if not len(blobs.frame):
         return None
     best: BlobTrack | None = None
-    for seed in np.flatnonzero(blobs.frame == blobs.frame[0]):
+    for seed in np.flatnonzero(blobs.frame == blobs.frame[0]) if through is None else through:
         near = np.hypot(*(blobs.plane_px - blobs.plane_px[seed]).T) < _MOVED_PX
         alike = np.abs(np.log(blobs.area / blobs.area[seed])) < 0.4
         members = np.flatnonzero(near & alike)

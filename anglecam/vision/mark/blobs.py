@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
+from anglecam.vision.mark.segment import Region
 
 _MIN_AREA_PX2 = 12.0
 """Smallest blob with a useful centroid, px²."""
@@ -80,4 +81,18 @@ def find_blobs(
         np.array(area, float),
         np.array(contrast, float),
         np.array(label, np.int64),
+    )
+
+
+def blobs_of_regions(regions: Sequence[Sequence[Region]]) -> Blobs:
+    """Return the wholly visible regions of every picture, in the plane of motion, as blobs of equal contrast."""
+    whole = [(t, region) for t, of_picture in enumerate(regions) for region in of_picture if region.whole]
+    places = np.array([region.centre_px for _, region in whole]).reshape(-1, 2)
+    return Blobs(
+        frame=np.array([t for t, _ in whole], np.int64),
+        picture_px=places,
+        plane_px=places,
+        area=np.array([region.area_px2 for _, region in whole]),
+        contrast=np.ones(len(whole)),
+        label=np.zeros(len(whole), np.int64),
     )

@@ -14,6 +14,8 @@ from anglecam.vision.image.transforms import rotation
 
 _BLOB_RADIUS, _SURROUNDINGS_RADIUS = 0.8, 1.8
 """In units of the root of the blob's area: the blob lies within the first, its surroundings between the two."""
+_MAX_SIDE = 41
+"""Most points along a side of the grid on which surroundings are compared: a large blob needs no finer one."""
 _NOISE = 2.0
 """Grey levels by which any two pictures differ. Featureless surroundings then score near 0.5, which is undecided."""
 
@@ -51,13 +53,14 @@ def co_motion_share(
     """
     size = float(np.sqrt(area_px2))
     half = int(np.ceil(_SURROUNDINGS_RADIUS * size))
-    grid = np.stack(np.meshgrid(np.arange(-half, half + 1.0), np.arange(-half, half + 1.0)), axis=-1)
+    line = np.linspace(-half, half, min(2 * half + 1, _MAX_SIDE))
+    grid = np.stack(np.meshgrid(line, line), axis=-1)
     from_moved_blob = np.hypot(*(grid - (second_px - static_px)).transpose(2, 0, 1))
     outside = (np.hypot(*grid.transpose(2, 0, 1)) > _BLOB_RADIUS * size) & (from_moved_blob > _BLOB_RADIUS * size)
     before = _sampled(first, first_px + grid)
     moving, static = _sampled(second, second_px + grid @ rotation(turn)), _sampled(second, static_px + grid)
     inside = outside & (before >= 0.0).all(axis=2) & (moving >= 0.0).all(axis=2) & (static >= 0.0).all(axis=2)
-    if inside.sum() < area_px2 / 4.0:
+    if inside.sum() * (line[1] - line[0]) ** 2 < area_px2 / 4.0:
         return 0.5
     if_moving, if_static = (float(np.abs(after[inside] - before[inside]).mean()) + _NOISE for after in (moving, static))
     return if_static / (if_static + if_moving)

@@ -41,8 +41,6 @@ class ColourModel:
     """Standard deviation of the fraction in the mark's surroundings."""
     mean_bgr: Floats
     """(3,) the mark's colour in this clip, grey levels."""
-    chroma: Floats
-    """(2,) the mark's a*, b*."""
 
     @property
     def mean_rgb(self) -> tuple[int, int, int]:
@@ -77,7 +75,7 @@ def hue_contrast(image: Image, rgb: tuple[int, int, int] | None) -> NDArray[Any]
     if rgb is None:
         row = np.array([[0.0, 1.0, -_SKIN_SLOPE, -128.0 * (1.0 - _SKIN_SLOPE)]])
         return cv2.transform(lab.astype(np.float32), row)
-    along = chroma_of(rgb)
+    along = lab_of(rgb)[1:]
     along = along / max(float(np.hypot(*along)), 1.0)
     across = np.array([-along[1], along[0]])
     rows = np.array([[0.0, *v, -128.0 * v.sum()] for v in (along, across)])
@@ -85,13 +83,14 @@ def hue_contrast(image: Image, rgb: tuple[int, int, int] | None) -> NDArray[Any]
     return parts[..., 0] - np.abs(parts[..., 1])
 
 
-def chroma_of(rgb: tuple[int, int, int]) -> Floats:
-    """Return (a*, b*) of a colour, (2,)."""
+def lab_of(rgb: tuple[int, int, int]) -> Floats:
+    """Return (L*, a*, b*) of a colour, (3,); L* from 0 to 100."""
     pixel = np.array([[rgb[::-1]]], np.uint8)
-    return cv2.cvtColor(pixel, cv2.COLOR_BGR2LAB)[0, 0, 1:].astype(float) - 128.0
+    stored = cv2.cvtColor(pixel, cv2.COLOR_BGR2LAB)[0, 0].astype(float)
+    return (stored - [0.0, 128.0, 128.0]) * [100.0 / 255.0, 1.0, 1.0]
 
 
-def learn_colour(inside: Floats, around: Floats, elsewhere: Floats) -> ColourModel:
+def fit_discriminant(inside: Floats, around: Floats, elsewhere: Floats) -> ColourModel:
     """Fit the linear discriminant between the mark and its surroundings: w ∝ Σ⁻¹ (μ_mark − μ_around) (Fisher 1936).
 
     Parameters
@@ -115,5 +114,4 @@ def learn_colour(inside: Floats, around: Floats, elsewhere: Floats) -> ColourMod
     offset = -float(w @ mean_around)
     value = around @ w + offset
     noise = 1.4826 * float(np.median(np.abs(value - np.median(value))))
-    chroma = chroma_of(tuple(round(v) for v in np.clip(mean_in[::-1], 0, 255)))
-    return ColourModel(w, offset, noise, mean_in, chroma)
+    return ColourModel(w, offset, noise, mean_in)

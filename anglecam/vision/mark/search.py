@@ -1,115 +1,188 @@
-"""Find the mark in a few frames of a clip: the blob of the right hue that travels on a circle.
+"""Find the mark in a few frames of a clip: the blob of one colour that travels on a circle.
 
-At first only a hue is known, so blobs are thresholded at several levels of it. Other objects share the hue: a mug on
-the table has it but does not move, a toy that swings past moves but keeps no constant distance from the pivot, and a
-face moves with the mark but is less red. The remaining blobs are ranked by how often they are seen, how constant their
-size is, and how strongly their hue stands out.
+At first only colours are known that the mark may have (`anglecam.vision.mark.cues`), so blobs are thresholded at
+several levels of closeness to each. Other objects share the colour: a mug on the table has it but does not move, a toy
+that swings past moves but keeps no constant distance from the pivot, and a face moves with the mark but is less red.
+The remaining blobs are ranked by how often they are seen, how constant their size is, and how strongly they stand out.
+Each cue's best is then found again by the colour learnt from it, as in the whole clip, and the marks compete.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.mark.blob_tracks import BlobTrack, moving_track, resting_track
-from anglecam.vision.mark.blobs import find_blobs
-from anglecam.vision.mark.colour import ColourModel, chroma_of, hue_contrast, learn_colour
+from anglecam.vision.mark.blobs import Blobs, blobs_of_regions, find_blobs
+from anglecam.vision.mark.cues import RED, Cue, declared_cue, moving_cues, pointed_cues
+from anglecam.vision.mark.found_mark import FoundMark, Samples
+from anglecam.vision.mark.learn_colour import MIN_CONTRAST, is_same_colour, learn_colour
+from anglecam.vision.mark.segment import SMALLEST_SHARE, disc, find_regions
+from anglecam.vision.mark.track import follow_mark
 
 _LEVEL_SHARES = (0.3, 0.4, 0.5, 0.6, 0.7)
-"""Thresholds for blobs, as shares of the way from the picture's usual hue contrast to its highest."""
-_MIN_CONTRAST = 8.0
-"""Units of a*, b* by which the mark's hue must stand out; JPEG's chroma errors reach 3 or 4."""
+"""Thresholds for blobs, as shares of the way from the picture's usual contrast to its highest."""
 _TOP_PX = 40
-"""The highest hue contrast is that of the 40th pixel, which excludes the codec's outliers."""
+"""The highest contrast is that of the 40th pixel, which excludes the codec's outliers."""
 _MAX_NOISE, _MAX_NOISE_DECLARED = 0.15, 0.4
 """Largest standard deviation of the surroundings' fraction of mark at which mark and surroundings are distinct. Where
 the colour is declared and the mark has it, the mark may stand out less, as brick-red lips on brown skin do."""
-_HUE_TOLERANCE = np.radians(25.0)
+_LEAST_SHARE = 0.3
+"""Share of the samples in which the mark must be found again, whole and on its circle."""
+_COMPACT_SHARE = 0.9
+"""Share of a blob into which the opening's disc fits; with less, a thread or a rod is attached to it. Of an ellipse
+three times as long as wide, as of lips, it is 0.98."""
+_RED_PRIOR = 10.0
+"""Factor of the red cue's score. The mark is usually a mouth; hair and a shirt move with it, are larger and stand out
+more from the wall."""
 
 
-@dataclass(frozen=True)
-class FoundMark:
-    """The mark as the search found it."""
-
-    model: ColourModel
-    """Its colour, learnt from the clip."""
-    area_px2: float
-    """Its typical area, coarse, px²."""
-    place_px: Floats
-    """(2,) its median place in the plane of motion, px."""
-    circle: tuple[Floats, float] | None
-    """Coarse centre and radius of its path, px; ``None`` where it does not move."""
-
-
-def find_mark(
-    images: Sequence[Image],
-    rgb: tuple[int, int, int] | None,
-    near_px: Floats | None,
-    to_plane: Callable[[int, Floats], Floats],
-) -> FoundMark | None:
+def find_mark(samples: Samples, rgb: tuple[int, int, int] | None, near_px: Floats | None) -> FoundMark | None:
     """Find the mark and learn its colour from frames spread over a clip.
 
     Parameters
     ----------
-    images : sequence of ndarray
-        (h, w, 3) frames, blue, green, red.
+    samples : Samples
+        Frames spread over the clip.
     rgb : tuple of int, optional
         The declared colour, accurate to some tens of grey levels. Without it the mark is the reddest thing, as opposed
-        to skin, that moves.
+        to skin, that moves, or a thing of any other colour that moves.
     near_px : ndarray, optional
         (2,) hint at the pivot in the plane of motion, px. Where nothing rotates around it, other centres are tried.
-    to_plane : callable
-        Maps (i, point), a point (2,) of the i-th picture, to the plane of motion, in which paths are circles, px.
 
     Returns
     -------
     FoundMark or None
-        ``None`` where no hue stands out, or where the only thing that stands out is at rest while other things move.
+        ``None`` where no colour stands out, or where the only thing that stands out is at rest while other things move.
     """
-    maps = [cv2.GaussianBlur(hue_contrast(image, rgb), (0, 0), 1.0) for image in images]
-    at_rest = not _something_moves(images)
-    usual, top = _hue_range(maps, at_rest)
-    if top - usual < _MIN_CONTRAST:
+    at_rest = not something_moves(samples.stabilised)
+    if rgb is not None:
+        cues = [declared_cue(rgb)]
+    elif samples.pointed_px is not None:
+        cues = pointed_cues(samples.images[0], samples.pointed_px)
+    else:
+        cues = [RED, *([] if at_rest else moving_cues(samples.stabilised))]
+    found = [mark for cue in cues if (mark := _mark_of_cue(cue, samples, near_px, at_rest)) is not None]
+    ranked = sorted(found, key=lambda mark: -mark.score)
+    if not ranked:
+        return None
+    best = ranked[0]
+    rivals = [mark.score for mark in ranked if np.hypot(*(mark.place_px - best.place_px)) > np.sqrt(best.area_px2)]
+    return replace(best, margin=best.score / rivals[0]) if rivals else best
+
+
+def _mark_of_cue(cue: Cue, samples: Samples, near_px: Floats | None, at_rest: bool) -> FoundMark | None:
+    """Return the thing of one colour that is most like a mark; ``None`` where there is none."""
+    images = samples.images
+    maps = [cv2.GaussianBlur(cue.contrast(image), (0, 0), 1.0) for image in images]
+    usual, top = _contrast_range(maps, at_rest)
+    if top - usual < MIN_CONTRAST:
         return None
     thresholded = []
     for share in _LEVEL_SHARES:
         level = usual + share * (top - usual)
-        if level - usual >= _MIN_CONTRAST / 2.0:
-            thresholded.append((level, find_blobs(maps, level, usual, to_plane)))
+        if level - usual >= MIN_CONTRAST / 2.0:
+            thresholded.append((level, find_blobs(maps, level, usual, samples.to_plane)))
     # The hint misleads where a slanted view shows the marker on the shaft far from the centre of rotation.
     for hint in (near_px,) if near_px is None else (near_px, None):
         tracks: list[BlobTrack | None] = []
         for level, blobs in thresholded:
-            tracks.append(moving_track(blobs, images, level, hint))
+            through = None if samples.pointed_px is None else _pointed_blobs(blobs, maps[0], level, samples.pointed_px)
+            tracks.append(moving_track(blobs, images, level, hint, on_body=cue.on_body, through=through))
             if at_rest:
-                tracks.append(resting_track(blobs, images, level))
+                tracks.append(resting_track(blobs, images, level, through))
         for track in sorted((t for t in tracks if t is not None), key=lambda t: -t.score):
-            model = _learn(images, maps, track, _MAX_NOISE if rgb is None else _MAX_NOISE_DECLARED)
-            if model is None or (rgb is not None and not _same_hue(model.chroma, chroma_of(rgb))):
+            model = learn_colour(images, maps, track, _MAX_NOISE_DECLARED if cue.name == "declared" else _MAX_NOISE)
+            if model is None or (cue.name == "declared" and not is_same_colour(model, cue.rgb)):
                 continue
-            area, place = track.blobs.area[track.members], track.blobs.plane_px[track.members]
-            return FoundMark(model, float(np.median(area)), np.median(place, axis=0), track.circle)
+            mark = FoundMark(model, *_typical(track), track.circle, cue.name, _opening(track, maps), track.score)
+            if track.circle is None:
+                return mark
+            seen = _seen_again(mark, samples, hint)
+            if seen is not None:
+                return replace(seen, score=seen.score * _RED_PRIOR) if cue is RED else seen
     return None
 
 
-def _hue_range(maps: Sequence[NDArray[Any]], at_rest: bool) -> tuple[float, float]:
-    """Return the usual hue contrast of the picture and the highest one, of moving pixels where there are enough."""
+def _typical(track: BlobTrack) -> tuple[float, Floats]:
+    """Return the median area, px², and the median place, px, of a track's blobs."""
+    members = track.members
+    return float(np.median(track.blobs.area[members])), np.median(track.blobs.plane_px[members], axis=0)
+
+
+def _pointed_blobs(blobs: Blobs, contrast: NDArray[Any], level: float, box_px: Floats) -> NDArray[np.intp]:
+    """Return the indices of the first picture's blobs that lie in a box, at least in part."""
+    _, labels = cv2.connectedComponents((contrast > level).astype(np.uint8), connectivity=8)
+    left, top, right, bottom = np.round(box_px).astype(int)
+    inside = np.unique(labels[max(top, 0) : bottom + 1, max(left, 0) : right + 1])
+    return np.flatnonzero((blobs.frame == 0) & np.isin(blobs.label, inside))
+
+
+def _in_box(places: Floats, box_px: Floats, margin: float) -> NDArray[np.bool_]:
+    return np.asarray(((places > box_px[:2] - margin) & (places < box_px[2:] + margin)).all(axis=1))
+
+
+def _opening(track: BlobTrack, maps: Sequence[NDArray[Any]]) -> int:
+    """Return half the radius of the largest disc in a track's blobs, px, if thinner parts are attached, else 0."""
+    radii, shares = [], []
+    for m in track.members:
+        coloured = (maps[int(track.blobs.frame[m])] > track.level).astype(np.uint8)
+        _, labels = cv2.connectedComponents(coloured, connectivity=8)
+        blob = (labels == track.blobs.label[m]).astype(np.uint8)
+        radius = int(cv2.distanceTransform(np.pad(blob, 1), cv2.DIST_L2, 5).max() / 2.0)
+        opened = cv2.morphologyEx(blob, cv2.MORPH_OPEN, disc(radius))
+        radii.append(radius)
+        shares.append(float(opened.sum() / blob.sum()))
+    return int(np.median(radii)) if np.median(shares) < _COMPACT_SHARE else 0
+
+
+def _seen_again(mark: FoundMark, samples: Samples, hint: Floats | None) -> FoundMark | None:
+    """Find the mark again by the colour that was learnt, as in the whole clip; ``None`` where it does not stay itself.
+
+    The threshold that found the blobs may have cut off a part of the mark, or joined it to something. A disc that
+    another thing passes in front of seems to move, but its area changes.
+    """
+    regions = [
+        [
+            samples.in_plane(i, region)
+            for region in find_regions(image, mark.model, SMALLEST_SHARE * mark.area_px2, mark.opening_px)
+        ]
+        for i, image in enumerate(samples.images)
+    ]
+    blobs = blobs_of_regions(regions)
+    through = None
+    if samples.pointed_px is not None:
+        first = np.flatnonzero(blobs.frame == 0)
+        through = first[_in_box(blobs.picture_px[first], samples.pointed_px, np.sqrt(mark.area_px2))]
+    track = moving_track(blobs, samples.images, 0.0, hint, on_body=False, through=through)
+    if track is None or track.circle is None:
+        return None
+    area, place = _typical(track)
+    mark = replace(mark, area_px2=area, place_px=place, circle=track.circle)
+    status = follow_mark(regions, samples.time, mark).status
+    share = status.count(OK) / len(status)
+    return replace(mark, score=mark.score * share**2) if share >= _LEAST_SHARE else None
+
+
+def _contrast_range(maps: Sequence[NDArray[Any]], at_rest: bool) -> tuple[float, float]:
+    """Return the usual contrast of the picture and the highest one, of moving pixels where there are enough."""
     stack_max = np.maximum.reduce(list(maps))
     change = stack_max - np.minimum.reduce(list(maps))
     usual = float(np.median(maps[0]))
-    # Moving pixels set the scale, because a static thing may be far redder than the mark.
-    moving = stack_max[change > _MIN_CONTRAST]
+    # Moving pixels set the scale, because a static thing may have far more of the colour than the mark.
+    moving = stack_max[change > MIN_CONTRAST]
     top = moving if moving.size >= _TOP_PX and not at_rest else stack_max.ravel()
     return usual, float(np.partition(top, -_TOP_PX)[-_TOP_PX])
 
 
-def _something_moves(images: Sequence[Image]) -> bool:
+def something_moves(images: Sequence[Image]) -> bool:
     """Return whether more pixels change than a mark covers, apart from flicker of the light."""
     small = [cv2.GaussianBlur(cv2.cvtColor(i, cv2.COLOR_BGR2GRAY), (0, 0), 2.0)[::2, ::2].astype(float) for i in images]
     median = np.median(small, axis=0)
@@ -118,42 +191,3 @@ def _something_moves(images: Sequence[Image]) -> bool:
         if (np.abs(picture - gain * median) > 12.0).mean() > 1e-3:
             return True
     return False
-
-
-def _learn(
-    images: Sequence[Image], maps: Sequence[NDArray[Any]], track: BlobTrack, max_noise: float
-) -> ColourModel | None:
-    """Learn the colour from a track's blobs; ``None`` where they do not stand out from their neighbourhood."""
-    inside, around, elsewhere, contrast = [], [], [], []
-    for m in track.members:
-        t = int(track.blobs.frame[m])
-        coloured = (maps[t] > track.level).astype(np.uint8)
-        _, labels = cv2.connectedComponents(coloured, connectivity=8)
-        blob = (labels == track.blobs.label[m]).astype(np.uint8)
-        core = cv2.erode(blob, np.ones((3, 3), np.uint8))
-        core = core if core.sum() >= 6 else blob
-        # Edge pixels belong to neither. Beyond them lies a collar as wide as the mark, without other blobs.
-        grown = cv2.dilate(blob, np.ones((9, 9), np.uint8))
-        wide = 2 * max(8, round(float(np.sqrt(blob.sum())) / 2.0)) + 1
-        collar: Image = cv2.dilate(grown, np.ones((wide, wide), np.uint8)) - grown
-        near_coloured: Image = cv2.dilate(coloured, np.ones((9, 9), np.uint8))
-        collar = collar & (1 - near_coloured)
-        inside.append(images[t][core > 0])
-        around.append(images[t][collar > 0])
-        if collar.any():
-            contrast.append(float(np.median(maps[t][core > 0]) - np.median(maps[t][collar > 0])))
-        rest = np.s_[::8, ::8]
-        elsewhere.append(images[t][rest][near_coloured[rest] == 0])
-    parts = [np.concatenate(p).astype(float) for p in (inside, around, elsewhere)]
-    # The contrast to the collar excludes a blush: it stands out from the wall, but not from the face.
-    if min(map(len, parts)) < 20 or np.median(contrast) < _MIN_CONTRAST:
-        return None
-    model = learn_colour(*parts)
-    return model if model.noise < max_noise else None
-
-
-def _same_hue(chroma: Floats, declared: Floats) -> bool:
-    """Return whether a colour is the declared one up to shading, which scales (a*, b*) along the hue."""
-    here, there = np.hypot(*chroma), np.hypot(*declared)
-    angle = np.arctan2(chroma[1], chroma[0]) - np.arctan2(declared[1], declared[0])
-    return bool(abs((angle + np.pi) % (2.0 * np.pi) - np.pi) < _HUE_TOLERANCE and 0.4 * there < here < 1.8 * there)

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.mark.colour import EMPTY_LEVEL, FULL_LEVEL, ColourModel
 
+SMALLEST_SHARE = 0.25
+"""Of the mark's area; a smaller region is not the mark, even if partly hidden."""
 _MARGIN_PX = 12
 """Margin around a region, px, that contains the foot of its edges."""
 _FOOT_PX = 3
@@ -51,7 +53,7 @@ class Region:
     """False where the region touches the picture's edge or another region."""
 
 
-def find_regions(image: Image, model: ColourModel, smallest_px2: float) -> list[Region]:
+def find_regions(image: Image, model: ColourModel, smallest_px2: float, opening_px: int = 0) -> list[Region]:
     """Find the regions of the mark's colour in an image.
 
     Parameters
@@ -62,6 +64,9 @@ def find_regions(image: Image, model: ColourModel, smallest_px2: float) -> list[
         The mark's colour.
     smallest_px2 : float
         Regions with a smaller area within the contour of the half level are left out.
+    opening_px : int
+        Radius of a disc that must fit into a region everywhere; thinner parts, such as the thread of a ball, are cut
+        off.
 
     Returns
     -------
@@ -72,10 +77,11 @@ def find_regions(image: Image, model: ColourModel, smallest_px2: float) -> list[
     smooth = cv2.GaussianBlur(fraction, (3, 3), 0)
     half = (EMPTY_LEVEL + FULL_LEVEL) / 2.0
     core = (smooth >= half).astype(np.uint8)
-    patches, _ = cv2.findContours(core, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    compact = cv2.morphologyEx(core, cv2.MORPH_OPEN, disc(opening_px)) if opening_px else core
+    patches, _ = cv2.findContours(compact, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     sized = sorted(((cv2.contourArea(p), k) for k, p in enumerate(patches) if len(p) >= _MIN_OUTLINE_PX), reverse=True)
     large = [patches[k] for area, k in sized[:_MAX_REGIONS] if area >= smallest_px2]
-    measured = (_measure(fraction, smooth, core, patch, model) for patch in large)
+    measured = (_measure(fraction, smooth, compact, patch, model) for patch in large)
     return [region for region in measured if region is not None]
 
 
@@ -93,15 +99,15 @@ def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], m
     outline = _outline(smooth[box], inner)
     filled = cv2.drawContours(np.zeros_like(inner), [outline], -1, 1, cv2.FILLED)
     reach = _reach(smooth[box], filled, model)
-    near_others = cv2.dilate(others, _disc(_FOOT_PX))
+    near_others = cv2.dilate(others, disc(_FOOT_PX))
     # Specks of the colour are ignored: they come and go with the noise.
-    touched = bool((others & cv2.dilate(reach, _disc(_FOOT_PX))).sum() > _SPECK_SHARE * inner.sum())
+    touched = bool((others & cv2.dilate(reach, disc(_FOOT_PX))).sum() > _SPECK_SHARE * inner.sum())
     reach &= 1 - near_others
     low = min(0.4, max(0.1, 3.0 * model.noise))
     cover = _cover(fraction[box], filled, reach | near_others)
     weight = np.clip((cover - low) / (1.0 - 2.0 * low), 0.0, 1.0) * reach
     # A highlight or the teeth inside the outline belong to the mark: away from the edge the outline is filled.
-    weight[cv2.erode(filled, _disc(_FOOT_PX)) > 0] = 1.0
+    weight[cv2.erode(filled, disc(_FOOT_PX)) > 0] = 1.0
 
     y, x = np.mgrid[0 : inner.shape[0], 0 : inner.shape[1]].astype(np.float64)
     area = float(weight.sum())
@@ -127,7 +133,7 @@ def _outline(smooth: Image, inner: Image) -> NDArray[Any]:
     """Join the thresholded patch with the Canny edges along it, and return the outer contour."""
     step = (FULL_LEVEL - EMPTY_LEVEL) / 2.0
     edges = cv2.Canny(smooth, step, 2.0 * step) // 255
-    along: Image = cv2.dilate(inner, _disc(1))
+    along: Image = cv2.dilate(inner, disc(1))
     contours, _ = cv2.findContours(inner | (edges & along), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     return max(contours, key=len)
 
@@ -141,7 +147,7 @@ def _reach(smooth: Image, filled: Image, model: ColourModel) -> Image:
     belongs[labels[filled > 0]] = 1
     belongs[0] = 0
     connected = belongs[labels]
-    return cv2.dilate(connected, _disc(_FOOT_PX))
+    return cv2.dilate(connected, disc(_FOOT_PX))
 
 
 def _cover(fraction: Image, filled: Image, reach: Image) -> NDArray[Any]:
@@ -150,7 +156,7 @@ def _cover(fraction: Image, filled: Image, reach: Image) -> NDArray[Any]:
     A single scale for the whole picture would shift the edge as bright and dark wallpaper pass behind it.
     """
     value = (fraction.astype(np.float32) - EMPTY_LEVEL) / (FULL_LEVEL - EMPTY_LEVEL)
-    inside = cv2.erode(filled, _disc(2)).astype(np.float32)
+    inside = cv2.erode(filled, disc(2)).astype(np.float32)
     outside = (1 - reach).astype(np.float32)
     within = _spread(value * inside + _PRIOR, _PRIOR + inside)
     without = _spread(value * outside, _PRIOR + outside)
@@ -162,6 +168,7 @@ def _spread(value: NDArray[Any], weight: NDArray[Any]) -> NDArray[Any]:
     return cv2.GaussianBlur(value, (0, 0), _LOCAL_PX) / cv2.GaussianBlur(weight, (0, 0), _LOCAL_PX)
 
 
-def _disc(radius_px: int) -> Image:
+def disc(radius_px: int) -> Image:
+    """Return a filled disc as a structuring element, (2r + 1, 2r + 1)."""
     size = 2 * radius_px + 1
     return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))

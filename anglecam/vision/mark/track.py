@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats
-from anglecam.vision.mark.search import FoundMark
+from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle, fit_circle
 from anglecam.vision.status import AMBIGUOUS, NO_MARK, OCCLUDED

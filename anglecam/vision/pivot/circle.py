@@ -49,7 +49,7 @@ class Circle:
 
 
 def circle_through(points_px: Floats) -> tuple[Floats, float]:
-    """Fit a circle algebraically with scikit-image's `CircleModel`.
+    """Fit a circle algebraically: in closed form through three points, else with scikit-image's `CircleModel`.
 
     Parameters
     ----------
@@ -63,10 +63,24 @@ def circle_through(points_px: Floats) -> tuple[Floats, float]:
     radius_px : float
         Infinite where the centre is NaN.
     """
+    if len(points_px) == 3:  # hundreds of times for each clip, and a hundred times as fast
+        return _circumcircle(*points_px.tolist())
     model = CircleModel.from_estimate(points_px)
     if not model:
         return np.full(2, np.nan), np.inf
     return np.asarray(model.center, dtype=float), float(model.radius)
+
+
+def _circumcircle(first: list[float], second: list[float], third: list[float]) -> tuple[Floats, float]:
+    """Return the circle through three points: |p − o|² is the same for all, which is linear in the centre o."""
+    (x1, y1), (x2, y2) = ((x - first[0], y - first[1]) for x, y in (second, third))
+    twice_area = x1 * y2 - x2 * y1
+    if twice_area == 0.0:
+        return np.full(2, np.nan), np.inf
+    square1, square2 = x1 * x1 + y1 * y1, x2 * x2 + y2 * y2
+    x = (y2 * square1 - y1 * square2) / (2.0 * twice_area)
+    y = (x1 * square2 - x2 * square1) / (2.0 * twice_area)
+    return np.array([first[0] + x, first[1] + y]), float(np.hypot(x, y))
 
 
 def fit_circle(points_px: Floats, *, start: tuple[Floats, float] | None = None) -> Circle | None:

@@ -1,4 +1,4 @@
-"""The pivot: a round marker, the centre of rotation of the mark's path, or the combination of both."""
+"""The pivot: declared, or estimated from a round marker, the centre of rotation of the mark's path and a hint."""
 
 from __future__ import annotations
 
@@ -11,9 +11,13 @@ from anglecam.vision.pivot.circle import Circle
 from anglecam.vision.pivot.marker import RoundMarker
 
 _MAX_RADIUS_SIGMA = 0.2
-"""Relative uncertainty of the path's radius above which its centre is ignored."""
+"""Relative uncertainty of the path's radius above which its centre alone is no pivot."""
 _DISAGREE = 9.21
 """99 % point of χ² with two degrees of freedom."""
+_MARKED = 0.5
+"""Probability, before looking, that a rig has a round marker on its pivot."""
+_CERTAIN = 0.99
+"""Probability from which on a round thing counts as the pivot's marker."""
 
 
 @dataclass(frozen=True)
@@ -25,43 +29,133 @@ class PivotEstimate:
     covariance_px2: Floats
     """(2, 2) px²."""
     source: str
-    """``marker``, ``centre of rotation`` or ``marker and centre of rotation``."""
+    """``declared``, or one or more of ``marker``, ``centre of rotation`` and ``hint``."""
 
 
-def combine_pivot(marker: RoundMarker | None, circle: Circle | None) -> tuple[PivotEstimate | None, str | None]:
-    """Combine marker and centre of rotation by inverse covariance; where they disagree, take the centre of rotation.
+def combine_pivot(
+    marker: RoundMarker | None,
+    circle: Circle | None,
+    hint: PivotEstimate | None = None,
+    round_things_per_px2: float = 0.0,
+    displacement_px2: Floats | None = None,
+) -> tuple[PivotEstimate | None, str | None]:
+    """Combine what is known about the pivot, each by its inverse covariance.
+
+    A round thing is the pivot's marker only if the motion, or the hint, says so. Three cases compete: it marks the
+    pivot, or it is on the shaft but nearer to the camera than the mark, which displaces it in the picture, or it is
+    another round thing, such as a screw. With the density q of round things and N(S) the density of its distance from
+    the pivot that motion or hint predict, for the covariance S of either case, the weights are::
+
+        ¼·N(C + C_marker),    ¼·N(C + C_marker + D),    q
+
+    with the covariance D of the displacement. Mean and covariance are those of the mixture. A screw near the
+    ill-determined centre of a short arc is thus an uncertain pivot, and a marker at the centre of a long arc a certain
+    one.
 
     Parameters
     ----------
     marker : RoundMarker, optional
-        The round marker, if one was found.
+        The round thing, if one was found.
     circle : Circle, optional
         The mark's path, if the mark moved.
+    hint : PivotEstimate, optional
+        What is declared about the pivot's place; used where the path does not determine it.
+    round_things_per_px2 : float
+        Density of other round things in the picture, 1/px²; zero where the marker is declared.
+    displacement_px2 : ndarray, optional
+        (2, 2) covariance of the marker's displacement if it is at another depth than the mark, px².
 
     Returns
     -------
     pivot : PivotEstimate or None
-        ``None`` where there is neither.
+        ``None`` where nothing determines it.
     note : str or None
-        Message for the user where the two disagree by more than their uncertainties. The centre of rotation is then
-        used, because the mark keeps a constant distance from it.
+        Message for the user where the round thing is not the pivot, or may not be.
     """
-    if circle is not None and not circle.covariance_px2[2, 2] < (_MAX_RADIUS_SIGMA * circle.radius_px) ** 2:
-        circle = None
-    if circle is None:
-        return (None if marker is None else PivotEstimate(marker.centre_px, marker.covariance_px2, "marker")), None
-    from_path = PivotEstimate(circle.centre_px, circle.centre_covariance_px2, "centre of rotation")
-    if marker is None:
-        return from_path, None
-    difference = marker.centre_px - circle.centre_px
-    spread = marker.covariance_px2 + circle.centre_covariance_px2
-    if difference @ np.linalg.solve(spread, difference) > _DISAGREE:
-        distance, sigma = float(np.hypot(*difference)), float(np.sqrt(np.trace(spread) / 2.0))
-        return from_path, (
-            f"marker and centre of rotation are {distance:.2f} px apart (uncertainty {sigma:.2f} px);"
-            " the centre of rotation is used"
+    expected = _expected(circle, hint)
+    if marker is None or expected is None:
+        found = None if marker is None else PivotEstimate(marker.centre_px, marker.covariance_px2, "marker")
+        return found or expected, None
+    D = np.zeros((2, 2)) if displacement_px2 is None else displacement_px2
+    cases = [
+        _case(expected, marker.centre_px, marker.covariance_px2),
+        _case(expected, marker.centre_px, marker.covariance_px2 + D),
+    ]
+    weight = np.array([_MARKED / 2.0 * case.density for case in cases] + [round_things_per_px2])
+    distance = float(np.hypot(*(marker.centre_px - expected.centre_px)))
+    if min(case.away for case in cases) > _DISAGREE or weight.sum() == 0.0:
+        return expected, _disagreement(expected, marker, distance)
+    weight /= weight.sum()
+    means = np.array([*(case.centre_px for case in cases), expected.centre_px])
+    covariances = np.array([*(case.covariance_px2 for case in cases), expected.covariance_px2])
+    centre = weight @ means
+    off = means - centre
+    covariance = np.einsum("k,kij->ij", weight, covariances) + np.einsum("k,ki,kj->ij", weight, off, off)
+    note = None
+    if cases[0].away > _DISAGREE:
+        note = _disagreement(expected, marker, distance)
+    elif weight[2] > 1.0 - _CERTAIN:
+        note = (
+            f"the round thing {distance:.0f} px from the expected pivot may be something else (probability"
+            f" {weight[2]:.0%}); the pivot is known to {np.sqrt(np.trace(covariance) / 2.0):.1f} px"
         )
-    information = np.linalg.inv(marker.covariance_px2) + np.linalg.inv(circle.centre_covariance_px2)
-    covariance = np.linalg.inv(information)
-    centre = marker.centre_px - marker.covariance_px2 @ np.linalg.solve(spread, difference)
-    return PivotEstimate(centre, covariance, "marker and centre of rotation"), None
+    return PivotEstimate(centre, covariance, f"marker and {expected.source}"), note
+
+
+def disagreement_with_path(declared: PivotEstimate, circle: Circle) -> str | None:
+    """Return a message where the centre of the mark's path is not the declared pivot, ``None`` where it may be."""
+    difference, spread = declared.centre_px - circle.centre_px, declared.covariance_px2 + circle.centre_covariance_px2
+    if not np.isfinite(spread).all() or difference @ np.linalg.solve(spread, difference) <= _DISAGREE:
+        return None
+    return (
+        f"the declared pivot and the centre of rotation are {np.hypot(*difference):.1f} px apart (uncertainty"
+        f" {np.sqrt(np.trace(spread) / 2.0):.1f} px); the declared pivot is used"
+    )
+
+
+@dataclass(frozen=True)
+class _Case:
+    """The pivot if the marker shows it with a given covariance."""
+
+    density: float
+    """Of the marker's place, 1/px²."""
+    away: float
+    """Squared distance of marker and expected pivot, in units of its variance."""
+    centre_px: Floats
+    covariance_px2: Floats
+
+
+def _case(expected: PivotEstimate, marker_px: Floats, covariance: Floats) -> _Case:
+    difference, spread = marker_px - expected.centre_px, covariance + expected.covariance_px2
+    away = float(difference @ np.linalg.solve(spread, difference))
+    gain = expected.covariance_px2 @ np.linalg.inv(spread)
+    return _Case(
+        density=float(np.exp(-away / 2.0) / (2.0 * np.pi * np.sqrt(np.linalg.det(spread)))),
+        away=away,
+        centre_px=expected.centre_px + gain @ difference,
+        covariance_px2=np.asarray(gain @ covariance, dtype=float),
+    )
+
+
+def _disagreement(expected: PivotEstimate, marker: RoundMarker, distance: float) -> str:
+    sigma = float(np.sqrt(np.trace(marker.covariance_px2 + expected.covariance_px2) / 2.0))
+    return (
+        f"marker and {expected.source} are {distance:.2f} px apart (uncertainty {sigma:.2f} px);"
+        f" the {expected.source} is used"
+    )
+
+
+def _expected(circle: Circle | None, hint: PivotEstimate | None) -> PivotEstimate | None:
+    """Return the pivot by the mark's motion, and by the hint where the motion does not determine it."""
+    if circle is not None and circle.covariance_px2[2, 2] < (_MAX_RADIUS_SIGMA * circle.radius_px) ** 2:
+        return PivotEstimate(circle.centre_px, circle.centre_covariance_px2, "centre of rotation")
+    if hint is None or circle is None or not np.isfinite(circle.covariance_px2).all():
+        return hint
+    # A short arc determines the direction to its centre well, and the distance badly.
+    difference = circle.centre_px - hint.centre_px
+    spread = hint.covariance_px2 + circle.centre_covariance_px2
+    gain = hint.covariance_px2 @ np.linalg.inv(spread)
+    if difference @ np.linalg.solve(spread, difference) > _DISAGREE:
+        return hint
+    covariance = np.asarray(hint.covariance_px2 - gain @ hint.covariance_px2, dtype=float)
+    return PivotEstimate(hint.centre_px + gain @ difference, covariance, "hint and centre of rotation")

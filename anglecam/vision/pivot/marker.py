@@ -91,6 +91,15 @@ def find_marker(image: Image, expected_px: Floats | None, covariance_px2: Floats
     return RoundMarker(centre + [x0, y0], covariance, radius)
 
 
+def count_round_things(image: Image) -> int:
+    """Count the round things in a picture (h, w, 3), among which a marker is one."""
+    gx, gy = _gradients(image)
+    found = np.zeros(gx.shape, np.uint8)
+    for _, coverage in _coverages(image, gx, gy):
+        found |= (coverage >= _MIN_COVERAGE).astype(np.uint8)
+    return int(cv2.connectedComponents(cv2.dilate(found, np.ones((7, 7), np.uint8)))[0] - 1)
+
+
 def _gradients(image: Image) -> tuple[Floats, Floats]:
     """Return the gradient of the colour plane with the steepest one at each pixel, grey levels per px."""
     smooth = cv2.GaussianBlur(image, (0, 0), 1.0).astype(np.float64)

@@ -32,11 +32,15 @@ from anglecam.vision.status import NO_MARK, OCCLUDED, UNDECODABLE
 
 _MAX_SAMPLES = 16
 """Samples from which the body is learnt, at most: they are compared in pairs."""
+_NEAR_POINT = 0.05
+"""Of the picture's width: features as near as this to a point that is declared belong to the body."""
 _MIN_SEEN_SHARE = 0.3
 """Share of a keyframe's points that must move as one body for a frame to be measured."""
 
 
-def follow_rigid_body(frames: Iterator[Frame], samples: Sequence[Image], noise: float) -> RigidMotion | str:
+def follow_rigid_body(
+    frames: Iterator[Frame], samples: Sequence[Image], noise: float, pointed_px: Floats | None = None
+) -> RigidMotion | str:
     """Measure the body's rotation in every frame; nothing is assumed but that the body is rigid and rotates.
 
     Parameters
@@ -47,13 +51,16 @@ def follow_rigid_body(frames: Iterator[Frame], samples: Sequence[Image], noise: 
         Some of its frames, spread over the clip, (height, width, 3).
     noise : float
         Standard deviation of the pixels, grey levels.
+    pointed_px : ndarray, optional
+        (4,) box in the first sample in which the body is: left, top, right, bottom, px; a point is a box without
+        extent.
 
     Returns
     -------
     RigidMotion or str
         The cause in a few words where nothing in the clip rotates.
     """
-    learnt = _learn([cv2.cvtColor(s, cv2.COLOR_BGR2GRAY) for s in samples], noise)
+    learnt = _learn([cv2.cvtColor(s, cv2.COLOR_BGR2GRAY) for s in samples], noise, pointed_px)
     if isinstance(learnt, str):
         return learnt
     body, keyframes, spread = learnt
@@ -96,16 +103,43 @@ def _guesses(recent: list[tuple[float, Floats]], time: float, body: Features, gr
         yield found
 
 
-def _learn(samples: Sequence[Image], noise: float) -> tuple[Features, list[Keyframe], float] | str:
+def _learn(
+    samples: Sequence[Image], noise: float, pointed_px: Floats | None
+) -> tuple[Features, list[Keyframe], float] | str:
     """Find the features of the body that rotates, and keyframes; or return the cause where there are none."""
     images = _unlike(samples, noise)
     images = [images[i] for i in np.unique(np.linspace(0, len(images) - 1, _MAX_SAMPLES).round().astype(int))]
     if len(images) < 2:
         return "nothing moves"
     features = [find_features(image) for image in images]
+    body = _most_turning(features) if pointed_px is None else _in_box(features[0], pointed_px, images[0].shape[1])
+    if len(body.points) < MIN_POINTS:
+        return (
+            "nothing rigid rotates" if pointed_px is None else "too little can be recognised where the mark is declared"
+        )
+    poses: dict[int, Floats] = {}
+    for i, picture in enumerate(features):
+        pose = find_body_pose(body, picture)
+        if pose is not None:
+            poses[i] = pose
+    if not poses or np.ptp([turn_of(pose) for pose in poses.values()]) < MIN_TURN:
+        return "nothing rigid rotates"
+    keyframes, spread = choose_keyframes(images, poses, body.points)
+    return (body, keyframes, spread) if keyframes else "too little of the rotating body can be tracked"
+
+
+def _in_box(features: Features, box_px: Floats, width: int) -> Features:
+    """Return the features inside a box, or near it where it is small."""
+    room = max(0.0, _NEAR_POINT * width - float(np.hypot(*(box_px[2:] - box_px[:2]))))
+    inside = ((features.points >= box_px[:2] - room) & (features.points <= box_px[2:] + room)).all(axis=1)
+    return Features(features.points[inside], features.descriptors[inside])
+
+
+def _most_turning(features: Sequence[Features]) -> Features:
+    """Return the features of the body that rotates, in the picture that shows most of them."""
     turning = [np.zeros(len(f.points)) for f in features]
     matched = [np.zeros(len(f.points)) for f in features]
-    for i, j in combinations(range(len(images)), 2):
+    for i, j in combinations(range(len(features)), 2):
         found = find_turning_body(features[i], features[j])
         if found is not None:
             pairs, inlier = found
@@ -115,18 +149,7 @@ def _learn(samples: Sequence[Image], noise: float) -> tuple[Features, list[Keyfr
             turning[j][pairs[inlier, 1]] += 1
     reference = int(np.argmax([t.sum() for t in turning]))
     of_body = turning[reference] > 0.5 * matched[reference]
-    if of_body.sum() < MIN_POINTS:
-        return "nothing rigid rotates"
-    body = Features(features[reference].points[of_body], features[reference].descriptors[of_body])
-    poses: dict[int, Floats] = {}
-    for i, picture in enumerate(features):
-        pose = find_body_pose(body, picture)
-        if pose is not None:
-            poses[i] = pose
-    if np.ptp([turn_of(pose) for pose in poses.values()]) < MIN_TURN:
-        return "nothing rigid rotates"
-    keyframes, spread = choose_keyframes(images, poses, body.points)
-    return (body, keyframes, spread) if keyframes else "too little of the rotating body can be tracked"
+    return Features(features[reference].points[of_body], features[reference].descriptors[of_body])
 
 
 def _unlike(samples: Sequence[Image], noise: float) -> list[Image]:

@@ -8,7 +8,7 @@ import pytest
 from anglecam.vision.mark.colour import ColourModel
 from anglecam.vision.mark.segment import find_regions
 
-RED = ColourModel(np.array([0.0, 0.0, 1 / 255]), 0.0, 0.01, np.array([0.0, 0.0, 255.0]), np.zeros(2))
+RED = ColourModel(np.array([0.0, 0.0, 1 / 255]), 0.0, 0.01, np.array([0.0, 0.0, 255.0]))
 """The fraction of mark is the red channel."""
 
 

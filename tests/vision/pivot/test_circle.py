@@ -16,8 +16,16 @@ def test_three_points_determine_a_circle():
     np.testing.assert_allclose([*centre, radius], [7, 7, 50], atol=1e-9)
 
 
-def test_points_on_a_line_have_no_circle():
-    points = np.column_stack([np.arange(9.0), 2.0 * np.arange(9.0)])
+def test_the_closed_form_of_three_points_agrees_with_the_fit_of_the_same_points_twice():
+    for points in np.random.default_rng(0).uniform(0.0, 640.0, (50, 3, 2)):
+        centre, radius = circle_through(points)
+        fitted, fitted_radius = circle_through(np.vstack([points, points]))
+        np.testing.assert_allclose([*centre, radius], [*fitted, fitted_radius], rtol=1e-6)
+
+
+@pytest.mark.parametrize("count", [3, 9])
+def test_points_on_a_line_have_no_circle(count):
+    points = np.column_stack([np.arange(count), 2.0 * np.arange(count)])
     assert not np.isfinite(circle_through(points)[1]) or circle_through(points)[1] > 1e6
 
 

@@ -1,0 +1,66 @@
+"""Learn the mark's colour from the blobs of one track, and compare it with a declared colour."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.data.typing import Image
+from anglecam.vision.mark.blob_tracks import BlobTrack
+from anglecam.vision.mark.colour import ColourModel, fit_discriminant, lab_of
+
+MIN_CONTRAST = 8.0
+"""Lab units by which the mark's colour must stand out; JPEG's chroma errors reach 3 or 4."""
+_HUE_TOLERANCE = np.radians(25.0)
+_COLOURED = 20.0
+"""Chroma, units of a*, b*, from which on a declared colour has a hue that can be compared."""
+_GREY_TOLERANCE = 35.0
+"""Lab units between the declared colour, where it has no hue, and that of the mark: tens of grey levels."""
+
+
+def learn_colour(
+    images: Sequence[Image], maps: Sequence[NDArray[Any]], track: BlobTrack, max_noise: float
+) -> ColourModel | None:
+    """Learn the colour from a track's blobs; ``None`` where they do not stand out from their neighbourhood."""
+    inside, around, elsewhere, contrast = [], [], [], []
+    for m in track.members:
+        t = int(track.blobs.frame[m])
+        coloured = (maps[t] > track.level).astype(np.uint8)
+        _, labels = cv2.connectedComponents(coloured, connectivity=8)
+        blob = (labels == track.blobs.label[m]).astype(np.uint8)
+        core = cv2.erode(blob, np.ones((3, 3), np.uint8))
+        core = core if core.sum() >= 6 else blob
+        # Edge pixels belong to neither. Beyond them lies a collar as wide as the mark, without other blobs.
+        grown = cv2.dilate(blob, np.ones((9, 9), np.uint8))
+        wide = 2 * max(8, round(float(np.sqrt(blob.sum())) / 2.0)) + 1
+        collar: Image = cv2.dilate(grown, np.ones((wide, wide), np.uint8)) - grown
+        near_coloured: Image = cv2.dilate(coloured, np.ones((9, 9), np.uint8))
+        collar = collar & (1 - near_coloured)
+        inside.append(images[t][core > 0])
+        around.append(images[t][collar > 0])
+        if collar.any():
+            contrast.append(float(np.median(maps[t][core > 0]) - np.median(maps[t][collar > 0])))
+        rest = np.s_[::8, ::8]
+        elsewhere.append(images[t][rest][near_coloured[rest] == 0])
+    parts = [np.concatenate(p).astype(float) for p in (inside, around, elsewhere)]
+    # The contrast to the collar excludes a blush: it stands out from the wall, but not from the face.
+    if min(map(len, parts)) < 20 or np.median(contrast) < MIN_CONTRAST:
+        return None
+    model = fit_discriminant(*parts)
+    return model if model.noise < max_noise else None
+
+
+def is_same_colour(model: ColourModel, rgb: tuple[int, int, int] | None) -> bool:
+    """Return whether a colour is the declared one up to shading, which scales (a*, b*) along the hue."""
+    if rgb is None:
+        return True
+    seen, declared = lab_of(model.mean_rgb), lab_of(rgb)
+    here, there = np.hypot(*seen[1:]), np.hypot(*declared[1:])
+    if there < _COLOURED:
+        return bool(np.linalg.norm(seen - declared) < _GREY_TOLERANCE)
+    angle = np.arctan2(seen[2], seen[1]) - np.arctan2(declared[2], declared[1])
+    return bool(abs((angle + np.pi) % (2.0 * np.pi) - np.pi) < _HUE_TOLERANCE and 0.4 * there < here < 1.8 * there)
