@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
 from anglecam.vision.image.transforms import rotation
-from anglecam.vision.registration.tiles import AxisView
+from anglecam.vision.registration.axis_view import AxisView
 
 NO_INFORMATION = 1e-9
 """Information of a frame in which every tile is hidden."""
@@ -64,7 +64,7 @@ def leans_of(size: int) -> slice:
 
 @dataclass(frozen=True)
 class CentreEquations:
-    """Normal equations for the errors of the centres (size 3 + 3·tiles), every frame's angle eliminated."""
+    """Normal equations for the errors of the free unknowns, every frame's angle eliminated."""
 
     information: Floats
     """(size, size)."""
@@ -78,9 +78,7 @@ class CentreEquations:
     """(frames,) score of the angle."""
 
 
-def centre_equations(
-    normal: Floats, gradient: Floats, turns: Floats, axis: AxisView, heights: Floats
-) -> CentreEquations:
+def centre_equations(normal: Floats, gradient: Floats, turns: Floats, by_unknown: Floats) -> CentreEquations:
     """Assemble the normal equations.
 
     Parameters
@@ -89,18 +87,15 @@ def centre_equations(
         (tiles, frames, 5, 5) and (tiles, frames, 5) from `TileFit`, divided by the variances.
     turns : ndarray
         (frames,) rad.
-    axis : AxisView
-        Current parallax.
-    heights : ndarray
-        (tiles,) current heights, px.
+    by_unknown : ndarray
+        (tiles, 4, size) from `centre_derivatives`, of the unknowns that are free.
 
     Returns
     -------
     CentreEquations
-        Linear in the steps of all unknowns.
+        Linear in the steps of the free unknowns.
     """
     displacement = _displacements(turns)
-    by_unknown = centre_derivatives(axis, heights)
     place = np.einsum("kai,tkab,kbj->tij", displacement, normal[..., 1:, 1:], displacement)
     cross_place = np.einsum("kai,tka->tki", displacement, normal[..., 1:, 0])
     score = np.einsum("kai,tka->ti", displacement, gradient[..., 1:])
@@ -127,7 +122,7 @@ def centre_derivatives(axis: AxisView, heights: Floats) -> Floats:
 
 
 def solve_centres(equations: CentreEquations, prior: Floats, error: Floats) -> tuple[Floats, Floats]:
-    """Solve for the steps of all unknowns.
+    """Solve for the steps of the free unknowns.
 
     Parameters
     ----------
@@ -157,10 +152,10 @@ def _displacements(turns: Floats) -> Floats:
 
 
 def remaining_gradient(
-    normal: Floats, gradient: Floats, turns: Floats, axis: AxisView, heights: Floats, step: Floats, turn_steps: Floats
+    normal: Floats, gradient: Floats, turns: Floats, by_unknown: Floats, step: Floats, turn_steps: Floats
 ) -> Floats:
     """Return the gradient (tiles, frames, 5) after a step of the unknowns (size,) and of the turns (frames,), rad."""
-    place = np.einsum("kai,tiu,u->tka", _displacements(turns), centre_derivatives(axis, heights), step, optimize=True)
+    place = np.einsum("kai,tiu,u->tka", _displacements(turns), by_unknown, step, optimize=True)
     whole = np.concatenate([np.broadcast_to(turn_steps[:, None], (*place.shape[:2], 1)), place], axis=2)
     return np.asarray(gradient - np.einsum("tkab,tkb->tka", normal, whole))
 
@@ -186,8 +181,8 @@ def displacement_scatter(normal: Floats, gradient: Floats, variance: Floats) -> 
     return np.asarray((square * seen).sum(axis=1) / np.maximum(seen.sum(axis=1), 1) / variance)
 
 
-def effective_centre(normal: Floats, axis: AxisView, heights: Floats) -> Floats:
-    """Return the matrix (2, size) from the errors of all unknowns to the error of the effective centre.
+def effective_centre(normal: Floats, by_unknown: Floats) -> Floats:
+    """Return the matrix (2, size) from the errors of the free unknowns to the error of the effective centre.
 
     Errors d of the tiles' centres act on a frame's angle through the sum over tiles of n·(1 − R)·d, with the cross
     terms n of angle and place. As complex numbers, factors commute: the sum equals that of a common centre whose error
@@ -195,8 +190,7 @@ def effective_centre(normal: Floats, axis: AxisView, heights: Floats) -> Floats:
     """
     cross = normal[..., 0, 1:3].sum(axis=1)
     against = cross[:, 0] - 1j * cross[:, 1]
-    derivatives = centre_derivatives(axis, heights)
-    share = (against / against.sum()) @ (derivatives[:, 0] + 1j * derivatives[:, 1])
+    share = (against / against.sum()) @ (by_unknown[:, 0] + 1j * by_unknown[:, 1])
     return np.stack([share.real, share.imag])
 
 
@@ -208,7 +202,7 @@ def disagreement_of_groups(covariance: Floats, scores: Floats, groups: NDArray[n
     Parameters
     ----------
     covariance : ndarray
-        (size, size) of all unknowns.
+        (size, size) of the free unknowns.
     scores : ndarray
         (tiles, size).
     groups : ndarray

@@ -20,6 +20,7 @@ from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.median import median_picture
 from anglecam.vision.image.transforms import rotation
 from anglecam.vision.registration.appearance import TileViews
+from anglecam.vision.registration.axis_view import AxisView
 
 TILE_SIDE_PX = 16
 """Side of a tile, px."""
@@ -33,12 +34,6 @@ _MIN_STEADIER = 1.5
 """Least ratio of squared spreads, as filmed over rotated back, of a tile that belongs to the body."""
 _MAX_HEIGHT = 0.3
 """Largest height of a part of the body, as a share of half the picture's diagonal."""
-_OFF_CENTRE = 0.03
-"""Standard uncertainty of the principal point of a camera that is not calibrated, as a share of the picture's width."""
-_CALIBRATED = 0.005
-"""The same of a calibrated camera, as a share of its focal length."""
-_TILT_AXIS = 0.02
-"""Standard uncertainty of the direction of a declared tilt, rad."""
 _HEIGHT_STEP_PX = 1.0
 """Displacement between neighbouring heights that are tried, px."""
 
@@ -58,25 +53,6 @@ class FrameView:
     """Row whose exposure ``turn`` refers to."""
     pivot_covariance_px2: Floats | None = None
     """(2, 2) covariance of the pivot between frames, px²; ``None`` where the camera does not move."""
-
-
-@dataclass(frozen=True)
-class AxisView:
-    """The axis of rotation, as the camera sees it: a line, on which each height has its centre of rotation."""
-
-    parallax: Floats
-    """(2,) displacement of the centre of rotation for each px of height."""
-    direction_sigma: float
-    """Standard uncertainty of the line's direction, rad."""
-
-    @property
-    def aside(self) -> Floats:
-        """(2,) displacement for each px of height and each rad of the line's direction."""
-        return np.array([-self.parallax[1], self.parallax[0]])
-
-    def turned(self, direction: float) -> AxisView:
-        """Return the view with the line's direction changed by a small angle, rad."""
-        return replace(self, parallax=self.parallax + direction * self.aside)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,46 +75,15 @@ class Tiles:
     corners: Floats
     """(tiles, 2) upper left corners, px; the tile with the most information first."""
     heights: Floats
-    """(tiles,) towards the camera, px; zero in a view that is not tilted."""
+    """(tiles,) towards the camera, px; zero where all heights share one centre."""
 
 
-def motion_plane(lens: Lens, size: tuple[int, int], pivot_px: Floats) -> MotionPlane:
-    """Map the pixels of a picture to the plane of motion.
-
-    Parameters
-    ----------
-    lens : Lens
-        From the picture to the plane.
-    size : tuple of int
-        Width and height of the picture, px.
-    pivot_px : ndarray
-        (2,) in the plane, px.
-    """
+def motion_plane(lens: Lens, size: tuple[int, int]) -> MotionPlane:
+    """Map the pixels of a picture of (width, height) to the plane of motion."""
     x, y = np.meshgrid(np.arange(size[0], dtype=float), np.arange(size[1], dtype=float))
     ground = np.ascontiguousarray(lens.rectify(np.stack([x, y], axis=-1)))
     steps = [np.hypot(*np.moveaxis(np.diff(ground, axis=axis), -1, 0)).min() for axis in (0, 1)]
-    axis = _square_view(lens, size, pivot_px) if lens.tilt == 0.0 else AxisView(lens.parallax, _TILT_AXIS)
-    return MotionPlane(lens, ground, 1.0 / max(min(steps), 0.1), axis)
-
-
-def _square_view(lens: Lens, size: tuple[int, int], pivot_px: Floats) -> AxisView:
-    """Return how an axis parallel to the line of sight is seen: as a line from the pivot to the principal point.
-
-    Points at the height z appear larger by the factor f/(f − z), so the centre is displaced by (pivot − principal
-    point)·z/f. An undeclared focal length is taken to equal the picture's width: it only scales the heights.
-    """
-    if lens.calibration is not None:
-        focal, principal = lens.calibration.focal_px, lens.calibration.camera_matrix[:2, 2]
-        sigma = _CALIBRATED * focal
-    else:
-        focal, principal = lens.focal_px or float(size[0]), (np.array(size) - 1.0) / 2.0
-        sigma = _OFF_CENTRE * size[0]
-    arm = np.asarray(pivot_px - principal, dtype=float)
-    length = float(np.hypot(*arm))
-    along = arm / length if length > 0.0 else np.array([1.0, 0.0])
-    # near the principal point the line is as long as the error of that point makes it
-    apparent = float(np.hypot(length, sigma))
-    return AxisView(along * apparent / focal, sigma / apparent)
+    return MotionPlane(lens, ground, 1.0 / max(min(steps), 0.1), AxisView(lens.parallax))
 
 
 def choose_tiles(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats, noise: float) -> Tiles:
