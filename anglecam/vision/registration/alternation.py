@@ -99,7 +99,7 @@ class Data:
 
     @property
     def free(self) -> NDArray[np.intp]:
-        """Places of the free unknowns: pivot, then heights if the axis is seen as a line, then all if it is estimated."""
+        """Places of the free unknowns: pivot, heights if the axis is seen as a line, all if it is estimated."""
         size = 3 + 3 * len(self.tiles.heights)
         if self.axis.estimated:
             return np.arange(size)
