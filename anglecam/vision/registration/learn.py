@@ -90,7 +90,8 @@ def learn_body(
         height, width = frames[0].image.shape[:2]
         deep = replace(plane, axis=axis_in_perspective(plane.lens, (width, height), pivot.centre_px))
         normal, gradient = _at_the_end(data, last)
-        if have_own_centres(normal, gradient, last.state.turns, deep.axis.parallax):
+        arms = tiles.corners + TILE_SIDE_PX / 2 - data.centres(last.state)
+        if have_own_centres(normal, gradient, last.state.turns, arms, deep.axis.parallax):
             tiles = choose_tiles(stack, deep, pivot.centre_px, noise)
             if len(tiles.corners) >= _FEWEST_TILES:
                 plane, (data, last) = deep, _learn(frames, tiles, deep, pivot)

@@ -13,13 +13,18 @@ import numpy as np
 from anglecam.data.typing import Floats
 from anglecam.vision.image.transforms import rotation
 
-_ERROR_RATE = 1e-3
-"""Share of bodies with a common centre that are taken for deep. Such a body is learnt with heights near zero: its angle
-is not wrong, only less certain."""
+_ERROR_RATE = 0.01
+"""Share of bodies with a common centre that are taken for deep. The two mistakes do not cost the same: such a body is
+learnt with heights near zero, and its angle is only less certain; a deep body with a common centre gets a wrong
+angle."""
+_REWEIGHTINGS = 20
 
 
-def have_own_centres(normal: Floats, gradient: Floats, turns: Floats, parallax: Floats) -> bool:
+def have_own_centres(normal: Floats, gradient: Floats, turns: Floats, arms_px: Floats, parallax: Floats) -> bool:
     """Return whether the tiles' centres scatter along the image of the axis more than across it.
+
+    While one centre is common to all, the angles' scale gives way to the tiles' displacements, which then
+    contain their arms times an error of the scale. Heights act along the axis alone, so the part across it determines that error.
 
     Parameters
     ----------
@@ -28,20 +33,30 @@ def have_own_centres(normal: Floats, gradient: Floats, turns: Floats, parallax: 
         centre have converged.
     turns : ndarray
         (frames,) rad.
+    arms_px : ndarray
+        (tiles, 2) from the common centre to the tiles, px.
     parallax : ndarray
         (2,) along the image of the axis.
     """
-    along, across = np.abs(displacements_of_centres(normal, gradient, turns, parallax)).T
-    return _signed_rank_p(along - across) < _ERROR_RATE
-
-
-def displacements_of_centres(normal: Floats, gradient: Floats, turns: Floats, parallax: Floats) -> Floats:
-    """Return (tiles, 2) displacement of each tile's centre along and across the axis, in standard deviations of noise.
-
-    A constant displacement of a tile is part of its appearance and is eliminated.
-    """
     unit = parallax / np.hypot(*parallax)
     axes = np.array([[unit[0], -unit[1]], [unit[1], unit[0]]])
+    found, spread = displacements_of_centres(normal, gradient, turns, axes)
+    known = np.isfinite(spread).all(axis=1)
+    (along, across), (s_along, s_across), arms = found[known].T, spread[known].T, (arms_px @ axes)[known]
+    one = np.ones(len(arms))
+    scale, shift = _least_absolute(np.stack([arms[:, 1], one], axis=1) / s_across[:, None], across / s_across)
+    across = (across - scale * arms[:, 1] - shift) / s_across
+    along = along - scale * arms[:, 0]
+    along = (along - _least_absolute((one / s_along)[:, None], along / s_along)) / s_along
+    return _signed_rank_p(np.abs(along) - np.abs(across)) < _ERROR_RATE
+
+
+def displacements_of_centres(normal: Floats, gradient: Floats, turns: Floats, axes: Floats) -> tuple[Floats, Floats]:
+    """Return (tiles, 2) displacement of each tile's centre along ``axes`` (columns), and its uncertainty by noise, px.
+
+    A constant displacement of a tile is part of its appearance and is eliminated. The uncertainty of a tile that shows
+    nothing is infinite.
+    """
     displacement = (np.eye(2) - rotation(turns)) @ axes
     place, score = normal[..., 1:3, 1:3], gradient[..., 1:3]
     own = np.einsum("kai,tkab,kbj->tij", displacement, place, displacement)
@@ -50,9 +65,18 @@ def displacements_of_centres(normal: Floats, gradient: Floats, turns: Floats, pa
     information = own - eliminated @ cross.transpose(0, 2, 1)
     right = np.einsum("kai,tka->ti", displacement, score) - np.einsum("tib,tb->ti", eliminated, score.sum(axis=1))
     covariance = np.linalg.pinv(information, hermitian=True)
-    spread = np.sqrt(np.maximum(np.einsum("tii->ti", covariance), 0.0))
-    found = np.einsum("tij,tj->ti", covariance, right)
-    return np.divide(found, spread, out=np.zeros_like(found), where=spread > 0.0)
+    variance = np.einsum("tii->ti", covariance)
+    return np.einsum("tij,tj->ti", covariance, right), np.sqrt(np.where(variance > 0.0, variance, np.inf))
+
+
+def _least_absolute(columns: Floats, values: Floats) -> Floats:
+    """Return the factors of the columns with the least sum of absolute residuals, by reweighted least squares."""
+    weight = np.ones(len(values))
+    for _ in range(_REWEIGHTINGS):
+        root = np.sqrt(weight)
+        factors = np.linalg.lstsq(columns * root[:, None], values * root, rcond=None)[0]
+        weight = 1.0 / np.maximum(np.abs(values - columns @ factors), 1.0)  # below the noise all count the same
+    return factors
 
 
 def _signed_rank_p(differences: Floats) -> float:
