@@ -77,7 +77,7 @@ def _least_absolute(columns: Floats, values: Floats) -> Floats:
         root = np.sqrt(weight)
         factors = np.linalg.lstsq(columns * root[:, None], values * root, rcond=None)[0]
         weight = 1.0 / np.maximum(np.abs(values - columns @ factors), 1.0)  # below the noise all count the same
-    return factors
+    return np.asarray(factors, dtype=float)
 
 
 def _signed_rank_p(differences: Floats) -> float:

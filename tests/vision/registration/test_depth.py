@@ -18,7 +18,7 @@ LEARNT, JUDGED = 40, 20
 MOST_DEG = 0.005
 """Twice the sigma of such a body; with a common centre, two depths err by 0.1°."""
 COVERED = (0.3, 2.0)
-"""Of the error over sigma, RMS: the frames share the error of one learnt body, so one film scatters by a factor of two."""
+"""Of the error over sigma, RMS: the frames share the error of one learnt body, so it scatters by a factor of two."""
 
 
 def draw(turns, apart_px, rng):
@@ -74,7 +74,10 @@ def test_a_flat_body_keeps_the_common_centre(seed):
     assert COVERED[0] < np.sqrt(np.mean((error / sigma) ** 2)) < COVERED[1]
 
 
-@pytest.mark.parametrize("seed", [1, 2])
+TOO_FEW = pytest.mark.xfail(strict=True, reason="a quarter of the tiles at another depth is not evidence enough")
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=TOO_FEW), 3])
 def test_halves_at_different_depths_turn_about_centres_of_their_own(seed):
     arm = PIVOT - (np.array(SIZE) - 1.0) / 2.0
     apart = 3.0 * arm / np.hypot(*arm)
