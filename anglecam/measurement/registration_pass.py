@@ -19,8 +19,8 @@ from anglecam.data.typing import Floats, Image
 from anglecam.video.film import Film
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.estimate import PivotEstimate
-from anglecam.vision.registration.learn import learn_appearance
-from anglecam.vision.registration.tiles import FrameView, choose_tiles, motion_plane
+from anglecam.vision.registration.learn import learn_body
+from anglecam.vision.registration.tiles import FrameView, motion_plane
 from anglecam.vision.registration.turn import NO_TURN, BodyAppearance, TurnEstimate, find_turn, refine_doubtful_turn
 
 _LEARNT = 120
@@ -37,7 +37,6 @@ _STACK = 15
 """Number of the learnt frames, evenly spaced over the rotations, that are superposed to find the rigid tiles."""
 _FEWEST = 12
 """A body seen in fewer frames is not learnt."""
-_FEWEST_TILES = 3
 _YIELDING = 0.5
 """Of `BodyAppearance.absorbed_share`: 0.05 to 0.1 in clips of steps and swings, 0.8 in a swing of 70° with six frames
 on the way."""
@@ -87,7 +86,7 @@ class Registered:
     pivot_px: Floats
     """(2,) centre of rotation estimated from the whole body, px."""
     pivot_covariance_px2: Floats
-    """(2, 2) px²."""
+    """(2, 2) of the centre through which the rotations depend on the pivot, px²."""
     appearance: BodyAppearance
     """The appearance that was learnt."""
 
@@ -135,11 +134,11 @@ def register_clip(
     ]
     by_turn = np.argsort([g.turn for g in views])
     stack = by_turn[np.unique(np.linspace(0, len(by_turn) - 1, _STACK).round().astype(int))]
-    tiles = choose_tiles([views[i] for i in stack], plane, start.pivot.centre_px, pixel_noise([g.image for g in views]))
-    if len(tiles.corners) < _FEWEST_TILES:
-        return "too little of the body is rigid and has edges"
+    noise = pixel_noise([g.image for g in views])
     with threadpool_limits(limits=1, user_api="blas"):  # small systems, in which threads only wait for each other
-        appearance = learn_appearance(views, tiles, plane, start.pivot)
+        appearance = learn_body(views, [views[i] for i in stack], plane, start.pivot, noise)
+    if appearance is None:
+        return "too little of the body is rigid and has edges"
     del views
     if appearance.absorbed_share > _YIELDING:
         return "the body is seen in too few poses, or too obliquely, to be learnt"
@@ -204,6 +203,6 @@ def _gathered(found: list[TurnEstimate], rows: Floats, appearance: BodyAppearanc
         pivot_sensitivity=np.array([one.pivot_sensitivity for one in found]),
         row=rows,
         pivot_px=appearance.pivot_px,
-        pivot_covariance_px2=appearance.pivot_covariance_px2,
+        pivot_covariance_px2=appearance.centre_covariance_px2,
         appearance=appearance,
     )

@@ -67,6 +67,10 @@ class TileAppearance:
     """(tiles, planes, knots, knots) of the splines, y first."""
     gains: Floats
     """(tiles, GAIN_POWERS, 3): constant, x and y, for every power of the angle in rad."""
+    leans: Floats
+    """(tiles, 2) gradient of the height over the tile."""
+    parallax: Floats
+    """(2,) displacement of the centre of rotation for each px of height."""
 
     def __len__(self) -> int:
         return len(self.corners)
@@ -79,11 +83,20 @@ def join_tiles(tiles: Sequence[TileAppearance]) -> TileAppearance:
         tiles[0].side,
         np.concatenate([t.coefficients for t in tiles]),
         np.concatenate([t.gains for t in tiles]),
+        np.concatenate([t.leans for t in tiles]),
+        tiles[0].parallax,
     )
 
 
 def learn_tile(
-    corner: Floats, side: int, views: TileViews, turns: Floats, pivot: Floats, gains: Floats | None = None
+    corner: Floats,
+    side: int,
+    views: TileViews,
+    turns: Floats,
+    pivot: Floats,
+    parallax: Floats,
+    lean: Floats,
+    gains: Floats | None = None,
 ) -> TileAppearance:
     """Fit one tile's appearance to its views in frames of known angle.
 
@@ -99,6 +112,10 @@ def learn_tile(
         (views,) angle of the body from the reference frame, counter-clockwise as seen, rad.
     pivot : ndarray
         (2,) the tile's centre of rotation in the reference frame, px.
+    parallax : ndarray
+        (2,) displacement of the centre of rotation for each px of height.
+    lean : ndarray
+        (2,) gradient of the height over the tile.
     gains : ndarray, optional
         (GAIN_POWERS, 3) initial gains; zero by default.
 
@@ -109,16 +126,15 @@ def learn_tile(
     """
     n = round(side / KNOT_SPACING_PX) + 3
     start = np.zeros((GAIN_POWERS, 3)) if gains is None else gains
-    band, right = normal_equations(views.offsets, views.values, views.starts, turns, pivot, corner, side, n, start)
+    seen, place = (views.offsets, views.values, views.starts, turns, pivot, corner, side), (parallax, lean)
+    band, right = normal_equations(*seen, n, start, *place)
     lower = _as_lower_band(band, n) + _SMOOTHNESS * _roughness(n)
     lower[0] += _RIDGE
     factor = cholesky_banded(lower, lower=True, overwrite_ab=True)
     coefficients = cho_solve_banded((factor, True), right.T).T.reshape(-1, n, n)
-    normal, gradient = gain_equations(
-        views.offsets, views.values, views.starts, turns, pivot, corner, side, coefficients
-    )
+    normal, gradient = gain_equations(*seen, coefficients, *place)
     fitted = np.linalg.lstsq(normal, gradient, rcond=1e-9)[0].reshape(1, GAIN_POWERS, 3)
-    return TileAppearance(corner[None], side, coefficients[None], fitted)
+    return TileAppearance(corner[None], side, coefficients[None], fitted, lean[None], parallax)
 
 
 @dataclass(frozen=True)
@@ -126,9 +142,10 @@ class TileFit:
     """The normal equations of each view for its angle: sums over its pixels."""
 
     normal: Floats
-    """(views, 3, 3) products of the derivatives by angle (rad) and by x and y of the body's place (px)."""
+    """(views, 5, 5) products of the derivatives by angle (rad), by x and y of the body's place (px), and by the tile's
+    lean along x and y."""
     gradient: Floats
-    """(views, 3) products of derivative and residual."""
+    """(views, 5) products of derivative and residual."""
     squares: Floats
     """(views,) sum of squared residuals."""
     count: Integers
@@ -147,6 +164,10 @@ class TileFit:
             squares=self.squares * kept,
             count=self.count * kept,
         )
+
+    def rigid(self) -> TileFit:
+        """Return a copy for angle, x and y alone."""
+        return replace(self, normal=self.normal[..., :3, :3], gradient=self.gradient[..., :3])
 
     def weighted(self, variance: Floats) -> tuple[Floats, Floats]:
         """Return normal matrix and gradient divided by the residuals' variances, given along the first axis."""
@@ -208,6 +229,8 @@ def compare_tiles(tiles: TileAppearance, views: TileViews, turns: Floats, pivots
             tiles.side,
             tiles.coefficients,
             tiles.gains,
+            tiles.parallax,
+            tiles.leans,
         )
     )
 

@@ -1,7 +1,8 @@
 """Normal equations of a body's tiles for the centre of rotation and the tiles' heights.
 
-A rotated tile appears displaced by t = (1 − R)·(e + p·h), with the error e of the pivot, the parallax p and the tile's
-height h. Every frame's angle is free and is eliminated.
+A rotated tile appears displaced by t = (1 − R)·(e + (p + φ·p')·h), with the error e of the pivot, the parallax p, its
+error of direction φ (p' is p turned by a right angle), and the tile's height h, which may vary over the tile. Every
+frame's angle is free and is eliminated.
 """
 
 from __future__ import annotations
@@ -13,23 +14,57 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
 from anglecam.vision.image.transforms import rotation
+from anglecam.vision.registration.axis_view import AxisView
 
 NO_INFORMATION = 1e-9
 """Information of a frame in which every tile is hidden."""
 
 
 @dataclass(frozen=True)
-class CentrePrior:
-    """Prior information on the centres of rotation, 1/px²."""
+class Centres:
+    """All that determines about which image points the tiles rotate, or a step or an error of it."""
 
-    pivot: Floats
-    """(2, 2)."""
-    height: float
+    values: Floats
+    """(3 + 3·tiles,) pivot (px), direction of the parallax (rad), heights (px), and leans x and y of every tile."""
+
+    @property
+    def pivot(self) -> Floats:
+        """(2,) px."""
+        return self.values[PIVOT]
+
+    @property
+    def direction(self) -> float:
+        """Of the parallax, rad."""
+        return float(self.values[DIRECTION])
+
+    @property
+    def heights(self) -> Floats:
+        """(tiles,) px."""
+        return self.values[heights_of(len(self.values))]
+
+    @property
+    def leans(self) -> Floats:
+        """(tiles, 2) gradients of the height."""
+        return self.values[leans_of(len(self.values))].reshape(-1, 2)
+
+
+PIVOT, DIRECTION = slice(0, 2), 2
+"""Places of pivot and direction among the unknowns."""
+
+
+def heights_of(size: int) -> slice:
+    """Return the places of the heights among ``size`` unknowns."""
+    return slice(3, 3 + (size - 3) // 3)
+
+
+def leans_of(size: int) -> slice:
+    """Return the places of the leans among ``size`` unknowns."""
+    return slice(3 + (size - 3) // 3, size)
 
 
 @dataclass(frozen=True)
 class CentreEquations:
-    """Normal equations for the errors of pivot and heights (size 2 or 2 + tiles), every frame's angle eliminated."""
+    """Normal equations for the errors of the free unknowns, every frame's angle eliminated."""
 
     information: Floats
     """(size, size)."""
@@ -43,90 +78,148 @@ class CentreEquations:
     """(frames,) score of the angle."""
 
 
-def centre_equations(normal: Floats, gradient: Floats, turns: Floats, parallax: Floats) -> CentreEquations:
-    """Assemble the normal equations. Without parallax the heights have no effect and are left out.
+def centre_equations(normal: Floats, gradient: Floats, turns: Floats, by_unknown: Floats) -> CentreEquations:
+    """Assemble the normal equations.
 
     Parameters
     ----------
     normal, gradient : ndarray
-        (tiles, frames, 3, 3) and (tiles, frames, 3) for angle, x and y, divided by the variances.
+        (tiles, frames, 5, 5) and (tiles, frames, 5) from `TileFit`, divided by the variances.
     turns : ndarray
         (frames,) rad.
-    parallax : ndarray
-        (2,) displacement of the centre of rotation for each px of height.
+    by_unknown : ndarray
+        (tiles, 4, size) from `centre_derivatives`, of the unknowns that are free.
 
     Returns
     -------
     CentreEquations
-        Of size 2, or 2 + tiles with parallax.
+        Linear in the steps of the free unknowns.
     """
-    displacement = np.eye(2) - rotation(turns)
+    displacement = _displacements(turns)
     place = np.einsum("kai,tkab,kbj->tij", displacement, normal[..., 1:, 1:], displacement)
     cross_place = np.einsum("kai,tka->tki", displacement, normal[..., 1:, 0])
     score = np.einsum("kai,tka->ti", displacement, gradient[..., 1:])
-    turn_information, tiles = np.maximum(normal[..., 0, 0].sum(axis=0), NO_INFORMATION), len(normal)
-    size = 2 + (tiles if parallax.any() else 0)
-    information, scores, cross = np.zeros((size, size)), np.zeros((tiles, size)), np.zeros((len(turns), size))
-    information[:2, :2], scores[:, :2], cross[:, :2] = place.sum(axis=0), score, cross_place.sum(axis=0)
-    if size > 2:
-        place_height = place @ parallax
-        information[2:, :2], information[:2, 2:] = place_height, place_height.T
-        information[2:, 2:] = np.diag(place_height @ parallax)
-        scores[:, 2:] = np.diag(score @ parallax)
-        cross[:, 2:] = (cross_place @ parallax).T
+    turn_information = np.maximum(normal[..., 0, 0].sum(axis=0), NO_INFORMATION)
+    information = np.einsum("tiu,tij,tjv->uv", by_unknown, place, by_unknown, optimize=True)
+    scores = np.einsum("ti,tiu->tu", score, by_unknown)
+    cross = np.einsum("tki,tiu->ku", cross_place, by_unknown)
     information -= (cross.T / turn_information) @ cross
     scores -= (gradient[..., 0] / turn_information) @ cross
     return CentreEquations(information, scores, cross, turn_information, gradient[..., 0].sum(axis=0))
 
 
-def solve_centres(
-    equations: CentreEquations, prior: CentrePrior, error: Floats, heights: Floats
-) -> tuple[Floats, Floats]:
-    """Solve for the steps of pivot and heights.
+def centre_derivatives(axis: AxisView, heights: Floats) -> Floats:
+    """Return (tiles, 4, size) the derivatives of the tiles' centres (x, y) and leans (x, y) by the unknowns."""
+    tiles = len(heights)
+    each = np.arange(tiles)
+    derivatives = np.zeros((tiles, 4, 3 + 3 * tiles))
+    derivatives[:, :2, PIVOT] = np.eye(2)
+    derivatives[:, :2, DIRECTION] = heights[:, None] * axis.aside
+    derivatives[each, :2, 3 + each] = axis.parallax
+    for k in range(2):
+        derivatives[each, 2 + k, 3 + tiles + 2 * each + k] = 1.0
+    return derivatives
+
+
+def solve_centres(equations: CentreEquations, prior: Floats, error: Floats) -> tuple[Floats, Floats]:
+    """Solve for the steps of the free unknowns.
 
     Parameters
     ----------
     equations : CentreEquations
         From the data.
-    prior : CentrePrior
-        Prior information; the prior mean is zero for the error of the pivot and for the heights.
+    prior : ndarray
+        (size, size) prior information; the prior mean is zero for all.
     error : ndarray
-        (2,) current error of the pivot, px.
-    heights : ndarray
-        (tiles,) current heights, px.
+        (size,) current values.
 
     Returns
     -------
     step : ndarray
-        (size,) px.
+        (size,).
     covariance : ndarray
         (size, size) in units of the pixels' noise.
     """
-    information, right = equations.information.copy(), equations.scores.sum(axis=0)
-    information[:2, :2] += prior.pivot
-    right[:2] -= prior.pivot @ error
-    if len(information) > 2:
-        information[2:, 2:] += prior.height * np.eye(len(heights))
-        right[2:] -= prior.height * heights
-    covariance = np.asarray(np.linalg.inv(information), dtype=float)
-    return covariance @ right, covariance
+    covariance = np.asarray(np.linalg.inv(equations.information + prior), dtype=float)
+    return covariance @ (equations.scores.sum(axis=0) - prior @ error), covariance
 
 
-def disagreement_of_groups(covariance: Floats, scores: Floats, groups: NDArray[np.intp]) -> float:
-    """Return the pivot's variance from the disagreement of groups of tiles over that expected from noise alone.
+def _displacements(turns: Floats) -> Floats:
+    """Return (frames, 4, 4) the derivatives of the displacement by centre and lean."""
+    displacement = np.tile(np.eye(4), (len(turns), 1, 1))
+    displacement[:, :2, :2] -= rotation(turns)
+    return displacement
+
+
+def remaining_gradient(
+    normal: Floats, gradient: Floats, turns: Floats, by_unknown: Floats, step: Floats, turn_steps: Floats
+) -> Floats:
+    """Return the gradient (tiles, frames, 5) after a step of the unknowns (size,) and of the turns (frames,), rad."""
+    place = np.einsum("kai,tiu,u->tka", _displacements(turns), by_unknown, step, optimize=True)
+    whole = np.concatenate([np.broadcast_to(turn_steps[:, None], (*place.shape[:2], 1)), place], axis=2)
+    return np.asarray(gradient - np.einsum("tkab,tkb->tka", normal, whole))
+
+
+def displacement_scatter(normal: Floats, gradient: Floats, variance: Floats) -> Floats:
+    """Return each tile's mean square of its displacements over frames, in units of the noise.
+
+    Parameters
+    ----------
+    normal, gradient : ndarray
+        (tiles, frames, 5, 5) and (tiles, frames, 5) from `TileFit`.
+    variance : ndarray
+        (tiles,) of the pixels' noise.
+
+    Returns
+    -------
+    ndarray
+        (tiles,): 1 for a tile whose errors are those of the noise alone.
+    """
+    place, score = normal[..., 1:3, 1:3], gradient[..., 1:3]
+    square = np.einsum("tka,tkab,tkb->tk", score, np.linalg.pinv(place, hermitian=True), score) / 2.0
+    seen = normal[..., 0, 0] > NO_INFORMATION
+    return np.asarray((square * seen).sum(axis=1) / np.maximum(seen.sum(axis=1), 1) / variance)
+
+
+def effective_centre(normal: Floats, by_unknown: Floats) -> Floats:
+    """Return the matrix (2, size) from the errors of the free unknowns to the error of the effective centre.
+
+    Errors d of the tiles' centres act on a frame's angle through the sum over tiles of n·(1 − R)·d, with the cross
+    terms n of angle and place. As complex numbers, factors commute: the sum equals that of a common centre whose error
+    is Σ conj(n)·d / Σ conj(n), in every frame.
+    """
+    cross = normal[..., 0, 1:3].sum(axis=1)
+    against = cross[:, 0] - 1j * cross[:, 1]
+    share = (against / against.sum()) @ (by_unknown[:, 0] + 1j * by_unknown[:, 1])
+    return np.stack([share.real, share.imag])
+
+
+def disagreement_of_groups(covariance: Floats, scores: Floats, groups: NDArray[np.intp], acting: Floats) -> float:
+    """Return the effective centre's variance from the disagreement of groups of tiles over that expected from noise.
 
     The cluster-robust sandwich (Liang & Zeger 1986), with one cluster for each group.
+
+    Parameters
+    ----------
+    covariance : ndarray
+        (size, size) of the free unknowns.
+    scores : ndarray
+        (tiles, size).
+    groups : ndarray
+        (tiles,) group of each tile.
+    acting : ndarray
+        (2, size) from `effective_centre`.
     """
     names = np.unique(groups)
-    influence = np.stack([scores[groups == group].sum(axis=0) for group in names]) @ covariance
-    variance = float((influence[:, :2] ** 2).sum()) * len(names) / max(len(names) - 2, 1)
-    return variance / float(np.trace(covariance[:2, :2]))
+    influence = np.stack([scores[groups == group].sum(axis=0) for group in names]) @ covariance @ acting.T
+    variance = float((influence**2).sum()) * len(names) / max(len(names) - 2, 1)
+    return variance / float(np.trace(acting @ covariance @ acting.T))
 
 
 def excess_displacement(normal: Floats, gradient: Floats) -> float:
     """Return the mean square of the displacement that a body on a fixed pivot cannot have, in units of its noise."""
     seen = normal[:, 0, 0] > NO_INFORMATION
     normal, gradient = normal[seen], gradient[seen]
-    place = normal[:, 1:, 1:] - normal[:, 1:, :1] * normal[:, :1, 1:] / normal[:, :1, :1]
-    shift = gradient[:, 1:] - normal[:, 1:, 0] * (gradient[:, :1] / normal[:, :1, 0])
+    place = normal[:, 1:3, 1:3] - normal[:, 1:3, :1] * normal[:, :1, 1:3] / normal[:, :1, :1]
+    shift = gradient[:, 1:3] - normal[:, 1:3, 0] * (gradient[:, :1] / normal[:, :1, 0])
     return float(np.einsum("ni,nij,nj->n", shift, np.linalg.pinv(place, hermitian=True), shift).mean() / 2.0)

@@ -45,8 +45,20 @@ def _gain(gains, turn, x, y):  # type: ignore[no-untyped-def]
     return total
 
 
+@njit(cache=True, inline="always")
+def _leaning(c, s, parallax, lean, across):  # type: ignore[no-untyped-def]
+    """Write into ``across`` the displacement for each px along both axes of a tile whose height varies over it.
+
+    A point whose height exceeds the tile's by δ is displaced by (1 − R)·p·δ, and δ = lean·(point − middle).
+    """
+    across[0] = (1 - c) * parallax[0] + s * parallax[1]
+    across[1] = (1 - c) * parallax[1] - s * parallax[0]
+    rest = 1 - lean[0] * across[0] - lean[1] * across[1]
+    across[2], across[3] = lean[0] / rest, lean[1] / rest
+
+
 @njit(cache=True)
-def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gains):  # type: ignore[no-untyped-def]
+def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gains, parallax, lean):  # type: ignore[no-untyped-def]
     """Accumulate the normal equations for a tile's coefficients from views at known turns and gains.
 
     Parameters
@@ -63,6 +75,8 @@ def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gai
         Number of coefficients along a side.
     gains : ndarray
         (powers, 3) coefficients of the gain.
+    parallax, lean : ndarray
+        (2,) displacement of the centre for each px of height, and gradient of the height over the tile.
 
     Returns
     -------
@@ -73,13 +87,16 @@ def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gai
     band = np.zeros((n * n, 25))
     planes = values.shape[1]
     right = np.zeros((planes, n * n))
-    wx, wy = np.zeros(4), np.zeros(4)
+    wx, wy, across = np.zeros(4), np.zeros(4), np.zeros(4)
     scale = (n - 3) / side
     for k in range(len(turns)):
         c, s = np.cos(turns[k]), np.sin(turns[k])
+        _leaning(c, s, parallax, lean, across)
         for m in range(starts[k], starts[k + 1]):
             x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1] - corner[0]
             y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1] - corner[1]
+            rise = across[2] * (x - side / 2) + across[3] * (y - side / 2)
+            x, y = x + across[0] * rise, y + across[1] * rise
             if x < 0 or y < 0 or x >= side or y >= side:
                 continue
             g = _gain(gains, turns[k], 2 * x / side - 1, 2 * y / side - 1)
@@ -102,12 +119,12 @@ def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gai
 
 
 @njit(cache=True)
-def gain_equations(offsets, values, starts, turns, pivot, corner, side, coefficients):  # type: ignore[no-untyped-def]
+def gain_equations(offsets, values, starts, turns, pivot, corner, side, coefficients, parallax, lean):  # type: ignore[no-untyped-def]
     """Accumulate the normal equations for a tile's gain, with the coefficients given.
 
     Parameters
     ----------
-    offsets, values, starts, turns, pivot, corner, side
+    offsets, values, starts, turns, pivot, corner, side, parallax, lean
         As in `normal_equations`.
     coefficients : ndarray
         (planes, n, n), y first.
@@ -121,13 +138,16 @@ def gain_equations(offsets, values, starts, turns, pivot, corner, side, coeffici
     terms = 3 * 3
     gradient, basis = np.zeros(terms), np.zeros(terms)
     half, products = np.zeros(terms * (terms + 1) // 2), np.zeros(terms * (terms + 1) // 2)
-    wx, wy = np.zeros(4), np.zeros(4)
+    wx, wy, across = np.zeros(4), np.zeros(4), np.zeros(4)
     scale = (n - 3) / side
     for k in range(len(turns)):
         c, s = np.cos(turns[k]), np.sin(turns[k])
+        _leaning(c, s, parallax, lean, across)
         for m in range(starts[k], starts[k + 1]):
             x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1] - corner[0]
             y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1] - corner[1]
+            rise = across[2] * (x - side / 2) + across[3] * (y - side / 2)
+            x, y = x + across[0] * rise, y + across[1] * rise
             if x < 0 or y < 0 or x >= side or y >= side:
                 continue
             ux, uy = x * scale, y * scale
@@ -164,17 +184,18 @@ def gain_equations(offsets, values, starts, turns, pivot, corner, side, coeffici
 
 
 @njit(cache=True)
-def turn_equations(offsets, values, starts, turns, pivots, corners, side, splines, all_gains):  # type: ignore[no-untyped-def]
-    """Accumulate each view's normal equations for its turn and its centre's place, given the tile's appearance.
+def turn_equations(offsets, values, starts, turns, pivots, corners, side, splines, all_gains, parallax, leans):  # type: ignore[no-untyped-def]
+    """Accumulate each view's normal equations for its turn, its centre's place and its lean, given the appearance.
 
     The view's brightness and blur are fitted too, for each plane, and eliminated.
 
     Parameters
     ----------
-    offsets, values, starts, turns, side
+    offsets, values, starts, turns, side, parallax
         As in `normal_equations`.
-    pivots, corners, splines, all_gains : ndarray
-        (tiles, …) centres of rotation, corners, coefficients and gains: of one tile, or of one tile for each view.
+    pivots, corners, splines, all_gains, leans : ndarray
+        (tiles, …) centres of rotation, corners, coefficients, gains and leans: of one tile, or of one tile for each
+        view.
 
     Returns
     -------
@@ -182,22 +203,25 @@ def turn_equations(offsets, values, starts, turns, pivots, corners, side, spline
         The fields of `anglecam.vision.registration.appearance.TileFit`, in its order.
     """
     views, planes, n = len(turns), splines.shape[1], splines.shape[2]
-    normals, gradients = np.zeros((views, 3, 3)), np.zeros((views, 3))
+    normals, gradients = np.zeros((views, 5, 5)), np.zeros((views, 5))
     squares, counts = np.zeros(views), np.zeros(views, dtype=np.int64)
     lights = np.zeros((views, planes, 3))
     wx, wy, dx, dy, bx, by = np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4)
-    slope, bright = np.zeros(3), np.ones(3)
+    slope, bright, across = np.zeros(5), np.ones(3), np.zeros(4)
     scale = (n - 3) / side
     for k in range(views):
         c, s = np.cos(turns[k]), np.sin(turns[k])
         p = k if len(splines) > 1 else 0
         pivot, corner, coefficients, gains = pivots[p], corners[p], splines[p], all_gains[p]
-        normal, gradient = np.zeros((3, 3)), np.zeros(3)
-        light, light_gradient, cross = np.zeros((planes, 3, 3)), np.zeros((planes, 3)), np.zeros((planes, 3, 3))
+        _leaning(c, s, parallax, leans[p], across)
+        normal, gradient = np.zeros((5, 5)), np.zeros(5)
+        light, light_gradient, cross = np.zeros((planes, 3, 3)), np.zeros((planes, 3)), np.zeros((planes, 3, 5))
         for m in range(starts[k], starts[k + 1]):
             at_x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1]
             at_y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1]
             x, y = at_x - corner[0], at_y - corner[1]
+            rise = across[2] * (x - side / 2) + across[3] * (y - side / 2)
+            x, y = x + across[0] * rise, y + across[1] * rise
             # Half a pixel inside the tile, where data on all sides determine the spline.
             if x < 0.5 or y < 0.5 or x >= side - 0.5 or y >= side - 0.5:
                 continue
@@ -228,26 +252,30 @@ def turn_equations(offsets, values, starts, turns, pivots, corners, side, spline
                 slope[0] = along_y * away_x - along_x * away_y
                 slope[1] = along_x
                 slope[2] = along_y
+                rising = along_x * across[0] + along_y * across[1]
+                slope[3] = rising * (x - side / 2)
+                slope[4] = rising * (y - side / 2)
                 bright[0] = g * level
                 bent = away_y * away_y * xx - 2.0 * away_x * away_y * xy + away_x * away_x * yy
                 bright[2] = g * scale * scale * bent / from_pivot
                 residual = values[m, channel] - g * level
                 squares[k] += residual * residual
                 counts[k] += 1
-                for a in range(3):
+                for a in range(5):
                     gradient[a] += slope[a] * residual
-                    for b in range(a, 3):
+                    for b in range(a, 5):
                         normal[a, b] += slope[a] * slope[b]
                 for a in range(3):
                     light_gradient[channel, a] += bright[a] * residual
                     for b in range(3):
                         light[channel, a, b] += bright[a] * bright[b]
+                    for b in range(5):
                         cross[channel, a, b] += bright[a] * slope[b]
         if counts[k] < 30:
             counts[k] = 0
             squares[k] = 0.0
             continue
-        for a in range(3):
+        for a in range(5):
             for b in range(a):
                 normal[a, b] = normal[b, a]
         # Eliminate the view's brightness and blur.

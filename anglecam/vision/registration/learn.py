@@ -1,274 +1,181 @@
 """Learn the body from the frames that show it: its appearance, its centre of rotation, and its angle in each frame.
 
-The three depend on one another and are found alternately: the appearance for given angles, then centre and angles for a
-given appearance. An appearance with a small error agrees with the angles from which it was learnt, so the steps shrink
-slowly, each by nearly the same ratio. After the first rounds, every second step is therefore extended by Aitken
-extrapolation (Aitken 1926). The ratio is the share of an error of the centre that the appearance absorbs. It is
-measured at the end by displacing the converged centre, and enlarges the centre's covariance.
+The three depend on one another and are found alternately (`anglecam.vision.registration.alternation`). The share of an
+error of the centre that the appearance absorbs is measured at the end by displacing the converged centre, and enlarges
+the centre's covariance.
+
+The simple model is first: all parts rotate about one centre. Parts at different depths do not, in perspective. Where
+the tiles show this (`anglecam.vision.registration.own_centres`), the body is learnt again with a height and a slope for
+every tile. The heights are drawn from a normal distribution, whose variance is estimated from the heights themselves
+(MacKay 1992).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
 from anglecam.vision.image.clusters import group_neighbours
 from anglecam.vision.pivot.estimate import PivotEstimate
-from anglecam.vision.registration.appearance import (
-    HIDDEN_MISFIT,
-    TileAppearance,
-    TileFit,
-    TileViews,
-    compare_tiles,
-    equalise_brightness,
-    join_tiles,
-    learn_tile,
-)
+from anglecam.vision.registration.acceleration import MAX_RATIO
+from anglecam.vision.registration.alternation import Data, Round, State, alternate, compare_all, one_round
+from anglecam.vision.registration.appearance import join_tiles
+from anglecam.vision.registration.axis_view import axis_in_perspective
 from anglecam.vision.registration.centre_equations import (
-    CentrePrior,
+    DIRECTION,
+    PIVOT,
+    Centres,
     centre_equations,
     disagreement_of_groups,
+    effective_centre,
     excess_displacement,
-    solve_centres,
 )
-from anglecam.vision.registration.tiles import TILE_SIDE_PX, FrameView, MotionPlane, Tiles, view_tiles
-from anglecam.vision.registration.turn import BodyAppearance, covered_views, group_scatter
+from anglecam.vision.registration.own_centres import have_own_centres
+from anglecam.vision.registration.tiles import (
+    TILE_SIDE_PX,
+    FrameView,
+    MotionPlane,
+    Tiles,
+    choose_tiles,
+    view_tiles,
+)
+from anglecam.vision.registration.turn import BodyAppearance, group_scatter
 
+_FEWEST_TILES = 3
 _GROUPS = 6
 """Groups of neighbouring tiles."""
-_MAX_ROUNDS = 16
-_SETTLED_PX = 0.002
-"""Change of the centres of rotation below which the iteration ends, px."""
-_HIDDEN_ROUNDS = 3
-"""Rounds after which the set of hidden views is no longer changed."""
 _NUDGE_PX = 0.2
 """Displacement of a converged centre by which its absorbed share is measured, px."""
 _STRETCH = 1e-3
 """Relative stretch of converged angles by which their absorbed share is measured."""
-_MAX_ABSORBED = 0.98
-"""Largest share of an error that the appearance is assumed to absorb."""
-_MIN_VARIANCE = 0.5
-"""Least variance of a tile relative to the median. A smaller variance results from too few views, not from less
-noise."""
-_NO_MISFIT = 1e-9
-"""Replaces the usual misfit, zero, of a tile that is outside most pictures."""
 _DEPTH = 0.15
-"""Standard deviation of the heights of a body's parts, relative to their distance from the pivot."""
+"""Standard deviation of the heights of a body's parts, relative to their distance from the pivot, in a tilted view."""
+_DEPTH_SEEN = 0.3
+"""The same where tiles have centres of their own: an initial value, from which the estimated one follows."""
+_LEAN = 0.3
+"""Initial standard deviation of the gradient of a body's height."""
 
 
-@dataclass(frozen=True)
-class _State:
-    """The unknowns besides the appearance."""
-
-    error: Floats
-    """(2,) of the initial pivot, px."""
-    heights: Floats
-    """(tiles,) px."""
-    turns: Floats
-    """(frames,) rad."""
-
-    def moved(self, step: Floats, lever: float) -> _State:
-        """Return the state after a step whose components are all in px."""
-        error, heights, turns = np.split(step, [2, 2 + len(self.heights)])
-        return _State(self.error + error, self.heights + heights, self.turns + turns / lever)
-
-    def step_to(self, other: _State, lever: float) -> Floats:
-        """Return the step from this state to another, all components in px."""
-        parts = other.error - self.error, other.heights - self.heights, lever * (other.turns - self.turns)
-        return np.concatenate(parts)
-
-
-@dataclass(frozen=True)
-class _Data:
-    """Everything that stays the same from round to round."""
-
-    tiles: Tiles
-    views: Sequence[TileViews]
-    """One for each tile."""
-    start_px: Floats
-    """(2,) the initial pivot."""
-    parallax: Floats
-    prior: CentrePrior
-
-    def centres(self, state: _State) -> Floats:
-        """Return the centre of rotation of each tile, (tiles, 2) px."""
-        return self.start_px + state.error + state.heights[:, None] * self.parallax
-
-    def seen(self, state: _State) -> list[TileViews]:
-        """Return the views with offsets from those centres."""
-        off = state.error + (state.heights - self.tiles.heights)[:, None] * self.parallax
-        return [replace(v, offsets=v.offsets - shift) for v, shift in zip(self.views, off, strict=True)]
-
-
-@dataclass(frozen=True)
-class _Round:
-    """One round: the appearance for a state, and the state that follows from it."""
-
-    appearance: Sequence[TileAppearance]
-    """One for each tile."""
-    hidden: NDArray[np.bool_]
-    """(tiles, frames) views in which something covers the tile."""
-    variance: Floats
-    """(tiles,) mean squared residual, grey levels squared."""
-    covariance: Floats
-    """Of pivot and heights for a known appearance, in units of the pixels' noise."""
-    state: _State
-    fits: TileFit
-    """Of the appearance, in the state for which it was learnt."""
-
-
-def learn_appearance(
-    frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot: PivotEstimate
-) -> BodyAppearance:
-    """Learn the tiles' appearance, the centre of rotation and the angles, all from the same frames.
+def learn_body(
+    frames: Sequence[FrameView], stack: Sequence[FrameView], plane: MotionPlane, pivot: PivotEstimate, noise: float
+) -> BodyAppearance | None:
+    """Choose the body's tiles and learn them, with a common centre of rotation or, on evidence, with heights.
 
     Parameters
     ----------
     frames : sequence of FrameView
         Frames at different angles.
-    tiles : Tiles
-        From `anglecam.vision.registration.tiles.choose_tiles`.
+    stack : sequence of FrameView
+        Those of them that are superposed to find the rigid tiles.
     plane : MotionPlane
         Place of each pixel.
     pivot : PivotEstimate
         Prior of the pivot in the reference frame. Where the body hardly rotates, the data add no information to it.
+    noise : float
+        Standard deviation of the pixels, grey levels.
 
     Returns
     -------
-    BodyAppearance
-        In a frame of reference whose pivot is the learnt one.
+    BodyAppearance or None
+        In a frame of reference whose pivot is the learnt one; ``None`` where too little is rigid and has edges.
     """
+    tiles = choose_tiles(stack, plane, pivot.centre_px, noise)
+    if len(tiles.corners) < _FEWEST_TILES:
+        return None
+    data, last = _learn(frames, tiles, plane, pivot)
+    if not plane.axis.parallax.any():
+        height, width = frames[0].image.shape[:2]
+        deep = replace(plane, axis=axis_in_perspective(plane.lens, (width, height), pivot.centre_px))
+        normal, gradient = _at_the_end(data, last)
+        arms = tiles.corners + TILE_SIDE_PX / 2 - data.centres(last.state)
+        if have_own_centres(normal, gradient, last.state.turns, arms, deep.axis.parallax):
+            tiles = choose_tiles(stack, deep, pivot.centre_px, noise)
+            if len(tiles.corners) >= _FEWEST_TILES:
+                plane, (data, last) = deep, _learn(frames, tiles, deep, pivot)
+    return _body(data, last, plane, moving=frames[0].pivot_covariance_px2 is not None)
+
+
+def _learn(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot: PivotEstimate) -> tuple[Data, Round]:
+    """Learn with the unknowns that the view of the axis leaves free."""
     start = pivot.centre_px
-    lever = float(np.median(np.hypot(*(tiles.corners - start).T)))
-    prior = np.asarray(np.linalg.inv(pivot.covariance_px2), dtype=float)
+    prior = np.eye(3)
+    prior[PIVOT, PIVOT] = np.linalg.inv(pivot.covariance_px2)
+    if plane.axis.estimated:
+        prior[DIRECTION, DIRECTION] = plane.axis.direction_sigma**-2
     views = [
         view_tiles(c[None], h[None], frames, plane, start)[0] for c, h in zip(tiles.corners, tiles.heights, strict=True)
     ]
-    data = _Data(tiles, views, start, plane.lens.parallax, CentrePrior(prior, 1.0 / (_DEPTH * lever) ** 2))
-    last = _iterate(data, _State(np.zeros(2), tiles.heights, np.array([f.turn for f in frames])), lever)
+    data = Data(tiles, views, start, plane.axis, prior)
+    return data, alternate(data, _first_state(frames, tiles, plane, start))
+
+
+def _first_state(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, start_px: Floats) -> State:
+    """Return the state before anything is learnt."""
+    lever, tiles_in_all = float(np.median(np.hypot(*(tiles.corners - start_px).T))), len(tiles.heights)
+    scatter, slope = (_DEPTH_SEEN if plane.axis.estimated else _DEPTH) * lever, float(np.hypot(*plane.axis.parallax))
+    across, bent = (scatter * slope, TILE_SIDE_PX / 2 * slope) if plane.axis.estimated else (1.0, 1.0)
+    scale = np.repeat([1.0, across, 1.0, bent, lever], [2, 1, tiles_in_all, 2 * tiles_in_all, len(frames)])
+    centres = Centres(np.concatenate([np.zeros(3), tiles.heights, np.zeros(2 * tiles_in_all)]))
+    return State(centres, np.array([f.turn for f in frames]), scatter**2, _LEAN**2, scale)
+
+
+def _at_the_end(data: Data, last: Round) -> tuple[Floats, Floats]:
+    """Return normal matrices and gradients, divided by the variances, in the state that the last round found."""
+    fits = compare_all(last.appearance, data.seen(last.state), last.state.turns, data.centres(last.state))
+    return fits.without(last.hidden).weighted(last.variance * last.excess)
+
+
+def _body(data: Data, last: Round, plane: MotionPlane, moving: bool) -> BodyAppearance:
+    """Return the body of the last round with its uncertainties."""
     state, covariance = last.state, last.covariance / (1.0 - _absorbed_of_pivot(data, last))
-    fits = _compare_all(last.appearance, data.seen(state), state.turns, data.centres(state)).without(last.hidden)
-    normal, gradient = fits.weighted(last.variance)
-    groups = group_neighbours(tiles.corners, _GROUPS)
+    normal, gradient = _at_the_end(data, last)
+    corners = data.tiles.corners
+    groups = group_neighbours(corners, _GROUPS)
     total, freedom = group_scatter(normal, gradient, groups)
     # Two estimates of the Birge ratio: disagreement of groups about the angle and, where the camera does not move, the
     # displacement that a body on a fixed pivot cannot have.
     estimates = [total / max(freedom - len(state.turns), 1)]
-    if frames[0].pivot_covariance_px2 is None:
+    if not moving:
         estimates.append(excess_displacement(normal.sum(axis=0), gradient.sum(axis=0)))
     birge = max(1.0, float(np.sqrt(max(estimates))))
-    scores = centre_equations(normal, gradient, state.turns, data.parallax).scores
-    variance_ratio = max(birge**2, disagreement_of_groups(last.covariance, scores, groups))
+    by_unknown = data.by_unknown(state)
+    scores = centre_equations(normal, gradient, state.turns, by_unknown).scores
+    acting = effective_centre(normal, by_unknown)
+    variance_ratio = max(birge**2, disagreement_of_groups(last.covariance, scores, groups, acting))
     information = normal[:, :, 0, 0].sum(axis=1)
     return BodyAppearance(
         tiles=join_tiles(last.appearance),
-        heights=state.heights,
-        plane=plane,
-        pivot_px=start + state.error,
-        pivot_covariance_px2=variance_ratio * covariance[:2, :2],
+        heights=state.centres.heights,
+        plane=replace(plane, axis=data.axis_in(state)),
+        pivot_px=data.start_px + state.centres.pivot,
+        pivot_covariance_px2=variance_ratio * covariance[PIVOT, PIVOT],
+        centre_covariance_px2=variance_ratio * acting @ covariance @ acting.T,
         variance=last.variance,
+        excess=last.excess,
         groups=groups,
         birge=birge,
         absorbed_share=_absorbed_of_turns(data, last),
-        middle_px=information @ (tiles.corners + TILE_SIDE_PX / 2) / information.sum(),
+        middle_px=information @ (corners + TILE_SIDE_PX / 2) / information.sum(),
     )
 
 
-def _iterate(data: _Data, state: _State, lever: float) -> _Round:
-    """Alternate between appearance and state until the centres of rotation settle; return the last round."""
-    appearance = [
-        learn_tile(c, TILE_SIDE_PX, v, state.turns, o)
-        for c, v, o in zip(data.tiles.corners, data.views, data.centres(state), strict=True)
-    ]
-    now = _round(data, state, appearance, None)
-    before: Floats | None = None
-    for done in range(1, _MAX_ROUNDS):
-        step = state.step_to(now.state, lever)
-        if np.hypot(*(data.centres(now.state) - data.centres(state)).T).max() < _SETTLED_PX:
-            break
-        # In a tilted view the heights converge at different rates, so no single ratio exists to extrapolate with.
-        extrapolate = done > _HIDDEN_ROUNDS and before is not None and not data.parallax.any()
-        factor = _aitken_factor(before, step) if extrapolate and before is not None else 1.0
-        state = state.moved(step * factor, lever)
-        # After an extrapolation the ratio is estimated anew, from the next two steps.
-        before = None if extrapolate else step
-        now = _round(data, state, now.appearance, now.hidden if done >= _HIDDEN_ROUNDS else None, now.fits)
-    return now
-
-
-def _round(
-    data: _Data,
-    state: _State,
-    appearance: Sequence[TileAppearance],
-    hidden: NDArray[np.bool_] | None,
-    before: TileFit | None = None,
-) -> _Round:
-    """Learn the appearance for a state, then the state for that appearance."""
-    views, centres = data.seen(state), data.centres(state)
-    before = _compare_all(appearance, views, state.turns, centres) if before is None else before
-    out = _hidden(before) if hidden is None else hidden
-    appearance = [
-        learn_tile(t.corners[0], TILE_SIDE_PX, equalise_brightness(v, light).without(o), state.turns, c, t.gains[0])
-        for t, v, c, light, o in zip(appearance, views, centres, before.light, out, strict=True)
-    ]
-    all_fits = _compare_all(appearance, views, state.turns, centres)
-    fits = all_fits.without(out)
-    variance = fits.squares.sum(axis=1) / np.maximum(fits.count.sum(axis=1), 1)
-    variance = np.maximum(variance, _MIN_VARIANCE * np.median(variance))
-    equations = centre_equations(*fits.weighted(variance), state.turns, data.parallax)
-    step, covariance = solve_centres(equations, data.prior, state.error, state.heights)
-    height_steps = step[2:] if len(step) > 2 else np.zeros(len(state.heights))
-    turn_steps = (equations.turn_scores - equations.cross @ step) / equations.turn_information
-    following = _State(state.error + step[:2], state.heights + height_steps, state.turns + turn_steps)
-    return _Round(appearance, out, variance, covariance, following, all_fits)
-
-
-def _aitken_factor(before: Floats, step: Floats) -> float:
-    """Return the factor 1/(1 − r) from a step to the sum of all that follow, each r times its predecessor."""
-    ratio = float(before[:2] @ step[:2]) / max(float(before[:2] @ before[:2]), 1e-12)
-    return 1.0 / (1.0 - min(ratio, _MAX_ABSORBED)) if ratio > 0.0 else 1.0
-
-
-def _absorbed_of_turns(data: _Data, now: _Round) -> float:
+def _absorbed_of_turns(data: Data, now: Round) -> float:
     """Return the share of an error of the angles, proportional to the angle, that the appearance absorbs."""
     stretch = _STRETCH * (now.state.turns - np.median(now.state.turns))
     stretched = replace(now.state, turns=now.state.turns + stretch)
-    after = _round(data, stretched, now.appearance, now.hidden, now.fits)
+    after = one_round(data, stretched, now.appearance, now.hidden, now.excess, now.fits)
     return float((after.state.turns - now.state.turns) @ stretch / max(float(stretch @ stretch), 1e-18))
 
 
-def _absorbed_of_pivot(data: _Data, now: _Round) -> float:
+def _absorbed_of_pivot(data: Data, now: Round) -> float:
     """Return the share of an error of the pivot, in its least certain direction, that the appearance absorbs."""
-    axis = np.linalg.eigh(now.covariance[:2, :2])[1][:, -1]
-    nudged = replace(now.state, error=now.state.error + _NUDGE_PX * axis)
-    after = _round(data, nudged, now.appearance, now.hidden, now.fits)
-    remaining = float((after.state.error - now.state.error) @ axis) / _NUDGE_PX
-    return float(np.clip(remaining, 0.0, _MAX_ABSORBED))
-
-
-def _compare_all(
-    appearance: Sequence[TileAppearance], views: Sequence[TileViews], turns: Floats, centres: Floats
-) -> TileFit:
-    """Compare every tile with every frame: rows are tiles, columns frames."""
-    fits = [compare_tiles(t, v, turns, c[None]) for t, v, c in zip(appearance, views, centres, strict=True)]
-    return TileFit(
-        np.stack([f.normal for f in fits]),
-        np.stack([f.gradient for f in fits]),
-        np.stack([f.squares for f in fits]),
-        np.stack([f.count for f in fits]),
-        np.stack([f.light for f in fits]),
-    )
-
-
-def _hidden(fits: TileFit) -> NDArray[np.bool_]:
-    """Return the views (tiles, frames) with a large misfit: an object in front of a tile must not be learnt."""
-    mean_square = fits.squares / np.maximum(fits.count, 1)
-    # A tile outside most pictures has no usual misfit; the few views that show it are then marked as hidden.
-    usual = np.maximum(np.median(mean_square, axis=1, keepdims=True), _NO_MISFIT)
-    # Motion blur and the like affect all tiles alike.
-    of_frame = np.maximum(np.median(mean_square / usual, axis=0, keepdims=True), 1.0)
-    return np.asarray((mean_square > HIDDEN_MISFIT * of_frame * usual) | covered_views(fits))
+    axis = np.linalg.eigh(now.covariance[PIVOT, PIVOT])[1][:, -1]
+    nudge = np.zeros(len(now.state.centres.values))
+    nudge[PIVOT] = _NUDGE_PX * axis
+    nudged = replace(now.state, centres=Centres(now.state.centres.values + nudge))
+    after = one_round(data, nudged, now.appearance, now.hidden, now.excess, now.fits)
+    remaining = float((after.state.centres.pivot - now.state.centres.pivot) @ axis) / _NUDGE_PX
+    return float(np.clip(remaining, 0.0, MAX_RATIO))

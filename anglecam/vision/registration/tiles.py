@@ -1,8 +1,8 @@
 """The tiles of the body that are rigid and have edges, and their views in frames.
 
-All places are in the plane of motion (`anglecam.camera.lens`), in which the body rotates without changing its shape. In
-a tilted view, a point of the body that is z nearer to the camera than the pivot rotates around a different centre,
-displaced from the pivot by z·parallax. Each tile therefore has a height.
+All places are in the plane of motion (`anglecam.camera.lens`), in which the body rotates without changing its shape. A
+point of the body that is z nearer to the camera than the pivot rotates around a different centre, where the axis of
+rotation is seen at the height z: displaced from the pivot by z·parallax. Each tile therefore has a height.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.median import median_picture
 from anglecam.vision.image.transforms import rotation
 from anglecam.vision.registration.appearance import TileViews
+from anglecam.vision.registration.axis_view import AxisView
 
 TILE_SIDE_PX = 16
 """Side of a tile, px."""
@@ -63,6 +64,8 @@ class MotionPlane:
     """(height, width, 2) place of each pixel in the plane, px."""
     stretch: float
     """Largest number of picture pixels that one unit of length in the plane covers."""
+    axis: AxisView
+    """How the axis of rotation is seen."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,7 @@ class Tiles:
     corners: Floats
     """(tiles, 2) upper left corners, px; the tile with the most information first."""
     heights: Floats
-    """(tiles,) towards the camera, px; zero in a view that is not tilted."""
+    """(tiles,) towards the camera, px; zero where all heights share one centre."""
 
 
 def motion_plane(lens: Lens, size: tuple[int, int]) -> MotionPlane:
@@ -80,7 +83,7 @@ def motion_plane(lens: Lens, size: tuple[int, int]) -> MotionPlane:
     x, y = np.meshgrid(np.arange(size[0], dtype=float), np.arange(size[1], dtype=float))
     ground = np.ascontiguousarray(lens.rectify(np.stack([x, y], axis=-1)))
     steps = [np.hypot(*np.moveaxis(np.diff(ground, axis=axis), -1, 0)).min() for axis in (0, 1)]
-    return MotionPlane(lens, ground, 1.0 / max(min(steps), 0.1))
+    return MotionPlane(lens, ground, 1.0 / max(min(steps), 0.1), AxisView(lens.parallax))
 
 
 def choose_tiles(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats, noise: float) -> Tiles:
@@ -149,7 +152,7 @@ def view_tiles(
         (views, 2) the tiles' middles in the picture, px.
     """
     offsets, values, starts, centres = [], [], [0], []
-    parallax = heights[:, None] * plane.lens.parallax
+    parallax = heights[:, None] * plane.axis.parallax
     reach = (0.71 * TILE_SIDE_PX + 1.5) * plane.stretch
     for f in frames:
         arm = corners + TILE_SIDE_PX / 2 - pivot_px - parallax
@@ -187,7 +190,7 @@ def _each_rotated(arms: Floats, turns: Floats) -> Floats:
 def _find_heights(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats) -> Floats:
     """Find the height, px, at which each tile of the picture varies least between frames rotated back."""
     height, width = frames[0].image.shape[:2]
-    slope = float(np.hypot(*plane.lens.parallax))
+    slope = float(np.hypot(*plane.axis.parallax))
     if slope == 0.0:
         return np.zeros((height // TILE_SIDE_PX, width // TILE_SIDE_PX))
     grey = [replace(f, image=f.image.mean(axis=2, keepdims=True).astype(np.uint8)) for f in frames[::2]]
@@ -218,7 +221,7 @@ def _stack(
     """
     height, width = frames[0].image.shape[:2]
     x, y = np.meshgrid(np.arange(0.0, width, step), np.arange(0.0, height, step))
-    parallax = np.reshape(heights, (-1, 1)) * plane.lens.parallax
+    parallax = np.reshape(heights, (-1, 1)) * plane.axis.parallax
     arms = np.stack([x, y], axis=-1).reshape(-1, 2) - pivot_px - parallax
     pile, whole = [], np.ones(x.shape, bool)
     for f in frames:

@@ -51,8 +51,13 @@ class BodyAppearance:
     """(2,) centre of rotation in the reference frame, px."""
     pivot_covariance_px2: Floats
     """(2, 2) px²."""
+    centre_covariance_px2: Floats
+    """(2, 2) covariance of the tiles' effective common centre, through which the angles depend on all centres, px²."""
     variance: Floats
     """(tiles,) mean squared residual of each tile, grey levels squared."""
+    excess: Floats
+    """(tiles,) mean square of a tile's displacements in units of its noise; at least 1. A tile whose shape or light the
+    model does not describe counts less."""
     groups: NDArray[np.intp]
     """(tiles,) group of neighbours to which each tile belongs."""
     birge: float
@@ -106,17 +111,18 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
         With the uncertainty caused by noise, scatter between tiles, and copies.
     """
     views, places = view_tiles(body.tiles.corners, body.heights, [view], body.plane, body.pivot_px)
-    centres = body.pivot_px + body.heights[:, None] * body.plane.lens.parallax
+    centres = body.pivot_px + body.heights[:, None] * body.plane.axis.parallax
     turn = view.turn
     for _ in range(_MAX_STEPS):
-        fit = compare_tiles(body.tiles, views, np.full(len(body.tiles), turn), centres)
+        fit = compare_tiles(body.tiles, views, np.full(len(body.tiles), turn), centres).rigid()
         mean_square = np.where(fit.count > 0, fit.squares / np.maximum(fit.count, 1), np.inf)
         # Motion blur and the like affect all tiles alike, a hand or a hair only some.
         usual = float(np.median(mean_square / body.variance))
         clear = (mean_square < HIDDEN_MISFIT * max(usual, 1.0) * body.variance) & ~covered_views(fit)
         if not clear.any() or not np.isfinite(usual):
             return NO_TURN
-        each = fit.weighted(np.where(clear, body.variance * max(usual, 1.0), np.inf))
+        variance = np.where(clear, body.variance * max(usual, 1.0), np.inf)
+        each = fit.weighted(variance * body.excess)
         normal, gradient = each[0].sum(axis=0), each[1].sum(axis=0)
         noise_share = 1.0
         if view.pivot_covariance_px2 is not None:
@@ -128,12 +134,14 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
         if abs(step) < _SETTLED:
             break
     pivot_sensitivity = -normal[0, 1:] @ (np.eye(2) - rotation(turn)) / normal[0, 0]
-    noise = 1 / float(np.sqrt(normal[0, 0]))
+    whole = 1 / float(np.sqrt(normal[0, 0]))
+    # of this, the part of the pixels' noise: the tiles are weighted by more than their noise
+    noise = whole * float(np.sqrt((each[0][:, 0, 0] / body.excess).sum() / each[0][:, 0, 0].sum()))
     # A frame that a codec distorts more than others scatters more between its tiles. So few tiles estimate this only
     # roughly, hence the weighted mean.
     total, freedom = group_scatter(each[0][:, None], each[1][:, None], body.groups)
     birge2 = (_CLIP_FREEDOM * body.birge**2 + total) / (_CLIP_FREEDOM + max(freedom - 1, 0))
-    pose2 = noise_share * noise**2 * max(birge2 - 1, 0.0)
+    pose2 = noise_share * max(birge2 * whole**2 - noise**2, 0.0)
     if before is not None:
         misfit = noise * np.sqrt(noise_share * fit.count[clear].sum())
         pose2 += (_COPY * _copied_share(view.image, before, places[clear]) * misfit) ** 2
@@ -181,7 +189,7 @@ def refine_doubtful_turn(body: BodyAppearance, view: FrameView, reach_px: float)
     FrameView
         With the angle that fits best, or unchanged where no other fits distinctly better.
     """
-    centres = body.pivot_px + body.heights[:, None] * body.plane.lens.parallax
+    centres = body.pivot_px + body.heights[:, None] * body.plane.axis.parallax
     step = 1.0 / float(np.hypot(*(body.middle_px - body.pivot_px)))
     tries = [replace(view, turn=view.turn + k * step) for k in range(-int(reach_px), int(reach_px) + 1)]
 

@@ -118,7 +118,7 @@ class BackgroundMotion:
         for _ in range(_MAX_STEPS):
             rolls[:] = roll
             views = as_views(cuts.pixels[0] - origin - shift, cuts.values[0])
-            fit = compare_tiles(self.tiles, views, rolls, origins)
+            fit = compare_tiles(self.tiles, views, rolls, origins).rigid()
             # Another object's edge may fit in shape, but not in contrast.
             seen = cuts.whole[0] & (fit.count > 0) & (np.abs(fit.light[:, 0, 0]) < _MAX_LIGHT_CHANGE)
             if not seen.any():

@@ -152,13 +152,13 @@ def _alternate(
             of_tile = light[t]
             views = as_views(offsets[clear[:, t], t], cuts.values[clear[:, t], t])
             views = views if of_tile is None else equalise_brightness(views, of_tile[clear[:, t]])
-            tile = learn_tile(corner, WINDOW_SIDE_PX, views, rolls[clear[:, t]], origin)
+            tile = learn_tile(corner, WINDOW_SIDE_PX, views, rolls[clear[:, t]], origin, np.zeros(2), np.zeros(2))
             # The camera's motion does not change the light on the scenery.
             tile = replace(tile, gains=0.0 * tile.gains)
             if remaining >= sharp:
                 tile = replace(tile, coefficients=_blurred(tile.coefficients))
             tiles.append(tile)
-            fits.append(compare_tiles(tile, as_views(offsets[:, t], cuts.values[:, t]), rolls, origin[None]))
+            fits.append(compare_tiles(tile, as_views(offsets[:, t], cuts.values[:, t]), rolls, origin[None]).rigid())
             light[t] = fits[-1].light
         clear, variance = _clear_views(fits, cuts, absorbed)
         weight = clear.T / variance[:, None]
