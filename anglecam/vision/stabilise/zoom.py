@@ -23,6 +23,9 @@ _MIN_SHARE = 0.3
 """Least share of the windows that must follow. A textured body may have most of the others."""
 _MIN_KNOWN = 0.25
 """Least share of the frames in which a scale is found: a body may hide most of the scenery in the others."""
+_SIGNIFICANT = 5.0
+"""Change of scale, in its standard uncertainties, that counts: a smooth wall determines the scale badly, and the errors
+of neighbouring windows are correlated."""
 _INNER = (0.05, 0.95)
 """Quantiles taken for the smallest and the largest scale: single frames may be wrong."""
 _EDGE_PX = 1.0
@@ -51,21 +54,27 @@ def camera_zoom(images: Sequence[Image]) -> float | None:
     if len(centres) < _MIN_WINDOWS:
         return None
     scales = [_scale(centres, follow_windows(pictures[0], picture, centres)) for picture in pictures[1:]]
-    known = [1.0, *(scale for scale in scales if scale is not None)]
-    if len(known) < _MIN_KNOWN * len(images):
+    known = [scale for scale in scales if scale is not None]
+    if not known or len(known) + 1 < _MIN_KNOWN * len(images):
         return None
-    low, high = np.quantile(known, _INNER)
+    low, high = np.quantile([1.0, *(scale for scale, _ in known)], _INNER)
     zoom = float(high / low)
     reach = float(np.hypot(*pictures[0].shape[:2])) / 2.0
-    return zoom if (zoom - 1.0) * reach > _EDGE_PX else None
+    sigma = float(np.sqrt(2.0) * np.median([sigma for _, sigma in known]))
+    return zoom if zoom - 1.0 > max(_EDGE_PX / reach, _SIGNIFICANT * sigma) else None
 
 
-def _scale(centres: Floats, moved: Floats) -> float | None:
-    """Return the scale of the similarity that most windows follow; ``None`` where fewer do."""
+def _scale(centres: Floats, moved: Floats) -> tuple[float, float] | None:
+    """Return scale and its sigma of the similarity that most windows follow; ``None`` where fewer do."""
     cv2.setRNGSeed(0)
     matrix, follows = cv2.estimateAffinePartial2D(
         centres, centres + moved, method=cv2.RANSAC, ransacReprojThreshold=2.0 * TOLERANCE_PX, maxIters=500
     )
     if matrix is None or follows.mean() < _MIN_SHARE or follows.sum() < _MIN_WINDOWS:
         return None
-    return float(np.hypot(matrix[0, 0], matrix[1, 0]))
+    kept = follows.ravel().astype(bool)
+    start, end = centres[kept], (centres + moved)[kept]
+    off = end - (start @ matrix[:, :2].T + matrix[:, 2])
+    freedom = max(2 * len(start) - 4, 1)
+    spread = float(((start - start.mean(axis=0)) ** 2).sum())
+    return float(np.hypot(matrix[0, 0], matrix[1, 0])), float(np.sqrt((off**2).sum() / freedom / spread))
