@@ -3,8 +3,8 @@
 Bit for bit equal pictures are no proof, because a codec repeats what does not change. Nor are different pictures proof
 of the contrary: a converter encodes the repeated picture anew, and a filter adds new noise to it. So the motion
 decides: the angle stands still, within its noise, between frames in which it moves, and a smooth curve through the
-frames around passes elsewhere. A mechanism that pauses for one frame only is taken for a repeated frame as well, because
-no picture can tell the two apart; nothing is then stated for the frame.
+frames around passes elsewhere. A mechanism that pauses for one frame only is taken for a repeated frame as well,
+because no picture can tell the two apart; nothing is then stated for the frame.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ _CATCH_UP = (0.6, 1.6)
 """Share of the missed way that the first new frame must show to tell a longer stop of the film from one of the
 mechanism, which goes on as it began, or starts anew."""
 _EVEN = 2.0
-"""Factor within which the motion is even: a mechanism that comes to rest slows down by more from frame to frame, and one
-that starts anew gets faster."""
+"""Factor within which the motion is even: a mechanism that comes to rest slows down by more from frame to frame, and
+one that starts anew gets faster."""
 
 
 def duplicate_frames(line: Floats, noise: Floats, repeated: Flags) -> list[int]:

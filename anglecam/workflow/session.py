@@ -19,7 +19,9 @@ from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import read_series, write_series
 from anglecam.io.session import SERIES_ENDING, Recording, Session
-from anglecam.measurement.clock_sync import note_on, offsets, on_clip_clock
+from anglecam.measurement.clip import Measurement
+from anglecam.measurement.clock_sync import DARK, note_on, offsets, on_clip_clock
+from anglecam.measurement.tracks import MeasuredTracks
 from anglecam.measurement.trust import why_few
 from anglecam.measurement.uncorrected import uncorrected
 from anglecam.workflow.clip import measure_source, open_recording
@@ -117,11 +119,16 @@ def measure_session(
         measurement = measure_source(source, progress=lambda done, total: progress(name, done, total))
         if out is not None:
             write_series(measurement.series, out / f"{name}{SERIES_ENDING}")
-        notes.extend(f"{recording.source}: {note}" for note in measurement.notes)
+        notes.extend(f"{recording.source}: {note}" for note in measurement.notes if note != _dated_alone(measurement))
         return measurement.series, measurement.truncated
 
     gathered = gather_session(session, measured)
     return replace(gathered, notes=(*notes, *gathered.notes))
+
+
+def _dated_alone(measurement: Measurement | MeasuredTracks) -> str | None:
+    """Return what a clip says about its clock by its own lamp; the lamps of all clips together say it better."""
+    return measurement.clock if isinstance(measurement, Measurement) and measurement.clock != DARK else None
 
 
 def gather_session(

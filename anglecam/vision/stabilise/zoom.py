@@ -50,7 +50,8 @@ def camera_zoom(images: Sequence[Image]) -> float | None:
     if len(images) < 2:
         return None
     pictures = [subtract_local_mean(brightness(image)) for image in images]
-    centres, _ = find_windows(brightness(images[0]), pixel_noise(pictures))
+    # slopes that the subtraction removes determine no place
+    centres, _ = find_windows(pictures[0], pixel_noise(pictures))
     if len(centres) < _MIN_WINDOWS:
         return None
     scales = [_scale(centres, follow_windows(pictures[0], picture, centres)) for picture in pictures[1:]]
