@@ -15,6 +15,8 @@ from av.filter import Graph
 
 from anglecam.data.typing import Image
 
+STILL_CODECS = ("png", "apng", "gif")
+"""What these call interlaced is an order of transmission: all lines of their pictures are of one instant."""
 _BOTTOM_FIRST = (3, 4)
 """FFmpeg's AV_FIELD_BB and AV_FIELD_TB: the second, fourth, … line was exposed first."""
 _BETWEEN = np.array([1.0, -5.0, 20.0, 20.0, -5.0, 1.0]) / 32.0

@@ -26,7 +26,7 @@ from anglecam.io.rig import RigFrames
 from anglecam.video.container import open_container
 from anglecam.video.decode import Row, decode, decode_container, to_brightness, to_colours
 from anglecam.video.display import Display, read_display
-from anglecam.video.fields import fill_rows, first_field, is_bottom_first
+from anglecam.video.fields import STILL_CODECS, fill_rows, first_field, is_bottom_first
 from anglecam.video.images import decode_images
 from anglecam.video.truncation import is_cut_short
 
@@ -90,8 +90,9 @@ class Film:
     """Whether bytes are missing at the end of the file."""
     decode: Callable[[], Iterator[Row]] = field(repr=False)
     """Decodes all its rows from the start, because seeking may end on a wrong frame."""
-    bottom_first: bool = False
-    """Whether the second line of an interlaced picture belongs to its first field."""
+    bottom_first: bool | None = None
+    """Whether the second line of an interlaced picture belongs to its first field; ``None`` where all lines of a
+    picture are of one instant, as in photographs."""
     wanted: RigFrames = field(default_factory=RigFrames)
     """Which frames are measured: only these are yielded."""
     _memory: _Memory = field(default_factory=_Memory, repr=False)
@@ -203,13 +204,11 @@ class Film:
 
     def _shown(self, picture: av.VideoFrame, brightness: bool = False) -> Image:
         """Return a picture as a player shows it, of an interlaced one the first field."""
-        interlaced = picture.interlaced_frame
-        if interlaced:
-            picture = first_field(picture, self.bottom_first)
-        image = to_brightness(picture) if brightness else to_colours(picture)
-        if interlaced:
-            image = fill_rows(image, self.display.stored_size[1], self.bottom_first)
-        return self.display.show(image)
+        convert = to_brightness if brightness else to_colours
+        if self.bottom_first is None or not picture.interlaced_frame:
+            return self.display.show(convert(picture))
+        field = convert(first_field(picture, self.bottom_first))
+        return self.display.show(fill_rows(field, self.display.stored_size[1], self.bottom_first))
 
     def _read_once(self) -> None:
         """Read the film unless it was read completely before."""
@@ -230,7 +229,7 @@ class Film:
         for row in self._decoded():
             times.append(row[0])
             undecodable += row[1] is None
-            interlaced += row[1] is not None and row[1].interlaced_frame
+            interlaced += self.bottom_first is not None and row[1] is not None and row[1].interlaced_frame
             room -= _bytes(row)
             if room >= 0:
                 rows.append(row)
@@ -291,7 +290,7 @@ def open_film(path: Path, frames: RigFrames | None = None) -> Film:
             coarse_colour=coarse_colour,
             cut_short=is_cut_short(path),
             decode=partial(decode, path),
-            bottom_first=is_bottom_first(stream.codec_context.field_order),
+            bottom_first=None if codec in STILL_CODECS else is_bottom_first(stream.codec_context.field_order),
             wanted=wanted,
         )
 

@@ -11,7 +11,7 @@ import numpy as np
 
 LOSSLESS = {"codec": "libx264rgb", "pix_fmt": "bgr24", "options": {"qp": "0", "preset": "ultrafast"}}
 """H.264 without loss, in colours at full resolution, for MP4."""
-_INTERLACED_DCT, _INTERLACED_ME = 1 << 18, 1 << 29
+INTERLACED_DCT, INTERLACED_ME = 1 << 18, 1 << 29
 """FFmpeg's AV_CODEC_FLAG_INTERLACED_DCT and _ME."""
 
 
@@ -47,7 +47,7 @@ def encode(
                 elif rotation or hflip:
                     stream.set_display_rotation(rotation, hflip=hflip)
                 if interlaced:
-                    stream.codec_context.flags |= _INTERLACED_DCT | _INTERLACED_ME
+                    stream.codec_context.flags |= INTERLACED_DCT | INTERLACED_ME
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
     return path

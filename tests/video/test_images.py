@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
+import av
 import cv2
 import numpy as np
 import pytest
@@ -11,6 +14,7 @@ from anglecam.io.rig import RigFrames
 from anglecam.video.film import open_film
 from anglecam.workflow.clip import measure_source, open_source
 from support import things
+from support.encoded import INTERLACED_DCT
 
 AT_50_HZ = RigFrames(rate_hz=50.0)
 
@@ -73,6 +77,23 @@ def test_a_picture_of_a_phone_held_upright_is_shown_upright(tmp_path):
     image = next(film.frames()).image
     assert image[48, 36].min() > 240  # below right
     assert image[16, 36].max() < 15
+
+
+def test_a_progressive_png_is_not_taken_for_an_interlaced_film(tmp_path):
+    """PNG may transmit its lines in an interlaced order; FFmpeg flags them as it flags fields."""
+    encoder = av.CodecContext.create("png", "w")
+    encoder.width, encoder.height, encoder.pix_fmt, encoder.time_base = 64, 48, "rgb24", Fraction(1, 30)
+    encoder.flags |= INTERLACED_DCT
+    (picture,) = _random(1)
+    frame = av.VideoFrame.from_ndarray(picture, format="bgr24").reformat(format="rgb24")
+    for k in range(2):
+        frame.pts = k
+        (packet,) = encoder.encode(frame)
+        (tmp_path / f"a{k}.png").write_bytes(bytes(packet))
+    film = open_film(tmp_path, AT_50_HZ)
+    for shown in film.frames():
+        np.testing.assert_array_equal(shown.image, picture)
+    assert film.interlaced == 0
 
 
 def test_pictures_of_two_sizes_are_two_films(tmp_path):
