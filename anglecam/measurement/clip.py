@@ -22,6 +22,7 @@ from anglecam.data.typing import Floats
 from anglecam.io.rig import Rig
 from anglecam.io.session import recording_name
 from anglecam.measurement.angles import Angles, coarse_angles, turns
+from anglecam.measurement.carried_marks import carried_marks, smeared_marks, with_marks
 from anglecam.measurement.clock_sync import DARK, note_on, offset_of, on_clip_clock, see_lamp
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.duplicates import duplicate_frames
@@ -33,9 +34,6 @@ from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.measurement.trust import require_rotation, why_few
 from anglecam.video.film import Film
 from anglecam.vision.mark.outline_turn import outline_turn
-
-_CARRIED_PX = 1.0
-"""Largest distance of a smeared mark from the position predicted by the body's rotation, px; beyond, it is hidden."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +137,10 @@ def measure_clip(
             registered = replace(registered, turn=registered.turn - _rolls(detections))
             start = replace(start, turn=start.turn - _rolls(detections))
             found = np.isfinite(registered.turn)
-            ok = ok | (found & _carried_along(detections, start, registered, angles))
+            ok |= found & smeared_marks(detections, start, registered, float(np.median(angles.lever_px)))
+            carried = carried_marks(detections, ok, registered)
+            detections = with_marks(detections, carried)
+            ok |= np.array([region is not None for region in carried])
             row = np.where(found, registered.row, row)
             time = measurement_time(detections.time, row, detections.size[1], rig.camera.row_time_s)
             angles = coarse_angles(detections, ok, time, rig, command)
@@ -204,18 +205,6 @@ def _mark_rows(detections: Detections) -> Floats:
     return np.asarray(detections.in_picture(places)[:, 1])
 
 
-def _carried_along(detections: Detections, start: Start, registered: Registered, angles: Angles) -> NDArray[np.bool_]:
-    """Return the smeared frames whose mark is at the position predicted by the body's rotation: blurred, not hidden."""
-    off = registered.turn - start.turn - start.turn_per_row * (registered.row - start.row)
-    sure, lever = np.isfinite(start.sigma) & np.isfinite(off), float(np.median(angles.lever_px))
-    nowhere = np.full(2, np.nan)
-    places = np.array([nowhere if r is None else r.centre_px for r in detections.regions])
-    outward = np.hypot(*(places - detections.pivot.centre_px).T) - lever
-    along = (off - np.median(off[sure])) * lever
-    with np.errstate(invalid="ignore"):
-        return np.asarray(detections.smeared & (np.hypot(along, outward) < _CARRIED_PX))
-
-
 def _start(detections: Detections, ok: NDArray[np.bool_], time: Floats, row: Floats, angles: Angles, rig: Rig) -> Start:
     """Return the coarse rotation in all frames, as the fine pass starts from it."""
     n = len(time)
@@ -229,8 +218,10 @@ def _start(detections: Detections, ok: NDArray[np.bool_], time: Floats, row: Flo
         near -= 2.0 * np.pi * np.round(near / (2.0 * np.pi))
         turn[guessed] = near if rig.facing == "right" else -near
     known = np.isfinite(turn)
+    turn = np.interp(time, time[known], turn[known])
+    row = np.interp(time, time[known], row[known])
     if rig.camera.row_time_s is not None and known.sum() > 1:
-        speed[known] = np.gradient(turn[known], time[known])
+        speed = np.gradient(turn, time)
     pivots, covariance = np.broadcast_to(detections.pivot.centre_px, (n, 2)), None
     if detections.camera_moves is not None:
         pivots = detections.lens.rectify(detections.in_picture(pivots))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from anglecam.camera.lens import Lens
-from anglecam.data.typing import Floats, Image
+from anglecam.data.typing import Flags, Floats, Image
 from anglecam.video.film import Film
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.estimate import PivotEstimate
@@ -81,6 +81,10 @@ class Registered:
     """Standard uncertainty shared by all frames of the same pose, rad."""
     pivot_sensitivity: Floats
     """(n, 2) derivative of the rotation with respect to the pivot's position, rad/px."""
+    misfit: Floats
+    """Median misfit of the body's parts, relative to the usual one; infinite where it was not found."""
+    clear: Flags
+    """(n, tiles) which parts of the body are visible."""
     row: Floats
     """Row of the picture at whose exposure ``turn`` holds."""
     pivot_px: Floats
@@ -157,7 +161,7 @@ def register_clip(
                 rows[i] = appearance.row_of_middle(one)
                 one = replace(one, turn=one.turn + one.turn_per_row * (rows[i] - one.row), row=rows[i])
             if np.isnan(start.sigma[i]):
-                one = refine_doubtful_turn(appearance, one, _DOUBT_PX)
+                one = refine_doubtful_turn(appearance, _going_on(one, found, i), _DOUBT_PX)
             found[i] = find_turn(appearance, one, before if frame.predicted else None)
         before = image
         if progress is not None:
@@ -177,6 +181,12 @@ def _frame_view(start: Start, i: int, image: Image) -> FrameView:
     return FrameView(
         image, float(start.turn[i]), start.pivots_px[i], float(start.turn_per_row[i]), float(start.row[i]), covariance
     )
+
+
+def _going_on(view: FrameView, found: list[TurnEstimate], i: int) -> FrameView:
+    """Return a view at the angle at which the motion of the two frames before would go on, if they are known."""
+    ahead = 2.0 * found[i - 1].turn - found[i - 2].turn if i > 1 else np.nan
+    return view if np.isnan(ahead) else replace(view, turn=ahead)
 
 
 def _spread_out(turn: Floats, known: NDArray[np.intp], most: int) -> set[int]:
@@ -201,6 +211,8 @@ def _gathered(found: list[TurnEstimate], rows: Floats, appearance: BodyAppearanc
         noise=np.array([one.noise for one in found]),
         pose=np.array([one.pose for one in found]),
         pivot_sensitivity=np.array([one.pivot_sensitivity for one in found]),
+        misfit=np.array([one.misfit for one in found]),
+        clear=np.array([one.clear if len(one.clear) else np.zeros(len(appearance.heights), bool) for one in found]),
         row=rows,
         pivot_px=appearance.pivot_px,
         pivot_covariance_px2=appearance.centre_covariance_px2,

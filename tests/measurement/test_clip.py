@@ -295,3 +295,21 @@ def test_a_mouth_that_rests_in_two_places_is_found_though_the_hint_is_far_from_i
     measured = measure_clip(open_film(_film(tmp_path, look, held)), rig)
     assert set(measured.series.status) == {"ok"}
     assert np.hypot(*(measured.angles.pivot.centre_px - look.pivot)) < 3.0
+
+
+def test_a_red_thing_that_touches_the_mark_covers_nothing_and_the_body_measures_on(tmp_path):
+    look = Look()
+    beside = 6.0  # degrees above rest, where the mark passes the thing
+
+    def place(frames, mouths):
+        x, y = look.mouth(np.array([beside]))[0].round().astype(int)
+        for frame in frames:
+            cv2.rectangle(frame, (x + 22, y - 4), (x + 40, y + 4), look.lips_rgb[::-1], -1)
+
+    measured = measure_clip(open_film(_film(tmp_path, look, edit=place)), _rig(look), REST)
+    by_mark = detect_mark(open_film(tmp_path / "clip.avi"), _rig(look))
+    assert by_mark.status.count("occluded") >= 2
+    assert measured.series.ok.all()
+    error, sigma = _errors(measured.series, SWING)
+    assert np.abs(error).max() < 0.02
+    assert np.sqrt(np.mean((error / sigma) ** 2)) < 2.0

@@ -87,9 +87,13 @@ class TurnEstimate:
     the body is at the same place."""
     pivot_sensitivity: Floats
     """(2,) change of the angle with an error of the pivot, rad/px."""
+    misfit: float
+    """Median over the tiles of their mean squared residual, relative to the usual one."""
+    clear: NDArray[np.bool_]
+    """(tiles,) which tiles are visible; none where ``turn`` is NaN."""
 
 
-NO_TURN = TurnEstimate(np.nan, np.nan, np.nan, np.full(2, np.nan))
+NO_TURN = TurnEstimate(np.nan, np.nan, np.nan, np.full(2, np.nan), np.inf, np.zeros(0, bool))
 """For a frame in which the body is not visible."""
 
 
@@ -145,7 +149,7 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
     if before is not None:
         misfit = noise * np.sqrt(noise_share * fit.count[clear].sum())
         pose2 += (_COPY * _copied_share(view.image, before, places[clear]) * misfit) ** 2
-    return TurnEstimate(float(turn), noise, float(np.sqrt(pose2)), pivot_sensitivity)
+    return TurnEstimate(float(turn), noise, float(np.sqrt(pose2)), pivot_sensitivity, usual, clear)
 
 
 def _eliminate_pivot(normal: Floats, gradient: Floats, covariance_px2: Floats) -> tuple[Floats, Floats, float]:
