@@ -194,7 +194,7 @@ def _steadiness(followed: MarkTrack, circle: tuple[Floats, float]) -> float:
     centre, radius = circle if followed.circle is None else (followed.circle.centre_px, followed.circle.radius_px)
     off = np.hypot(*(np.array(places) - centre).T) - radius
     travel = float(np.hypot(*np.ptp(places, axis=0)))
-    return travel / (travel + _STEADY * float(np.sqrt((off**2).mean())))
+    return travel / (travel + _STEADY * float(np.sqrt((off**2).mean()))) if travel > 0.0 else 0.0
 
 
 def _contrast_range(maps: Sequence[NDArray[Any]], at_rest: bool) -> tuple[float, float]:
