@@ -19,6 +19,7 @@ from anglecam.io.rig import Rig
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.registration_pass import Registered
 from anglecam.measurement.sigma import PlaceErrors, angle_sigma, place_errors
+from anglecam.vision.image.transforms import rotate_each
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 
@@ -180,8 +181,7 @@ def _angles_of_body(
     """Return the angles of the line from the pivot to the middle of the rigid body."""
     turn, sigma = body.turn[ok], body.sigma[ok]
     arm = detections.lens.rectify(body.centre_px) - detections.pivot.centre_px
-    c, s = np.cos(turn), np.sin(turn)
-    mark = detections.pivot.centre_px + np.column_stack([c * arm[0] + s * arm[1], -s * arm[0] + c * arm[1]])
+    mark = detections.pivot.centre_px + rotate_each(arm, turn)
     signed = turn if rig.facing == "right" else -turn
     line = float(np.arctan2(-arm[1], _ahead(arm[:1], rig)[0])) + signed
     lever = np.full(len(turn), float(np.hypot(*arm)))

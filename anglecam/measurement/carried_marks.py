@@ -11,11 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from anglecam.data.series import OK
 from anglecam.data.typing import Flags, Floats
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.registration_pass import Registered, Start
-from anglecam.vision.image.transforms import rotation
+from anglecam.vision.image.transforms import rotate_each, rotation
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.registration.tiles import TILE_SIDE_PX
 
@@ -31,7 +30,7 @@ the body leaves the poses in which it was learnt."""
 def smeared_marks(detections: Detections, start: Start, registered: Registered, lever_px: float) -> Flags:
     """Return the smeared frames (n,) whose mark is where the body's rotation predicts it: blurred, not hidden."""
     off = registered.turn - start.turn - start.turn_per_row * (registered.row - start.row)
-    outward = np.hypot(*(_places(detections) - detections.pivot.centre_px).T) - lever_px
+    outward = np.hypot(*(detections.places_px - detections.pivot.centre_px).T) - lever_px
     along = (off - np.median(off[np.isfinite(start.sigma) & np.isfinite(off)])) * lever_px
     with np.errstate(invalid="ignore"):
         return np.asarray(detections.smeared & (np.hypot(along, outward) < _CARRIED_PX))
@@ -58,8 +57,8 @@ def carried_marks(detections: Detections, ok: Flags, registered: Registered) -> 
     known = np.flatnonzero(ok & np.isfinite(registered.turn))
     if not len(known):
         return tuple(regions)
-    arms = _places(detections)[known] - registered.pivot_px
-    at_mark = np.median(_rotated(arms, -registered.turn[known]), axis=0)
+    arms = detections.places_px[known] - registered.pivot_px
+    at_mark = np.median(rotate_each(arms, -registered.turn[known]), axis=0)
     moments = np.array([r.moments_px2 for i in known if (r := detections.regions[i]) is not None])
     half = 2.0 * np.sqrt(np.median(np.linalg.eigvalsh(moments)[:, -1]))  # of an ellipse's length
     middles = registered.appearance.tiles.corners + TILE_SIDE_PX / 2 - registered.appearance.pivot_px
@@ -81,19 +80,7 @@ def carried_marks(detections: Detections, ok: Flags, registered: Registered) -> 
 def with_marks(detections: Detections, regions: Sequence[Region | None]) -> Detections:
     """Return the detections with the given marks in place of their own."""
     both = [own if region is None else region for own, region in zip(detections.regions, regions, strict=True)]
-    status = [s if region is None else OK for s, region in zip(detections.status, regions, strict=True)]
-    return replace(detections, regions=tuple(both), status=tuple(status))
-
-
-def _places(detections: Detections) -> Floats:
-    """Return (n, 2) the mark's place in each frame, NaN where it is not found."""
-    nowhere = np.full(2, np.nan)
-    return np.array([nowhere if r is None else r.centre_px for r in detections.regions])
-
-
-def _rotated(arms: Floats, turns: Floats) -> Floats:
-    """Rotate (n, 2) arms counter-clockwise as seen by (n,) angles, rad."""
-    return np.asarray(np.einsum("ni,nij->nj", arms, rotation(turns)))
+    return replace(detections, regions=tuple(both))
 
 
 def _turned(region: Region, turn: float, pivot_px: Floats) -> Region:

@@ -18,7 +18,7 @@ from anglecam.camera.shutter import measurement_time, rig_as_shown
 from anglecam.data.camera_evidence import CameraEvidence
 from anglecam.data.command import Command
 from anglecam.data.series import OK, AngleSeries
-from anglecam.data.typing import Floats
+from anglecam.data.typing import Flags, Floats
 from anglecam.io.rig import Rig
 from anglecam.io.session import recording_name
 from anglecam.measurement.angles import Angles, coarse_angles, turns
@@ -34,6 +34,9 @@ from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.measurement.trust import require_rotation, why_few
 from anglecam.video.film import Film
 from anglecam.vision.mark.outline_turn import outline_turn
+
+_AGREE = 2.0
+"""Standard uncertainties by which two measurements of the rotation may differ."""
 
 
 @dataclass(frozen=True)
@@ -82,9 +85,12 @@ class Measurement:
     @property
     def notes(self) -> tuple[str, ...]:
         """Messages to the user, a line each."""
-        coarse = () if self.why_coarse is None else (f"measured on the {self.by} alone: {self.why_coarse}",)
-        found = (note for note in (self.interlaced, self.zero, self.clock) if note is not None)
-        return (*self.detections.notes, *coarse, *found)
+        coarse = None if self.why_coarse is None else f"measured on the {self.by} alone: {self.why_coarse}"
+        doubt = (
+            None if self.why_coarse is None else self.detections.pivot.doubt
+        )  # the whole body shows the pivot itself
+        found = (doubt, coarse, self.interlaced, self.zero, self.clock)
+        return (*self.detections.notes, *(note for note in found if note is not None))
 
     @property
     def contours_px(self) -> tuple[NDArray[np.int32] | None, ...]:
@@ -152,7 +158,8 @@ def measure_clip(
             if isinstance(body, Detections):
                 rigid = np.array([s == OK for s in body.status])
                 other = coarse_angles(body, rigid, body.time, rig, command)
-                if (other.sigma**2).mean() < (angles.sigma**2).mean():
+                surer = (other.sigma**2).mean() < (angles.sigma**2).mean()
+                if surer and _agree(angles, ok, other, rigid, rig):
                     detections, ok, time, angles = body, rigid, body.time, other
     require_rotation(film.path, detections, ok, angles, rig)
     series = _series(film.path, rig, time, detections, ok, angles, lamp)
@@ -178,6 +185,14 @@ def _pivot_from_path_alone(detections: Detections, rig: Rig) -> bool:
     return followable and detections.marker is None and rig.pivot.expected is None
 
 
+def _agree(one: Angles, ok: Flags, other: Angles, other_ok: Flags, rig: Rig) -> bool:
+    """Return whether two measurements of the rotation agree within their uncertainty."""
+    both = ok & other_ok
+    apart = turns(one, rig)[both[ok]] - turns(other, rig)[both[other_ok]]
+    expected = one.sigma[both[ok]] ** 2 + other.sigma[both[other_ok]] ** 2
+    return bool(both.any()) and float(apart.var()) < _AGREE**2 * float(expected.mean())
+
+
 def _in_all_frames(ok: NDArray[np.bool_], places_px: Floats) -> Floats:
     """Arrange the positions of the measured frames in all frames; NaN elsewhere."""
     placed = np.full((len(ok), 2), np.nan)
@@ -196,12 +211,10 @@ def _rolls(detections: Detections) -> Floats:
 
 def _mark_rows(detections: Detections) -> Floats:
     """Return (n,) rows of the picture in which the mark was found, px."""
-    nowhere = np.full(2, np.nan)
-    places = np.array([nowhere if r is None else r.centre_px for r in detections.regions])
+    places = detections.places_px
     if detections.body is not None:
-        places = np.where(
-            np.isfinite(detections.body.turn)[:, None], detections.lens.rectify(detections.body.centre_px), nowhere
-        )
+        seen = np.isfinite(detections.body.turn)[:, None]
+        places = np.where(seen, detections.lens.rectify(detections.body.centre_px), np.nan)
     return np.asarray(detections.in_picture(places)[:, 1])
 
 

@@ -67,6 +67,12 @@ class Detections:
     notes: tuple[str, ...]
     """Messages to the user, a line each."""
 
+    @property
+    def places_px(self) -> Floats:
+        """(frames, 2) position of the mark in the plane of motion, px; NaN where it is not found."""
+        nowhere = np.full(2, np.nan)
+        return np.array([nowhere if r is None else r.centre_px for r in self.regions])
+
     def in_picture(self, places_px: Floats) -> Floats:
         """Return the picture positions, px, of (frames, 2) positions in the plane of motion, one for each frame."""
         filmed = self.lens.distort(places_px)

@@ -39,7 +39,12 @@ _FEWEST = 12
 """A body seen in fewer frames is not learnt."""
 _YIELDING = 0.5
 """Of `BodyAppearance.absorbed_share`: 0.05 to 0.1 in clips of steps and swings, 0.8 in a swing of 70° with six frames
-on the way."""
+on the way. It is far below zero where the motion hardly determines the appearance."""
+_UNKNOWN_LEVER = 0.05
+"""Relative uncertainty of the lever arm, by the pivot's, from which on the body's own rotation has to determine it."""
+_OWN_ROTATION_PX = 2.0
+"""Least displacement, by its own rotation, of the body's parts against each other, px. Edges that are misplaced by
+0.05 px change the lever arm by more than 2.5 % where it is less."""
 _DOUBT_PX = 10.0
 """Largest error of a guessed rotation, px at the mark."""
 _AGREE = 4.0
@@ -143,9 +148,12 @@ def register_clip(
         appearance = learn_body(views, [views[i] for i in stack], plane, start.pivot, noise)
     if appearance is None:
         return "too little of the body is rigid and has edges"
+    turned = float(np.ptp([view.turn for view in views]))
     del views
-    if appearance.absorbed_share > _YIELDING:
+    if abs(appearance.absorbed_share) > _YIELDING:
         return "the body is seen in too few poses, or too obliquely, to be learnt"
+    if not _determines_its_lever(appearance, start.pivot, turned):
+        return "the body is too small, and its path too short, to show how far its pivot is"
     apart = appearance.pivot_px - start.pivot.centre_px
     if apart @ np.linalg.solve(appearance.pivot_covariance_px2 + start.pivot.covariance_px2, apart) > _ASTRAY:
         return "the rigid part of the picture does not rotate about the pivot"
@@ -181,6 +189,13 @@ def _frame_view(start: Start, i: int, image: Image) -> FrameView:
     return FrameView(
         image, float(start.turn[i]), start.pivots_px[i], float(start.turn_per_row[i]), float(start.row[i]), covariance
     )
+
+
+def _determines_its_lever(body: BodyAppearance, pivot: PivotEstimate, turned: float) -> bool:
+    """Return whether the lever arm is known by the pivot, or the body's rotation by ``turned`` rad shows it."""
+    lever = float(np.hypot(*(body.middle_px - pivot.centre_px)))
+    known = float(np.sqrt(np.linalg.eigvalsh(pivot.covariance_px2)[-1])) < _UNKNOWN_LEVER * lever
+    return known or body.extent_px * turned > _OWN_ROTATION_PX
 
 
 def _going_on(view: FrameView, found: list[TurnEstimate], i: int) -> FrameView:

@@ -92,7 +92,7 @@ def why_few(status: Sequence[str], least: float) -> str | None:
 
 def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig) -> str | None:
     declared = rig.pivot.expected is not None
-    lost = sum(s == "no_mouth" for s in detections.status)
+    lost = sum(s == "no_mouth" for s, measured in zip(detections.status, ok, strict=True) if not measured)
     if detections.moves and lost > (1.0 - rig.least_measured) * len(ok):
         return (
             f"in {lost} of {len(ok)} frames the mark is not found where a rotation about a fixed pivot would carry it;"

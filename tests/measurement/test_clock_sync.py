@@ -67,7 +67,7 @@ def late(filmed, tmp_path_factory):
 
 
 def test_a_lamp_that_agrees_with_the_command_changes_nothing(agreeing):
-    assert not any("the lamp" in note for note in agreeing.notes)
+    assert not agreeing.notes
     for series, record, rest in zip(agreeing.series, agreeing.records, RESTS, strict=True):
         dark, lit = series.evidence.lamp_s
         assert dark < rest <= lit
@@ -78,8 +78,8 @@ def test_a_lamp_that_agrees_with_the_command_changes_nothing(agreeing):
 
 def test_commands_by_another_clock_are_dated_by_the_lamps_of_all_clips_together(late, agreeing):
     measured = measure_session(read_session(late))
-    assert sum("the lamp shows" in note for note in measured.notes) == len(RESTS)
-    assert "behind the command's" in measured.notes[-1]
+    assert len(measured.notes) == len(RESTS)
+    assert "behind the command's" in measured.notes[0]
     sigma = measured.records[0].clock_sigma
     assert 0.0 < sigma < 1 / 30 / np.sqrt(12.0)  # better than one clip's lamp could tell
     for record, rest in zip(measured.records, RESTS, strict=True):

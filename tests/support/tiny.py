@@ -41,7 +41,7 @@ def tiny_lab(folder: Path, names: Sequence[str]) -> Path:
 
 @cache
 def _frames(seed: int) -> tuple[np.ndarray, ...]:
-    angles = 34 * np.cos(np.pi * np.arange(FRAMES) / (FRAMES - 1)) + seed
+    angles = 20 * np.cos(np.pi * np.arange(FRAMES) / (FRAMES - 1)) + seed
     drawn = draw_frames(Look(marker="ring"), angles, seed=seed)
     return tuple(cv2.resize(frame, SIZE, interpolation=cv2.INTER_AREA) for frame in drawn)
 

@@ -27,6 +27,25 @@ def rotation(turns: float | Floats) -> Floats:
     return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
 
 
+def rotate_each(arms: Floats, turns: Floats) -> Floats:
+    """Rotate points by an angle each, without the memory of a matrix for each.
+
+    Parameters
+    ----------
+    arms : ndarray
+        (n, 2), or (2,) for one that is rotated by all angles.
+    turns : ndarray
+        (n,) counter-clockwise as seen, rad.
+
+    Returns
+    -------
+    ndarray
+        (n, 2).
+    """
+    c, s = np.cos(turns), np.sin(turns)
+    return np.stack([c * arms[..., 0] + s * arms[..., 1], -s * arms[..., 0] + c * arms[..., 1]], axis=-1)
+
+
 def fit_rigid(start: Floats, end: Floats) -> Floats:
     """Fit a rotation and a translation by least squares (Umeyama 1991, without scale).
 

@@ -17,7 +17,10 @@ _DISAGREE = 9.21
 _MARKED, _NEARER = 0.4, 0.1
 """Probabilities, before looking, that a rig has a round marker on its pivot, and that it has one which is nearer to the
 camera than the mark."""
-_CERTAIN = 0.99
+_ALIGNED = 0.3
+"""The same, that it has another round thing on the line through the pivot along which a short arc cannot place it.
+Mechanisms are symmetric: screws and joints of the frame lie on that line more often than beside it."""
+_CERTAIN = 0.95
 """Probability from which on a round thing counts as the pivot's marker."""
 
 
@@ -31,6 +34,8 @@ class PivotEstimate:
     """(2, 2) px²."""
     source: str
     """``declared``, or one or more of ``marker``, ``centre of rotation`` and ``hint``."""
+    doubt: str | None = None
+    """Message where it rests on a round thing that the mark's path does not verify."""
 
 
 def combine_pivot(
@@ -47,11 +52,12 @@ def combine_pivot(
     another round thing, such as a screw. With the density q of round things and N(S) the density of its distance from
     the pivot that motion or hint predict, for the covariance S of either case, the weights are::
 
-        0.4·N(C + C_marker),    0.1·N(C + C_marker + D),    q
+        0.4·N(C + C_marker),    0.1·N(C + C_marker + D),    q + 0.3·N₁ / 2r
 
-    with the covariance D of the displacement. The pivot is that of the heaviest case, and its covariance is that of the
-    mixture around it. A screw near the ill-determined centre of a short arc is thus an uncertain pivot, and a marker at
-    the centre of a long arc a certain one.
+    with the covariance D of the displacement, the path's radius r, and the density N₁ of the distance across the least
+    certain direction. The pivot is that of the heaviest case. Its covariance is that of the mixture around it or, where
+    the weight of the third case exceeds 5 %, that of the third case around it. A marker at the centre of a long arc is
+    thus a certain pivot. A round thing that the arc is too short to verify is as uncertain as the arc's centre.
 
     Parameters
     ----------
@@ -71,7 +77,7 @@ def combine_pivot(
     pivot : PivotEstimate or None
         ``None`` where nothing determines it.
     note : str or None
-        Message for the user where the round thing is not the pivot, or may not be.
+        Message for the user where the round thing is not the pivot.
     """
     expected = _expected(circle, hint)
     if marker is None or expected is None:
@@ -82,7 +88,10 @@ def combine_pivot(
         _case(expected, marker.centre_px, marker.covariance_px2),
         _case(expected, marker.centre_px, marker.covariance_px2 + D),
     ]
-    weight = np.array([_MARKED * cases[0].density, _NEARER * cases[1].density, round_things_per_px2])
+    other = round_things_per_px2
+    if circle is not None and other > 0.0:
+        other += _ALIGNED * _density_across(expected, marker) / (2.0 * circle.radius_px)
+    weight = np.array([_MARKED * cases[0].density, _NEARER * cases[1].density, other])
     distance = float(np.hypot(*(marker.centre_px - expected.centre_px)))
     if min(case.away for case in cases) > _DISAGREE or weight.sum() == 0.0:
         return expected, _disagreement(expected, marker, distance)
@@ -92,15 +101,16 @@ def combine_pivot(
     centre = means[np.argmax(weight)]
     off = means - centre
     covariance = np.einsum("k,kij->ij", weight, covariances) + np.einsum("k,ki,kj->ij", weight, off, off)
-    note = None
-    if cases[0].away > _DISAGREE:
-        note = _disagreement(expected, marker, distance)
-    elif weight[2] > 1.0 - _CERTAIN:
-        note = (
+    doubt = note = None
+    if weight[2] > 1.0 - _CERTAIN:
+        covariance = covariances[2] + np.outer(off[2], off[2])
+        doubt = (
             f"the round thing {distance:.0f} px from the expected pivot may be something else (probability"
             f" {weight[2]:.0%}); the pivot is known to {np.sqrt(np.trace(covariance) / 2.0):.1f} px"
         )
-    return PivotEstimate(centre, covariance, f"marker and {expected.source}"), note
+    if cases[0].away > _DISAGREE:
+        note = _disagreement(expected, marker, distance)
+    return PivotEstimate(centre, covariance, f"marker and {expected.source}", doubt), note
 
 
 def disagreement_with_path(declared: PivotEstimate, circle: Circle) -> str | None:
@@ -136,6 +146,14 @@ def _case(expected: PivotEstimate, marker_px: Floats, covariance: Floats) -> _Ca
         centre_px=expected.centre_px + gain @ difference,
         covariance_px2=np.asarray(gain @ covariance, dtype=float),
     )
+
+
+def _density_across(expected: PivotEstimate, marker: RoundMarker) -> float:
+    """Return the density of the marker's distance from the line along which the pivot is least certain, 1/px."""
+    across = np.linalg.eigh(expected.covariance_px2)[1][:, 0]
+    variance = float(across @ (expected.covariance_px2 + marker.covariance_px2) @ across)
+    away = float(across @ (marker.centre_px - expected.centre_px))
+    return float(np.exp(-(away**2) / (2.0 * variance)) / np.sqrt(2.0 * np.pi * variance))
 
 
 def _disagreement(expected: PivotEstimate, marker: RoundMarker, distance: float) -> str:

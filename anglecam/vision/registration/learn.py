@@ -146,6 +146,8 @@ def _body(data: Data, last: Round, plane: MotionPlane, moving: bool) -> BodyAppe
     acting = effective_centre(normal, by_unknown)
     variance_ratio = max(birge**2, disagreement_of_groups(last.covariance, scores, groups, acting))
     information = normal[:, :, 0, 0].sum(axis=1)
+    middles = corners + TILE_SIDE_PX / 2
+    middle = information @ middles / information.sum()
     return BodyAppearance(
         tiles=join_tiles(last.appearance),
         heights=state.centres.heights,
@@ -158,7 +160,8 @@ def _body(data: Data, last: Round, plane: MotionPlane, moving: bool) -> BodyAppe
         groups=groups,
         birge=birge,
         absorbed_share=_absorbed_of_turns(data, last),
-        middle_px=information @ (corners + TILE_SIDE_PX / 2) / information.sum(),
+        middle_px=middle,
+        extent_px=float(np.sqrt(information @ ((middles - middle) ** 2).sum(axis=1) / information.sum())),
     )
 
 

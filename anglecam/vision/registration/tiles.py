@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from anglecam.camera.lens import Lens
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.median import median_picture
-from anglecam.vision.image.transforms import rotation
+from anglecam.vision.image.transforms import rotate_each, rotation
 from anglecam.vision.registration.appearance import TileViews
 from anglecam.vision.registration.axis_view import AxisView
 
@@ -32,6 +32,11 @@ _MAX_LOOSE_SHARE = 0.1
 """Largest share of such pixels in a tile."""
 _MIN_STEADIER = 1.5
 """Least ratio of squared spreads, as filmed over rotated back, of a tile that belongs to the body."""
+_NOISE_GRADIENT = 0.054
+"""Squared gradient of white noise, smoothed and differentiated as here, relative to its variance."""
+_MIN_EDGES = 3.0
+"""Least information of a tile, relative to what the noise of a plain tile appears to have. A plain wall would be taken
+for a part of the body, and determine the pivot wrongly."""
 _MAX_HEIGHT = 0.3
 """Largest height of a part of the body, as a share of half the picture's diagonal."""
 _HEIGHT_STEP_PX = 1.0
@@ -114,13 +119,17 @@ def choose_tiles(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floa
         cv2.Scharr(smooth, cv2.CV_32F, *axis, scale=1 / 32).reshape(mean.shape) for axis in ((1, 0), (0, 1))
     )
     y, x = np.mgrid[0:height, 0:width].astype(np.float32)
-    by_turn = along_y * (x - pivot_px[0])[..., None] - along_x * (y - pivot_px[1])[..., None]
-    information = _by_tile((by_turn**2 / (noise**2 + spread**2)).sum(axis=2) * whole)
+    arm_x, arm_y = (x - pivot_px[0])[..., None], (y - pivot_px[1])[..., None]
+    weight = whole[..., None] / (noise**2 + spread**2)
+    information = _by_tile(((along_y * arm_x - along_x * arm_y) ** 2 * weight).sum(axis=2)).sum(axis=(1, 3))
+    noise_gradient = _NOISE_GRADIENT * (np.pi / 2.0) / len(frames) * noise**2  # the median's variance is π/2 the mean's
+    apparent = _by_tile((noise_gradient * (arm_x**2 + arm_y**2) * weight).sum(axis=2)).sum(axis=(1, 3))
     loose = _by_tile(((spread.max(axis=2) > _LOOSE * noise) | ~whole).astype(np.float32))
     rigid = loose.mean(axis=(1, 3)) < _MAX_LOOSE_SHARE
     # Scenery does not rotate: it varies less as filmed than rotated back.
     as_filmed, rotated_back = (_by_tile((part**2).sum(axis=2)).sum(axis=(1, 3)) for part in (spread_as_filmed, spread))
-    worth = np.where(rigid & (as_filmed > _MIN_STEADIER * rotated_back), information.sum(axis=(1, 3)), 0.0)
+    has_edges = information > _MIN_EDGES * apparent
+    worth = np.where(rigid & has_edges & (as_filmed > _MIN_STEADIER * rotated_back), information, 0.0)
     best = [k for k in np.argsort(worth, axis=None)[::-1][:_MAX_TILES] if worth.flat[k] > 0]
     column_row = np.array([[k % worth.shape[1], k // worth.shape[1]] for k in best], dtype=float)
     return Tiles((TILE_SIDE_PX * column_row).reshape(-1, 2), heights.ravel()[best])
@@ -159,7 +168,7 @@ def view_tiles(
         middles = plane.lens.distort(arm @ rotation(f.turn) + f.pivot_px + parallax)
         if f.turn_per_row:
             extra = f.turn_per_row * (middles[:, 1] - f.row)
-            middles = plane.lens.distort(_each_rotated(arm, f.turn + extra) + f.pivot_px + parallax)
+            middles = plane.lens.distort(rotate_each(arm, f.turn + extra) + f.pivot_px + parallax)
         for corner, middle, shift in zip(corners, middles, parallax, strict=True):
             offset, value = _gather(
                 f.image,
@@ -179,12 +188,6 @@ def view_tiles(
             starts.append(starts[-1] + len(offset))
         centres.append(middles)
     return TileViews(np.concatenate(offsets), np.concatenate(values), np.array(starts)), np.concatenate(centres)
-
-
-def _each_rotated(arms: Floats, turns: Floats) -> Floats:
-    """Rotate each point (n, 2) by its own angle (n,), without the memory of one matrix for each pixel."""
-    c, s = np.cos(turns), np.sin(turns)
-    return np.column_stack([c * arms[:, 0] + s * arms[:, 1], -s * arms[:, 0] + c * arms[:, 1]])
 
 
 def _find_heights(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats) -> Floats:
@@ -228,7 +231,7 @@ def _stack(
         places = plane.lens.distort(arms @ rotation(f.turn) + f.pivot_px + parallax)
         if f.turn_per_row:
             extra = f.turn_per_row * (places[:, 1] - f.row)
-            places = plane.lens.distort(_each_rotated(arms, f.turn + extra) + f.pivot_px + parallax)
+            places = plane.lens.distort(rotate_each(arms, f.turn + extra) + f.pivot_px + parallax)
         at = places.reshape(*x.shape, 2).astype(np.float32)
         back = cv2.remap(f.image, at[..., 0], at[..., 1], cv2.INTER_LINEAR)
         pile.append(back.reshape(*x.shape, -1).astype(np.float32))

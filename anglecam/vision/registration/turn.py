@@ -67,6 +67,8 @@ class BodyAppearance:
     below 1 where the body was seen in many poses between its extremes."""
     middle_px: Floats
     """(2,) mean place of the tiles, weighted by their information, in the reference frame, px."""
+    extent_px: float
+    """Root mean square distance of the tiles from that place, weighted likewise, px."""
 
     def row_of_middle(self, view: FrameView) -> float:
         """Return the row of the picture in which a frame shows the middle."""

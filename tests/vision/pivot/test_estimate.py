@@ -47,8 +47,25 @@ def _marker(x, y):
 
 def test_a_round_thing_far_from_the_hint_is_an_uncertain_pivot():
     pivot, note = combine_pivot(_marker(50.0, 80.0), None, HINT, SCREWS)
-    assert "may be something else" in note
+    assert note is None
+    assert "may be something else" in pivot.doubt
     assert np.sqrt(np.trace(pivot.covariance_px2) / 2.0) > 5.0
+
+
+def test_a_round_thing_on_the_axis_of_a_short_arc_is_as_uncertain_as_the_arcs_centre():
+    at = np.radians(np.linspace(-6, 6, 200))
+    rng = np.random.default_rng(0)
+    circle = fit_circle(100 * np.column_stack([np.cos(at), np.sin(at)]) + 0.05 * rng.standard_normal((200, 2)))
+    along = np.sqrt(circle.centre_covariance_px2[0, 0])
+    assert 10.0 < along < 20.0
+    screw = circle.centre_px + [1.5 * along, 0.0]
+    pivot, _ = combine_pivot(_marker(*screw), circle, None, SCREWS)
+    assert "may be something else" in pivot.doubt
+    assert np.sqrt(pivot.covariance_px2[0, 0]) > along
+    long = fit_circle(_path((50, 60)))
+    certain, _ = combine_pivot(_marker(*long.centre_px), long, None, SCREWS)
+    assert certain.doubt is None
+    assert certain.covariance_px2[0, 0] < long.centre_covariance_px2[0, 0]
 
 
 def test_a_declared_marker_at_the_hint_is_a_certain_pivot():
