@@ -188,9 +188,13 @@ def _angles_of_body(
     neutral, resting = neutral_of(rig, command, time[ok], line, lever)
     errors = PlaceErrors(sigma * lever, 0.0)
     view = _view_errors(detections.lens, mark, detections.pivot.centre_px, line, neutral, resting, rig)
-    known = angle_sigma(mark, detections.pivot.centre_px, detections.pivot.covariance_px2, errors, resting)
+    known = angle_sigma(mark, detections.pivot.centre_px, np.zeros((2, 2)), errors, resting)
+    moved = body.pivot_sensitivity[ok]
+    if resting is not None:
+        moved = moved - moved[resting].mean(axis=0)
+    by_pivot = np.einsum("ni,ij,nj->n", moved, body.pivot_covariance_px2, moved)
     unsteady = mean_off_middle(time[ok], line, rig.camera.exposure_s)
-    sigma = np.sqrt(known**2 + view.sigma**2 + unsteady**2)
+    sigma = np.sqrt(known**2 + by_pivot + view.sigma**2 + unsteady**2)
     return Angles(line, sigma, mark, detections.pivot, neutral, resting, errors, view, unsteady)
 
 

@@ -51,11 +51,12 @@ def carried_marks(detections: Detections, ok: Flags, registered: Registered) -> 
     Returns
     -------
     tuple of Region or None
-        An entry a frame: the mark of the frame with the nearest rotation, rotated with the body.
+        An entry a frame: the mark of the frame with the nearest rotation, rotated with the body. None for a body that
+        is followed without a mark.
     """
     regions: list[Region | None] = [None] * len(ok)
     known = np.flatnonzero(ok & np.isfinite(registered.turn))
-    if not len(known):
+    if detections.body is not None or not len(known):
         return tuple(regions)
     arms = detections.places_px[known] - registered.pivot_px
     at_mark = np.median(rotate_each(arms, -registered.turn[known]), axis=0)

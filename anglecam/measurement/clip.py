@@ -70,7 +70,7 @@ class Measurement:
         """Object that the angles were measured on."""
         if self.why_coarse is None:
             return "whole body"
-        return "mark" if self.detections.body is None else "body's keyframes"
+        return self.detections.by
 
     @property
     def truncated(self) -> str | None:
@@ -134,8 +134,8 @@ def measure_clip(
     row = _mark_rows(detections)
     time = measurement_time(detections.time, row, detections.size[1], rig.camera.row_time_s)
     angles = coarse_angles(detections, ok, time, rig, command)
-    why_coarse: str | None = "the mark does not move"
-    if detections.moves:
+    why_coarse: str | None = "the mark does not move" if not detections.moves else "the body has too few features"
+    if detections.moves and detections.by != "outline":
         start = _start(detections, ok, time, row, angles, rig)
         registered = register_clip(film, start, detections.lens, progress)
         why_coarse = registered if isinstance(registered, str) else None

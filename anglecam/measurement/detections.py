@@ -54,6 +54,8 @@ class Detections:
     """Motion of the camera in each frame; ``None`` where it stands still."""
     body: RigidMotion | None
     """Motion of the rigid body where there is no mark; ``regions`` are empty then."""
+    by: str
+    """What is followed: ``mark``, ``body's keyframes`` or ``outline``."""
     noise: float
     """Standard deviation of the pixels, grey levels."""
     repeated: NDArray[np.bool_]

@@ -22,7 +22,7 @@ from anglecam.errors import InputError
 from anglecam.io.rig import Rig, RigMark
 from anglecam.measurement.detections import Detections, frame_of_mark, frames_to_keep
 from anglecam.measurement.pivot import find_pivot
-from anglecam.measurement.rigid_body_pass import detect_rigid_body
+from anglecam.measurement.rigid_body_pass import detect_outline, detect_rigid_body
 from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.mark.found_mark import FoundMark, Samples
@@ -75,10 +75,13 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
     near = None if rig.pivot.expected is None else lens.rectify(rig.pivot.expected)
     found = find_mark(samples, rig.mark_rgb, near) if samples.images else None
     if found is None:
-        body = detect_rigid_body(film, rig) if rig.mark_rgb is None and samples.images else None
-        if isinstance(body, Detections):
-            return body
-        besides = "" if body is None else f"; nor can the body be followed without a mark: {body}"
+        causes = []
+        for follow in _without_mark(rig, samples, steady):
+            body = follow(film, rig)
+            if isinstance(body, Detections):
+                return body
+            causes.append(body)
+        besides = f"; nor can the body be followed without a mark: {', and '.join(causes)}" if causes else ""
         raise InputError(_no_mark(path, sample, rig) + besides)
     zoom = camera_zoom(samples.images)
     if zoom is not None:
@@ -120,6 +123,7 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
         lens=lens,
         camera_moves=shakes,
         body=None,
+        by="mark",
         noise=noise,
         repeated=repeated,
         colour_rgb=found.model.mean_rgb,
@@ -127,6 +131,16 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
         truncated=film.why_truncated(sample),
         notes=tuple(notes),
     )
+
+
+def _without_mark(
+    rig: Rig, samples: Samples, steady: BackgroundMotion | None
+) -> list[Callable[[Film, Rig], Detections | str]]:
+    """Return the ways in which a body may be followed that has no mark of the declared kind."""
+    if rig.mark_rgb is not None or not samples.images:
+        return []
+    still = steady is None and rig.pointed_mark is None
+    return [detect_rigid_body, detect_outline] if still else [detect_rigid_body]
 
 
 def _samples(

@@ -1,4 +1,8 @@
-"""The coarse pass over a clip without a mark: follow a body that turns rigidly, such as a face in profile."""
+"""The coarse pass over a clip without a mark: follow a body that turns rigidly.
+
+A body with texture, such as a face in profile, is followed by its features. Where too few features rotate, the outline
+of what moves before a still background is followed instead, such as that of a grey stick.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +13,19 @@ from anglecam.data.series import OK
 from anglecam.io.rig import Rig
 from anglecam.measurement.detections import Detections, frame_of_mark, frames_to_keep
 from anglecam.measurement.pivot import find_pivot
-from anglecam.video.film import Film
+from anglecam.video.film import Film, Sample
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.circle import Circle
+from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 from anglecam.vision.rigid_body.follow import follow_rigid_body
+from anglecam.vision.rigid_body.follow_outline import follow_outline, learn_outline
+
+_NAMES = {"body's keyframes": "rigid body", "outline": "outline of what moves"}
+"""Of what is followed, in a message."""
 
 
 def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
-    """Follow the rigid body in place of a mark.
+    """Follow the features of a rigid body in place of a mark.
 
     Parameters
     ----------
@@ -35,18 +44,29 @@ def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
     InputError
         As `detect_mark`, for a file that cannot be read.
     """
-    lens = lens_from_rig(rig, film.size, film.path)
     sample = film.sample(frames_to_keep(film))
-    images = [f.image for f in sample.frames if f.image is not None]
-    noise, pointed = pixel_noise(images), rig.pointed_mark
+    images, pointed = [f.image for f in sample.frames if f.image is not None], rig.pointed_mark
     if pointed is None:
-        body = follow_rigid_body(film.frames(), images, noise)
+        body = follow_rigid_body(film.frames(), images, pixel_noise(images))
     else:
         first = frame_of_mark(film, pointed).image
         assert first is not None
-        body = follow_rigid_body(film.frames(), [first, *images], noise, np.array(pointed.as_box))
-    if isinstance(body, str):
-        return body
+        body = follow_rigid_body(film.frames(), [first, *images], pixel_noise(images), np.array(pointed.as_box))
+    return body if isinstance(body, str) else _detections(film, rig, sample, body, "body's keyframes")
+
+
+def detect_outline(film: Film, rig: Rig) -> Detections | str:
+    """Follow the outline of what moves before a still background; arguments and result as of `detect_rigid_body`."""
+    sample = film.sample(frames_to_keep(film))
+    learnt = learn_outline(sample.frames, film.frames())
+    outline = learnt if isinstance(learnt, str) else follow_outline(film.frames(), learnt)
+    return outline if isinstance(outline, str) else _detections(film, rig, sample, outline, "outline")
+
+
+def _detections(film: Film, rig: Rig, sample: Sample, body: RigidMotion, by: str) -> Detections | str:
+    """Return the detections of a body that was followed, or the cause where it has no pivot."""
+    images = [f.image for f in sample.frames if f.image is not None]
+    lens = lens_from_rig(rig, film.size, film.path)
     stamps, repeated, before = [], [], None
     for frame in film.frames():
         stamps.append(frame.time)
@@ -64,7 +84,6 @@ def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
     marker, pivot, disagreement = find_pivot(images, rig, turned, lens)
     if pivot is None or OK not in body.status:
         return "it hardly rotates"
-    notes = ["the rigid body is measured, without a mark", *([disagreement] if disagreement else [])]
     return Detections(
         time=np.array(stamps),
         status=body.status,
@@ -77,10 +96,11 @@ def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
         lens=lens,
         camera_moves=None,
         body=body,
-        noise=noise,
+        by=by,
+        noise=pixel_noise(images),
         repeated=np.array(repeated),
         colour_rgb=None,
         size=film.size,
         truncated=film.why_truncated(sample),
-        notes=tuple(notes),
+        notes=(f"the {_NAMES[by]} is measured, without a mark", *([disagreement] if disagreement else [])),
     )

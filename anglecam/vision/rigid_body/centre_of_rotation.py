@@ -30,6 +30,8 @@ bright face of a head move alike. Measured 0.03 with gamma 2.2 and a shutter ope
 _CORRELATED = 5.0
 """Variance factor for the correlation between neighbours among the 30 angles at which the centre of rotation is fitted:
 light, codec and blur cause similar errors in them."""
+_EVEN_PX = 0.3
+"""Noise of a place up to which all places count alike, px."""
 _OUTLIER = 4.0
 """Multiple of the median distance from the fit beyond which a place is rejected."""
 
@@ -41,7 +43,9 @@ class RigidMotion:
     turn: Floats
     """(n,) counter-clockwise as seen, from the median pose, rad; NaN where the body was lost."""
     sigma: Floats
-    """(n,) standard uncertainty of ``turn``, rad."""
+    """(n,) standard uncertainty of ``turn`` about a known centre, rad."""
+    pivot_sensitivity: Floats
+    """(n, 2) change of ``turn`` with an error of the centre, rad/px."""
     pivot_px: Floats
     """(2,) centre of rotation, px."""
     pivot_covariance_px2: Floats
@@ -90,7 +94,9 @@ def pose_information(pose: Floats, arm: Floats) -> Floats:
     )
 
 
-def fit_common_centre(frames: Sequence[FramePose], middle: Floats, spread: float) -> RigidMotion | str:
+def fit_common_centre(
+    frames: Sequence[FramePose], middle: Floats, spread: float, place_px: float = 0.0
+) -> RigidMotion | str:
     """Fit a centre of rotation that is common to all frames, and the body's angle around it in each.
 
     Parameters
@@ -101,6 +107,8 @@ def fit_common_centre(frames: Sequence[FramePose], middle: Floats, spread: float
         (2,) of the body in the reference, px.
     spread : float
         Standard uncertainty of an angle that no number of points reduces, rad.
+    place_px : float
+        The same of a place, px, which varies with the angle.
 
     Returns
     -------
@@ -121,8 +129,8 @@ def fit_common_centre(frames: Sequence[FramePose], middle: Floats, spread: float
     usual = max(1.0, float(np.median(group_ratio[ok])))
     ratio = (_CLIP_FREEDOM * usual + POINT_GROUPS * group_ratio[ok]) / (_CLIP_FREEDOM + POINT_GROUPS)
     covariance = np.linalg.inv(information[ok]) * np.maximum(ratio, 1.0)[:, None, None]
-    place, arm, centre_covariance, scatter = _fit_centre(turn[ok], shift[ok], covariance[:, 1:, 1:])
-    covariance[:, 1:, 1:] += scatter**2 * np.eye(2)
+    place, arm, centre_covariance, scatter = _fit_centre(turn[ok], shift[ok], covariance[:, 1:, 1:], place_px)
+    covariance[:, 1:, 1:] += (scatter**2 + place_px**2) * np.eye(2)
     weight = np.linalg.inv(covariance)
     measured = np.column_stack([turn[ok], shift[ok]])
     fitted = turn[ok]
@@ -139,13 +147,29 @@ def fit_common_centre(frames: Sequence[FramePose], middle: Floats, spread: float
     sigma[ok] = np.sqrt(1.0 / np.einsum("ni,ni->n", gain, slope) + spread**2 + (_SHARED_PX / reach) ** 2 + blur**2)
     if np.ptp(turns[ok]) < MIN_TURN:
         return "nothing rigid rotates"
+    sensitivity = np.full((len(turn), 2), np.nan)
+    total = np.einsum("ni,ni->n", gain, slope)
+    sensitivity[ok] = np.einsum("nj,nkj->nk", gain[:, 1:], rotation(fitted) - np.eye(2)) / total[:, None]
     pivot = middle + place - arm
     centre = pivot + arm @ rotation(median)
-    return RigidMotion(turns, sigma, pivot, centre_covariance, scatter, centre, status)
+    return RigidMotion(turns, sigma, sensitivity, pivot, centre_covariance, scatter, centre, status)
 
 
-def _fit_centre(turn: Floats, shift: Floats, noise: Floats) -> tuple[Floats, Floats, Floats, float]:
+def _fit_centre(turn: Floats, shift: Floats, noise: Floats, place_px: float) -> tuple[Floats, Floats, Floats, float]:
     """Fit shift = place + (R − 1)·arm, each angle counted once however long the body rests there.
+
+    A direction in which the body's place is hardly seen, such as that along a stick, counts little.
+
+    Parameters
+    ----------
+    turn : ndarray
+        (n,) rad.
+    shift : ndarray
+        (n, 2) px.
+    noise : ndarray
+        (n, 2, 2) covariance of the shifts, px².
+    place_px : float
+        Standard uncertainty of a place that varies with the angle, px: no number of frames reduces its effect.
 
     Returns
     -------
@@ -161,20 +185,26 @@ def _fit_centre(turn: Floats, shift: Floats, noise: Floats) -> tuple[Floats, Flo
     count = np.bincount(pose)
     mean_turn = np.bincount(pose, turn) / count
     mean_shift = np.column_stack([np.bincount(pose, axis) / count for axis in shift.T])
+    share = _EVEN_PX**2 * np.linalg.inv(noise + _EVEN_PX**2 * np.eye(2))
+    mean_share = np.column_stack([np.bincount(pose, part) / count for part in share.reshape(-1, 4).T])
+    weight = np.linalg.cholesky(mean_share.reshape(-1, 2, 2)).swapaxes(1, 2)
     A = np.concatenate(
         [np.broadcast_to(np.eye(2), (len(count), 2, 2)), rotation(mean_turn).swapaxes(1, 2) - np.eye(2)], axis=2
     )
+    A, b = weight @ A, np.einsum("nij,nj->ni", weight, mean_shift)
     keep = np.ones(len(count), bool)
     for _ in range(3):
-        design, right = A[keep].reshape(-1, 4), mean_shift[keep].ravel()
+        design, right = A[keep].reshape(-1, 4), b[keep].ravel()
         solution = np.linalg.lstsq(design, right, rcond=None)[0]
-        off = np.hypot(*(mean_shift - A @ solution).T)
+        off = np.hypot(*(b - A @ solution).T)
         keep = off <= _OUTLIER * max(float(np.median(off)), 1e-6)
     residual = right - design @ solution
     variance = float(residual @ residual) / max(len(residual) - 4, 1)
     to_centre = np.hstack([np.eye(2), -np.eye(2)])
-    covariance = _CORRELATED * variance * to_centre @ np.linalg.pinv(design.T @ design) @ to_centre.T
+    variance = _CORRELATED * variance + len(right) * place_px**2
+    covariance = variance * to_centre @ np.linalg.pinv(design.T @ design) @ to_centre.T
     off_px = shift - (solution[:2] + solution[2:] @ (rotation(turn) - np.eye(2)))
-    excess = np.median((off_px**2).sum(axis=1)) - np.median(np.trace(noise, axis1=1, axis2=2))
+    seen = np.einsum("ni,nij,nj->n", off_px, share, off_px)
+    excess = np.median(seen) - np.median(np.trace(share @ noise, axis1=1, axis2=2))
     # The median squared distance in the plane is 2 ln 2 times the variance of either coordinate.
     return solution[:2], solution[2:], covariance, float(np.sqrt(max(excess, 0.0) / (2 * np.log(2))))
