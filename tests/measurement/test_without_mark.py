@@ -1,0 +1,44 @@
+"""Clips in which no mark is found: a body with texture is followed by its features, any other by its outline."""
+
+import cv2
+import numpy as np
+import pytest
+
+from anglecam.io.rig import Rig
+from anglecam.measurement import mark_pass
+from anglecam.measurement.clip import measure_clip
+from anglecam.video.film import open_film
+from support import things
+
+SWING = 20.0 * np.sin(2 * np.pi * np.arange(60) / 40.0)
+PIVOT = (160.0, 60.0)
+
+
+def _plate(scene, angle):
+    """Draw a plate with a texture of bumps that swings about `PIVOT`."""
+    rng = np.random.default_rng(5)
+    bumps = cv2.resize(rng.uniform(60, 200, (18, 14)), (112, 144), interpolation=cv2.INTER_CUBIC).clip(0, 255)
+    texture = cv2.resize(bumps.astype(np.uint8), None, fx=4, fy=4, interpolation=cv2.INTER_LINEAR)
+    x, y = (4.0 * p + 1.5 for p in PIVOT)
+    swing = cv2.getRotationMatrix2D((0.0, 0.0), np.degrees(angle), 1.0)
+    swing[:, 2] = swing[:, :2] @ [-224.0, 0.0] + (x, y)
+    size = scene.shape[1::-1]
+    cover = cv2.warpAffine(np.full(texture.shape, 255, np.uint8), swing, size) > 127
+    scene[cover] = cv2.warpAffine(texture, swing, size)[cover][:, None]
+
+
+@pytest.mark.parametrize(
+    ("draw", "by", "rms_deg"),
+    [(_plate, "whole body", 0.02), (things.stick((110, 112, 110), 14.0, PIVOT, 140.0), "outline", 0.1)],
+    ids=["plate", "stick"],
+)
+def test_a_body_without_a_mark_is_measured(tmp_path, monkeypatch, draw, by, rms_deg):
+    monkeypatch.setattr(mark_pass, "find_mark", lambda *_: None)
+    film = open_film(things.film(tmp_path / "clip.mkv", draw, SWING))
+    measured = measure_clip(film, Rig())
+    assert measured.by == by
+    assert measured.series.ok.all()
+    error = np.degrees(measured.series.angle) - SWING
+    error -= np.median(error)
+    assert np.sqrt((error**2).mean()) < rms_deg
+    assert np.sqrt(((error / np.degrees(measured.series.sigma)) ** 2).mean()) < 1.5
