@@ -165,8 +165,8 @@ def _alternate(
         normals = np.stack([f.normal for f in fits]) * weight[..., None, None]
         gradients = np.stack([f.gradient for f in fits]) * weight[..., None]
         if remaining:
-            together = zip(normals.sum(axis=0), gradients.sum(axis=0), strict=True)
-            steps = np.array([solve_motion(*equations, rolling)[0] for equations in together])
+            together = zip(normals.sum(axis=0), gradients.sum(axis=0), np.asarray(clear.any(axis=1)), strict=True)
+            steps = np.array([solve_motion(n, g, rolling)[0] if seen else np.zeros(3) for n, g, seen in together])
             shifts = shifts - np.array([s[1:] @ rotation(roll) for s, roll in zip(steps, rolls, strict=True)])
             rolls = rolls + steps[:, 0]
     return _Learnt(
@@ -203,6 +203,8 @@ def _disagreement(normals: Floats, gradients: Floats, places: Floats, rolling: b
     free = free_parameters(rolling)
     ratios = []
     for normal, gradient in zip(normals.swapaxes(0, 1), gradients.swapaxes(0, 1), strict=True):
+        if not normal.any():
+            continue  # something hides all of the scenery
         step, covariance = solve_motion(normal.sum(axis=0), gradient.sum(axis=0), rolling)
         lower = np.linalg.cholesky(covariance[free, free])
         scores = (member.T @ (gradient - normal @ step))[:, free] @ lower

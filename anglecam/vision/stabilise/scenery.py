@@ -61,6 +61,9 @@ _SURROUNDING_AREA, _SURROUNDING_SHARE = 0.4, 0.6
 """Least share of the picture that the windows' hull covers, and of all windows that belong to them, for the group to
 be scenery even if it only rolls around a fixed point. A body that turns leaves scenery beside it, which has the
 windows."""
+_ENCLOSED_SHARE = 0.5
+"""Least share of the other windows inside the hull for a smaller group to be scenery that rolls, where hardly any other
+window stands still: a large body has the others."""
 _ROUNDS = 8
 _MIN_INFORMATION = 0.5
 """Least share of the windows' information, in every direction, that a frame must show; less may agree by chance."""
@@ -87,7 +90,7 @@ class Scenery:
     scatter_px: float
     """Standard deviation of the windows from their expected places, px."""
     surrounds: bool
-    """Whether the windows are most of those in the picture, and all around."""
+    """Whether the windows are most of those in the picture, and all around, or enclose those of a body."""
 
     @property
     def shakes(self) -> bool:
@@ -148,8 +151,8 @@ def find_scenery(pictures: Sequence[Image]) -> Scenery | None:
         return None
     close = off[group][off[group] < 1.0]
     scatter = TOLERANCE_PX * float(np.sqrt(close.mean()))
-    hull = cv2.contourArea(cv2.convexHull(centres[group].astype(np.float32)))
-    surrounds = group.mean() >= _SURROUNDING_SHARE and hull >= _SURROUNDING_AREA * pictures[0].size
+    still = (squared_deviations(moved, metric) < 1.0).mean(axis=1) >= _MIN_SEEN
+    surrounds = _surrounds(centres[group], centres[~group], int(still[~group].sum()), pictures[0].size)
     nowhere = np.empty((0, 2))
     found = Scenery(centres[group], metric[group], information[group], origin, nowhere, rolls, scatter, surrounds)
     each = [scenery_motion(found, moved[group, k]) for k in range(len(pictures))]
@@ -192,6 +195,15 @@ def scenery_motion(scenery: Scenery, moved: Floats) -> tuple[Floats, float]:
     if shares.min() < _MIN_INFORMATION:
         return np.full(2, np.nan), float("nan")
     return shift[0], float(roll[0])
+
+
+def _surrounds(centres: Floats, others: Floats, still: int, area_px2: int) -> bool:
+    """Return whether scenery is all around: most of all windows, or around those of a body, ``still`` of which rest."""
+    hull = cv2.convexHull(centres.astype(np.float32))
+    if len(centres) >= _SURROUNDING_SHARE * (len(centres) + len(others)):
+        return bool(cv2.contourArea(hull) >= _SURROUNDING_AREA * area_px2)
+    enclosed = [cv2.pointPolygonTest(hull, (float(x), float(y)), False) >= 0.0 for x, y in others]
+    return still < _MIN_WINDOWS and len(centres) < len(others) and float(np.mean(enclosed)) >= _ENCLOSED_SHARE
 
 
 def _seeds(centres: Floats, tensor: Floats, cell_px: float) -> NDArray[np.intp]:
