@@ -34,9 +34,12 @@ from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.measurement.trust import require_rotation, why_few
 from anglecam.video.film import Film
 from anglecam.vision.mark.outline_turn import outline_turn
+from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 
 _AGREE = 2.0
 """Standard uncertainties by which two measurements of the rotation may differ."""
+_LARGER = 2.0
+"""Least size of a body, relative to the mark's radius, from which on it is not the mark."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +158,7 @@ def measure_clip(
         elif _pivot_from_path_alone(detections, rig):
             # a centre fitted to the mark's path is much less certain than the centre of rotation of the whole body
             body = detect_rigid_body(film, rig)
-            if isinstance(body, Detections):
+            if isinstance(body, Detections) and body.body is not None and _shows_rotation(body.body, detections, ok):
                 rigid = np.array([s == OK for s in body.status])
                 other = coarse_angles(body, rigid, body.time, rig, command)
                 surer = (other.sigma**2).mean() < (angles.sigma**2).mean()
@@ -182,7 +185,16 @@ def _interlaced(film: Film) -> str | None:
 def _pivot_from_path_alone(detections: Detections, rig: Rig) -> bool:
     """Return whether the pivot is only the centre of the mark's path, and a rigid body could be followed instead."""
     followable = detections.body is None and detections.camera_moves is None and detections.lens.is_identity
-    return followable and detections.marker is None and rig.pivot.expected is None
+    return followable and detections.pivot.source == "centre of rotation" and rig.pivot.expected is None
+
+
+def _shows_rotation(body: RigidMotion, detections: Detections, ok: Flags) -> bool:
+    """Return whether a body is larger than the mark, which shows its own rotation no better, and as often seen."""
+    areas = [
+        region.area_px2 for region, seen in zip(detections.regions, ok, strict=True) if seen and region is not None
+    ]
+    larger = body.extent_px > _LARGER * float(np.sqrt(np.median(areas) / np.pi))
+    return larger and bool(np.isfinite(body.turn[ok]).all())
 
 
 def _agree(one: Angles, ok: Flags, other: Angles, other_ok: Flags, rig: Rig) -> bool:

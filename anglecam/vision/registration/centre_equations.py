@@ -197,7 +197,8 @@ def effective_centre(normal: Floats, by_unknown: Floats) -> Floats:
 def disagreement_of_groups(covariance: Floats, scores: Floats, groups: NDArray[np.intp], acting: Floats) -> float:
     """Return the effective centre's variance from the disagreement of groups of tiles over that expected from noise.
 
-    The cluster-robust sandwich (Liang & Zeger 1986), with one cluster for each group.
+    The cluster-robust sandwich (Liang & Zeger 1986), with one cluster for each group. From ν degrees of freedom the
+    centre has a t distribution, whose variance is ν/(ν − 2) times as large (GUM Supplement 1, 6.4.9.4).
 
     Parameters
     ----------
@@ -212,7 +213,8 @@ def disagreement_of_groups(covariance: Floats, scores: Floats, groups: NDArray[n
     """
     names = np.unique(groups)
     influence = np.stack([scores[groups == group].sum(axis=0) for group in names]) @ covariance @ acting.T
-    variance = float((influence**2).sum()) * len(names) / max(len(names) - 2, 1)
+    freedom = max(len(names) - 2, 1)
+    variance = float((influence**2).sum()) * len(names) / max(freedom - 2, 1)
     return variance / float(np.trace(acting @ covariance @ acting.T))
 
 

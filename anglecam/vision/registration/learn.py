@@ -1,8 +1,8 @@
 """Learn the body from the frames that show it: its appearance, its centre of rotation, and its angle in each frame.
 
 The three depend on one another and are found alternately (`anglecam.vision.registration.alternation`). The share of an
-error of the centre that the appearance absorbs is measured at the end by displacing the converged centre, and enlarges
-the centre's covariance.
+error of the centre that the appearance absorbs is measured at the end by displacing the converged centre, and that of
+an error of the angles by stretching them. The larger share enlarges the centre's covariance.
 
 The simple model is first: all parts rotate about one centre. Parts at different depths do not, in perspective. Where
 the tiles show this (`anglecam.vision.registration.own_centres`), the body is learnt again with a height and a slope for
@@ -130,7 +130,9 @@ def _at_the_end(data: Data, last: Round) -> tuple[Floats, Floats]:
 
 def _body(data: Data, last: Round, plane: MotionPlane, moving: bool) -> BodyAppearance:
     """Return the body of the last round with its uncertainties."""
-    state, covariance = last.state, last.covariance / (1.0 - _absorbed_of_pivot(data, last))
+    absorbed_of_turns = _absorbed_of_turns(data, last)
+    absorbed = float(np.clip(max(absorbed_of_turns, _absorbed_of_pivot(data, last)), 0.0, MAX_RATIO))
+    state, covariance = last.state, last.covariance / (1.0 - absorbed)
     normal, gradient = _at_the_end(data, last)
     corners = data.tiles.corners
     groups = group_neighbours(corners, _GROUPS)
@@ -159,7 +161,7 @@ def _body(data: Data, last: Round, plane: MotionPlane, moving: bool) -> BodyAppe
         excess=last.excess,
         groups=groups,
         birge=birge,
-        absorbed_share=_absorbed_of_turns(data, last),
+        absorbed_share=absorbed_of_turns,
         middle_px=middle,
         extent_px=float(np.sqrt(information @ ((middles - middle) ** 2).sum(axis=1) / information.sum())),
     )
@@ -180,5 +182,4 @@ def _absorbed_of_pivot(data: Data, now: Round) -> float:
     nudge[PIVOT] = _NUDGE_PX * axis
     nudged = replace(now.state, centres=Centres(now.state.centres.values + nudge))
     after = one_round(data, nudged, now.appearance, now.hidden, now.excess, now.fits)
-    remaining = float((after.state.centres.pivot - now.state.centres.pivot) @ axis) / _NUDGE_PX
-    return float(np.clip(remaining, 0.0, MAX_RATIO))
+    return float((after.state.centres.pivot - now.state.centres.pivot) @ axis) / _NUDGE_PX

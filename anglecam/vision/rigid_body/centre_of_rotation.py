@@ -54,6 +54,8 @@ class RigidMotion:
     """Standard deviation, in each direction, of the body's place around that for a fixed centre of rotation, px."""
     centre_px: Floats
     """(2,) middle of the tracked points, in the median pose, px."""
+    extent_px: float
+    """Root mean square distance of the tracked points from their middle, px."""
     status: tuple[str, ...]
     """``ok``, ``no_mouth`` (the body was lost), ``occluded`` or ``undecodable``."""
 
@@ -152,7 +154,7 @@ def fit_common_centre(
     sensitivity[ok] = np.einsum("nj,nkj->nk", gain[:, 1:], rotation(fitted) - np.eye(2)) / total[:, None]
     pivot = middle + place - arm
     centre = pivot + arm @ rotation(median)
-    return RigidMotion(turns, sigma, sensitivity, pivot, centre_covariance, scatter, centre, status)
+    return RigidMotion(turns, sigma, sensitivity, pivot, centre_covariance, scatter, centre, reach, status)
 
 
 def _fit_centre(turn: Floats, shift: Floats, noise: Floats, place_px: float) -> tuple[Floats, Floats, Floats, float]:

@@ -61,6 +61,8 @@ class MovingOutline:
 
     background: Image
     """(h, w, planes) the still background."""
+    level: float
+    """Slope of the difference from it from which on a pixel belongs to an edge of what moves, grey levels/px."""
     outline: Outline
     centre: Centre
     """Of its rotation."""
@@ -108,7 +110,7 @@ def learn_outline(samples: Sequence[Frame], frames: Iterator[Frame]) -> MovingOu
         return "what moves before the background is round, and its rotation is not seen"
     by_turn = sorted((match.pose for match in seen), key=turn_of)
     spread = np.unique(np.linspace(0, len(by_turn) - 1, _KNOWN).round().astype(int))
-    return MovingOutline(background, outline, centre, tuple(by_turn[i] for i in spread))
+    return MovingOutline(background, level, outline, centre, tuple(by_turn[i] for i in spread))
 
 
 def follow_outline(frames: Iterator[Frame], moving: MovingOutline) -> RigidMotion | str:
@@ -134,7 +136,8 @@ def follow_outline(frames: Iterator[Frame], moving: MovingOutline) -> RigidMotio
             continue
         seen = slopes(frame.image, moving.background)
         match = _found(moving, seen, [_going_on(recent)] if recent else [])
-        match = match or _found(moving, seen, moving.known)
+        if match is None and (seen.steepness > moving.level).sum() >= MIN_OUTLINE_POINTS:
+            match = _found(moving, seen, moving.known)
         recent = [] if match is None else [*recent[-1:], match.pose]
         poses.append(FramePose(NO_MARK) if match is None else _as_frame_pose(match))
     return fit_common_centre(poses, moving.outline.middle, 0.0, _PLACE_PX)

@@ -62,7 +62,7 @@ _SURROUNDING_AREA, _SURROUNDING_SHARE = 0.4, 0.6
 be scenery even if it only rolls around a fixed point. A body that turns leaves scenery beside it, which has the
 windows."""
 _ENCLOSED_SHARE = 0.5
-"""Least share of the other windows inside the hull for a smaller group to be scenery that rolls, where hardly any other
+"""Least share of the other windows inside the hull for a smaller group to be scenery that rolls, where hardly any
 window stands still: a large body has the others."""
 _ROUNDS = 8
 _MIN_INFORMATION = 0.5
@@ -152,7 +152,7 @@ def find_scenery(pictures: Sequence[Image]) -> Scenery | None:
     close = off[group][off[group] < 1.0]
     scatter = TOLERANCE_PX * float(np.sqrt(close.mean()))
     still = (squared_deviations(moved, metric) < 1.0).mean(axis=1) >= _MIN_SEEN
-    surrounds = _surrounds(centres[group], centres[~group], int(still[~group].sum()), pictures[0].size)
+    surrounds = _surrounds(centres[group], centres[~group], int(still.sum()), pictures[0].size)
     nowhere = np.empty((0, 2))
     found = Scenery(centres[group], metric[group], information[group], origin, nowhere, rolls, scatter, surrounds)
     each = [scenery_motion(found, moved[group, k]) for k in range(len(pictures))]
@@ -198,7 +198,7 @@ def scenery_motion(scenery: Scenery, moved: Floats) -> tuple[Floats, float]:
 
 
 def _surrounds(centres: Floats, others: Floats, still: int, area_px2: int) -> bool:
-    """Return whether scenery is all around: most of all windows, or around those of a body, ``still`` of which rest."""
+    """Return whether scenery is all around: most of all windows, or around those of a body where few stand still."""
     hull = cv2.convexHull(centres.astype(np.float32))
     if len(centres) >= _SURROUNDING_SHARE * (len(centres) + len(others)):
         return bool(cv2.contourArea(hull) >= _SURROUNDING_AREA * area_px2)
