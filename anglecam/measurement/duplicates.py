@@ -17,10 +17,11 @@ _MOVING = 5.0
 """Change of the angle from frame to frame, in standard deviations of its noise, that is motion."""
 _STILL = 4.2
 """The same up to which the angle stands still: three standard deviations of a difference of two."""
-_APART = 10.0
+_APART = 5.0
 """Distance of a still frame from the smooth curve through the frames around, in their own distances from it (root mean
-square), from which it is no part of that motion. With the two degrees of freedom that the curve leaves, chance alone
-reaches it in 1 % of still frames; a fast oscillation filmed with few frames a period stays below it."""
+square), from which it is no part of that motion. Of 300 servos and 300 swings drawn at random (seeds 0 to 299), 90
+frames each, with noise of 0.0002° to 0.2°, no frame was flagged wrongly; of 600 others of each (seeds 5000 to 5599),
+one frame of 54,000 each."""
 _AROUND = 3
 """Frames on either side through which the curve is laid, a cubic polynomial."""
 _CATCH_UP = (0.6, 1.6)

@@ -1,6 +1,8 @@
 """Frames that repeat the one before are found by the motion, with any noise, and pauses of the mechanism are kept."""
 
 import numpy as np
+import pytest
+from scipy.signal import TransferFunction, lsim
 
 from anglecam.measurement.duplicates import duplicate_frames
 
@@ -49,3 +51,26 @@ def test_a_smooth_turning_point_and_a_rest_are_no_duplicates():
     assert _found(SWING) == []
     rest = np.concatenate([np.zeros(20), np.linspace(0.0, 0.5, 20)])
     assert _found(rest, repeated=range(1, 20)) == []
+
+
+def _servo(rng):
+    """Return the angle of a second-order servo that gets ten commands in three seconds, rad."""
+    w, damping = rng.uniform(5, 40), rng.uniform(0.1, 1.0)
+    command = np.repeat(rng.uniform(-0.3, 0.3, 10), 90)
+    time = np.arange(len(command)) / 300.0
+    return lsim(TransferFunction([w * w], [1.0, 2.0 * damping * w, w * w]), command, time)[1][::10]
+
+
+def _fast_swing(rng):
+    return 0.3 * np.cos(2 * np.pi * rng.uniform(0.2, 3.0) * TIME + rng.uniform(0, 2 * np.pi))
+
+
+@pytest.mark.parametrize("motion", [_servo, _fast_swing])
+def test_a_film_without_repeated_frames_has_none(motion):
+    flagged = 0
+    for seed in range(1000, 1060):
+        rng = np.random.default_rng(seed)
+        line, noise = motion(rng), 10.0 ** rng.uniform(-5.5, -2.5)
+        noisy = line + noise * rng.standard_normal(len(line))
+        flagged += len(duplicate_frames(noisy, np.full(len(line), noise), np.zeros(len(line), bool)))
+    assert flagged <= 1  # of 5,400 frames
