@@ -94,10 +94,7 @@ BIASED = pytest.mark.xfail(strict=True, reason="the mean error of the clip is la
 
 @pytest.mark.parametrize(
     "drawn",
-    [
-        pytest.param(name, marks=BIASED if name == "no marker, no hint, red lamp" else ())
-        for name in SESSIONS
-    ],
+    [pytest.param(name, marks=BIASED if name == "no marker, no hint, red lamp" else ()) for name in SESSIONS],
     indirect=True,
 )
 def test_the_whole_error_mean_and_scatter_is_as_large_as_sigma(drawn):
