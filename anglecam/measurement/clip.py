@@ -89,9 +89,8 @@ class Measurement:
     def notes(self) -> tuple[str, ...]:
         """Messages to the user, a line each."""
         coarse = None if self.why_coarse is None else f"measured on the {self.by} alone: {self.why_coarse}"
-        doubt = (
-            None if self.why_coarse is None else self.detections.pivot.doubt
-        )  # the whole body shows the pivot itself
+        # the whole body shows the pivot itself
+        doubt = None if self.why_coarse is None else self.detections.pivot.doubt
         found = (doubt, coarse, self.interlaced, self.zero, self.clock)
         return (*self.detections.notes, *(note for note in found if note is not None))
 
@@ -137,7 +136,7 @@ def measure_clip(
     row = _mark_rows(detections)
     time = measurement_time(detections.time, row, detections.size[1], rig.camera.row_time_s)
     angles = coarse_angles(detections, ok, time, rig, command)
-    why_coarse: str | None = "the mark does not move" if not detections.moves else "the body has too few features"
+    why_coarse: str | None = "the body has too few features" if detections.moves else "the mark does not move"
     if detections.moves and detections.by != "outline":
         start = _start(detections, ok, time, row, angles, rig)
         registered = register_clip(film, start, detections.lens, progress)
