@@ -102,3 +102,20 @@ def test_of_two_things_one_is_measured_or_neither(tmp_path):
         return
     turn = np.degrees(motion.turn)
     assert min(np.std(turn - SWING), np.std(turn + 0.7 * SWING)) < 0.2
+
+
+@pytest.mark.parametrize(("lengths", "ratio"), [((80.0, 80.0), 1.8), ((56.0, 40.0), 1.41), ((52.0, 56.0), 1.88)])
+def test_of_two_hinged_links_one_is_measured_or_none(tmp_path, lengths, ratio):
+    first, second = lengths
+
+    def links(scene, angle):
+        joint = things.hanging((160.0, 30.0), first, angle)
+        things.bar(scene, (160.0, 30.0), joint, 10.0, GREY)
+        things.bar(scene, joint, things.hanging(joint, second, ratio * angle), 10.0, GREY)
+
+    swing = 20.0 * np.sin(2 * np.pi * np.arange(60) / 40.0)
+    motion = _followed(tmp_path, links, swing, relief=12.0)
+    if not isinstance(motion, str):
+        apart = np.degrees(motion.turn) - np.outer([1.0, ratio], swing)
+        off = np.abs(apart - np.median(apart, axis=1)[:, None]) / np.degrees(motion.sigma)
+        assert np.median(off, axis=1).min() < 1.0
