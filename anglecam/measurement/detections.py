@@ -104,3 +104,10 @@ def frame_of_mark(film: Film, mark: RigMark) -> Frame:
     if found.image is None:
         raise InputError(f"{film.path}: the mark is declared in frame {mark.frame}, which cannot be decoded")
     return found
+
+
+def in_all_frames(ok: NDArray[np.bool_], places_px: Floats) -> Floats:
+    """Arrange the positions of the measured frames in all frames; NaN elsewhere."""
+    placed = np.full((len(ok), 2), np.nan)
+    placed[ok] = places_px
+    return placed

@@ -1,7 +1,7 @@
 """The coarse pass over a clip: find the mark in every frame, and the pivot.
 
 The first reading keeps a few frames, from which the mark's colour, its rough path and the pivot's marker are learnt.
-The second reading finds the mark in every frame. Where there is no mark, a body that turns rigidly is followed instead.
+The second reading finds the mark in every frame.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from anglecam.errors import InputError
 from anglecam.io.rig import Rig, RigMark
 from anglecam.measurement.detections import Detections, frame_of_mark, frames_to_keep
 from anglecam.measurement.pivot import find_pivot
-from anglecam.measurement.rigid_body_pass import detect_outline, detect_rigid_body
 from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.mark.found_mark import FoundMark, Samples
@@ -32,17 +31,17 @@ from anglecam.vision.mark.track import MarkTrack, follow_mark
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.pivot.marker import RoundMarker
 from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
-from anglecam.vision.stabilise.learn import learn_background
-from anglecam.vision.stabilise.zoom import camera_zoom
 
 _CLEAR = 2.0
 """Ratio of the best score to the next best from which on the choice of the mark is clear."""
-_LEAST_KNOWN = 0.5
-"""Least share of the sampled frames in which the motion of a camera that moves is known. In fewer, what was taken for
-scenery is not what the camera stands before."""
 
 
-def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | None = None) -> Detections:
+def detect_mark(
+    film: Film,
+    rig: Rig,
+    steady: BackgroundMotion | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Detections:
     """Find the mark in every frame of a clip, and the pivot.
 
     Parameters
@@ -51,6 +50,8 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
         The clip.
     rig : Rig
         Declares mark, pivot and camera.
+    steady : BackgroundMotion, optional
+        The scenery by which the camera's motion is measured; without it the camera is at rest.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
 
@@ -68,27 +69,13 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
     lens = lens_from_rig(rig, film.size, path)
     sample = film.sample(frames_to_keep(film))
     noise = pixel_noise([f.image for f in sample.frames if f.image is not None])
-    steady = learn_background([f.image for f in sample.frames if f.image is not None])
     pointed = rig.pointed_mark
     frames = [*([] if pointed is None else [frame_of_mark(film, pointed)]), *sample.frames]
     samples = _samples(film, frames, pointed, steady, lens)
     near = None if rig.pivot.expected is None else lens.rectify(rig.pivot.expected)
     found = find_mark(samples, rig.mark_rgb, near) if samples.images else None
     if found is None:
-        causes = []
-        for follow in _without_mark(rig, samples, steady):
-            body = follow(film, rig)
-            if isinstance(body, Detections):
-                return body
-            causes.append(body)
-        besides = f"; nor can the body be followed without a mark: {', and '.join(causes)}" if causes else ""
-        raise InputError(_no_mark(path, sample, rig) + besides)
-    zoom = camera_zoom(samples.images)
-    if zoom is not None:
-        raise InputError(
-            f"{path}: the camera zooms or comes nearer, by {100.0 * (zoom - 1.0):.1f} %; film from one place and with"
-            " fixed focus and zoom"
-        )
+        raise InputError(_no_mark(path, sample, rig))
     time, filmed, decoded, repeated, shakes = _read_regions(film, found, sample.count, steady, progress)
     candidates = filmed if shakes is None else [_unshaken(r, move) for r, move in zip(filmed, shakes, strict=True)]
     lens, track, marker, pivot, disagreement = _follow(candidates, time, found, samples.stabilised, rig, lens)
@@ -133,16 +120,6 @@ def detect_mark(film: Film, rig: Rig, progress: Callable[[int, int], None] | Non
     )
 
 
-def _without_mark(
-    rig: Rig, samples: Samples, steady: BackgroundMotion | None
-) -> list[Callable[[Film, Rig], Detections | str]]:
-    """Return the ways in which a body may be followed that has no mark of the declared kind."""
-    if rig.mark_rgb is not None or not samples.images:
-        return []
-    still = steady is None and rig.pointed_mark is None
-    return [detect_rigid_body, detect_outline] if still else [detect_rigid_body]
-
-
 def _samples(
     film: Film, frames: Sequence[Frame], pointed: RigMark | None, steady: BackgroundMotion | None, lens: Lens
 ) -> Samples:
@@ -154,11 +131,6 @@ def _samples(
         where = f"{film.path}: the camera's motion is unknown in frame {pointed.frame}"
         raise InputError(f"{where}; declare the mark in another frame")
     kept = [(time, image, move) for (time, image), move in zip(pictures, moves, strict=True) if move.known]
-    if len(kept) < _LEAST_KNOWN * len(moves):
-        raise InputError(
-            f"{film.path}: the camera moves, and how can be seen in {len(kept)} of {len(moves)} sampled frames only;"
-            " film with a fixed camera, or so that the same scenery stays in the picture"
-        )
     return Samples(
         images=[image for _, image, _ in kept],
         stabilised=[image if steady is None else _stabilised(image, move) for _, image, move in kept],

@@ -17,7 +17,7 @@ from anglecam.vision.pivot.marker import RoundMarker, count_round_things, find_m
 
 _STILL = 9
 """Frames whose median shows the still background."""
-_HINT_PX = 10.0
+HINT_PX = 10.0
 """Standard uncertainty of the rig file's hint at the pivot."""
 _SLANTED_HINT_PX = 25.0
 """The same where nothing is found so near: a slanted view shifts a marker that lies in front of the plane of motion."""
@@ -82,7 +82,7 @@ def _hint(rig: Rig, lens: Lens) -> PivotEstimate | None:
     if rig.pivot.near is None:
         return None
     J = lens.jacobian(np.array(rig.pivot.near))
-    sigma = _HINT_PX if lens.tilt == 0.0 else _SLANTED_HINT_PX
+    sigma = HINT_PX if lens.tilt == 0.0 else _SLANTED_HINT_PX
     return PivotEstimate(lens.rectify(np.array(rig.pivot.near)), sigma**2 * J @ J.T, "hint")
 
 
@@ -107,7 +107,7 @@ def _still(images: Sequence[Image]) -> Image:
 def _find_marker(still: Image, rig: Rig, circle: Circle | None, lens: Lens) -> RoundMarker | None:
     if rig.pivot.near is not None:
         hint = np.array(rig.pivot.near)
-        near = find_marker(still, hint, _HINT_PX**2 * np.eye(2))
+        near = find_marker(still, hint, HINT_PX**2 * np.eye(2))
         return near or find_marker(still, hint, _SLANTED_HINT_PX**2 * np.eye(2))
     if circle is None:
         return find_marker(still, None, None)

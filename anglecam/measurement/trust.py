@@ -20,6 +20,7 @@ from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.detections import Detections
+from anglecam.measurement.pivot import HINT_PX
 
 _MAX_OFF_CIRCLE = 0.02
 """Largest systematic variation of the distance from the pivot, as a share of the mark's travel. An error along the
@@ -34,6 +35,13 @@ _PIVOT_SIGMAS = 3.0
 _MAX_SCALE_SIGMA = 0.2
 """Relative standard uncertainty of the path's radius from which on the path does not show its centre, as for a pivot
 (`anglecam.vision.pivot.estimate`)."""
+_HINT_SIGMAS = 3.0
+"""Standard uncertainties by which a hint at the pivot may be off the centre of rotation."""
+_SHORTEST = 0.05
+"""Share of the frames in which a mark may be shorter."""
+_LEAST_LENGTH, _LENGTH_PX = 0.75, 4.0
+"""Least length of a mark in the others, relative to its usual one, and the change that shows nothing, px. Motion blur
+lengthens a mark, and noise changes a small one."""
 _DECLARE = "pivot: {at: [x, y], sigma_px: s} in rig.yaml"
 _TRAVEL_PX = 0.5
 """Least RMS travel of a mark that moves, px. Noise, rain and flicker shift the centroid of a thing at rest by 0.2."""
@@ -92,6 +100,9 @@ def why_few(status: Sequence[str], least: float) -> str | None:
 
 def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig) -> str | None:
     declared = rig.pivot.expected is not None
+    elsewhere = _turns_elsewhere(detections, rig)
+    if elsewhere is not None:
+        return elsewhere
     lost = sum(s == "no_mouth" for s, measured in zip(detections.status, ok, strict=True) if not measured)
     if detections.moves and lost > (1.0 - rig.least_measured) * len(ok):
         return (
@@ -116,6 +127,56 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
             f"the mark's path is too short or too straight to show about which point it turns; declare it: {_DECLARE}"
         )
     return None
+
+
+def why_not_rigid(detections: Detections, ok: Flags) -> str | None:
+    """Return a message where what was followed as a mark is seen whole in some frames and in part in others.
+
+    Parameters
+    ----------
+    detections : Detections
+        The coarse pass.
+    ok : ndarray
+        (frames,) the measured frames.
+
+    Returns
+    -------
+    str or None
+        With its least length; ``None`` for a mark of constant length, and for a body without a mark.
+    """
+    longest = [
+        float(np.linalg.eigvalsh(region.moments_px2)[1])
+        for region, seen in zip(detections.regions, ok, strict=True)
+        if seen and region is not None
+    ]
+    if not longest:
+        return None
+    # a homogeneous bar is √12 times as long as its standard deviation
+    usual, least = np.sqrt(12.0 * np.quantile(longest, (0.5, _SHORTEST)))
+    if least > min(_LEAST_LENGTH * usual, usual - _LENGTH_PX):
+        return None
+    return (
+        f"the mark is {usual:.0f} px long, but only {least:.0f} px in some frames: something covers a part of it, or it"
+        " is no rigid thing; declare another: mark: {at: [x, y], frame: k} in rig.yaml"
+    )
+
+
+def _turns_elsewhere(detections: Detections, rig: Rig) -> str | None:
+    """Return a message where the path's centre is not where the hint at the pivot is."""
+    if rig.pivot.near is None or not _shows_its_centre(detections):
+        return None
+    assert detections.circle is not None
+    hint = detections.lens.rectify(np.array(rig.pivot.near))
+    off = detections.circle.centre_px - hint
+    spread = detections.circle.centre_covariance_px2 + HINT_PX**2 * np.eye(2)
+    if detections.lens.tilt != 0.0 or off @ np.linalg.solve(spread, off) < _HINT_SIGMAS**2:
+        return None
+    x, y = detections.lens.distort(detections.circle.centre_px)
+    expected = "{:g}, {:g}".format(*rig.pivot.near)
+    return (
+        f"what moves turns about {x:.0f},{y:.0f}, {np.hypot(*off):.0f} px from the hint pivot: {{near: [{expected}]}};"
+        " is another thing meant? Declare it: mark: {at: [x, y], frame: k} in rig.yaml"
+    )
 
 
 def _travel(mark_px: Floats) -> float:

@@ -48,8 +48,8 @@ _ROUNDS = 4
 _OWN = 0.5
 """Slope of the background, as a share of an edge's, up to which the edge is the moving thing's own."""
 _RIGID_SHARE = 0.5
-"""Least share of the moving things' own edges that must follow. A rigid thing and its sharp shadow have equal shares; of
-two hinged links fewer follow a common motion: 0.46 at most in 7 of 9 drawn ones, 0.55 to 1 of single things."""
+"""Least share of these edges that must follow one rotation. A rigid thing and its sharp shadow have equal shares; 0.55
+to 1 of single things followed, at most 0.46 of two hinged links that were followed wrongly."""
 _MIN_ANGULARITY = 0.02
 """Least angularity of an outline. A disc has that of its normals' errors, 0.0025 for errors of 3°."""
 _SEEN_SHARE = 0.3
@@ -97,7 +97,7 @@ def learn_outline(samples: Sequence[Frame], frames: Iterator[Frame]) -> MovingOu
     lengths = (steep > level).sum(axis=(1, 2))
     typical = int(np.argsort(lengths)[int(_TYPICAL * (len(lengths) - 1))])
     stretch, start = _frames_around(frames, samples[typical].index, images[0].nbytes)
-    outline = edges = find_outline(slopes(stretch[start], background), level)
+    outline = edges = _own(find_outline(slopes(stretch[start], background), level), background)
     if len(edges.points) < MIN_OUTLINE_POINTS:
         return "nothing moves before the background"
     for _ in range(_ROUNDS):
@@ -111,7 +111,7 @@ def learn_outline(samples: Sequence[Frame], frames: Iterator[Frame]) -> MovingOu
         if follows.all():
             break
         outline = outline.part(follows)
-    if _own(outline, background) < _RIGID_SHARE * _own(edges, background):
+    if len(outline.points) < _RIGID_SHARE * len(edges.points):
         return "most of what moves before the background does not follow one rotation"
     if np.median([match.angularity for match in seen]) < _MIN_ANGULARITY:
         return "what moves before the background is round, and its rotation is not seen"
@@ -157,11 +157,11 @@ def _frames_around(frames: Iterator[Frame], index: int, picture_bytes: int) -> t
     return [frame.image for frame in near if frame.image is not None], [frame.index for frame in near].index(index)
 
 
-def _own(outline: Outline, background: Image) -> int:
-    """Count the points of an outline where the background has no edge. Elsewhere they may be where it is covered."""
+def _own(outline: Outline, background: Image) -> Outline:
+    """Return the edges where the background has none. Elsewhere they may be the background's, which is covered."""
     behind = slopes(background, np.zeros_like(background)).steepness
     x, y = np.minimum(outline.points.round().astype(int), np.array(behind.shape[::-1]) - 1).T
-    return int((behind[y, x] < _OWN * outline.steepness).sum())
+    return outline.part(behind[y, x] < _OWN * outline.steepness)
 
 
 def _anywhere(picture: Image) -> Centre:

@@ -1,0 +1,139 @@
+"""How the camera moves in a clip, and the clip as a camera at rest would have filmed it.
+
+Shift and roll of a shaking camera are corrected for points, which leaves the frames as they are
+(`anglecam.vision.stabilise.background_motion`). A camera in the hand also comes nearer and tilts. Its frames are
+transformed to the place of the first one, from which the clip is then measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+
+import cv2
+import numpy as np
+
+from anglecam.data.typing import Floats, Image
+from anglecam.errors import InputError
+from anglecam.io.rig import Rig
+from anglecam.measurement.detections import frames_to_keep
+from anglecam.video.film import Film, Frame, Sample
+from anglecam.vision.stabilise.background_motion import BackgroundMotion
+from anglecam.vision.stabilise.learn import learn_background
+from anglecam.vision.stabilise.plane import follow_plane, seen_from_first
+from anglecam.vision.stabilise.zoom import camera_zoom
+
+_LEAST_KNOWN = 0.5
+"""Least share of the sampled frames in which the motion of a camera that moves is known. In fewer, what was taken for
+scenery is not what the camera stands before."""
+_LEAST_FOLLOWED = 0.8
+"""Least share of all frames in which the plane is followed."""
+
+
+@dataclass(frozen=True)
+class HeldCamera:
+    """A clip, and how its camera moves."""
+
+    film: Film
+    """The clip; where the camera does more than shift and roll, as a camera at rest would have filmed it."""
+    steady: BackgroundMotion | None = None
+    """The scenery by which shift and roll are measured; ``None`` where the film is that of a camera at rest."""
+    unknown: str | None = None
+    """Message where the camera moves in a way that cannot be measured, so that a mark's path shows no pivot."""
+
+
+@dataclass(frozen=True, eq=False)
+class FilmAtRest(Film):
+    """A film whose frames are transformed to the camera's first place."""
+
+    moves: tuple[Floats | None, ...] = ()
+    """(3, 3) homography from the first frame into each; ``None`` where it is unknown."""
+    first: Image | None = None
+    """The first frame, shown where a transformed frame ends."""
+
+    def frames(self, *, brightness: bool = False) -> Iterator[Frame]:
+        """Yield the transformed frames; without a picture where the camera's place is unknown."""
+        for frame in super().frames(brightness=brightness):
+            yield self._at_rest(frame)
+
+    def sample(self, most: int) -> Sample:
+        """Return evenly spaced transformed frames."""
+        sample = super().sample(most)
+        known = (self._at_rest(frame) for frame in sample.frames)
+        return replace(sample, frames=tuple(frame for frame in known if frame.image is not None))
+
+    def in_picture(self, places_px: Floats) -> Floats:
+        """Return the places in the filmed frames of (frames, 2) places in the first one, px."""
+        return np.array(
+            [
+                np.full(2, np.nan) if move is None else cv2.perspectiveTransform(place[None, None], move)[0, 0]
+                for place, move in zip(places_px, self.moves, strict=True)
+            ]
+        )
+
+    def _at_rest(self, frame: Frame) -> Frame:
+        move = self.moves[frame.index]
+        if frame.image is None or move is None:
+            return replace(frame, image=None)
+        assert self.first is not None
+        behind = self.first if frame.image.shape == self.first.shape else self.first.mean(axis=2, keepdims=True)
+        return replace(frame, image=seen_from_first(frame.image, move, behind.astype(np.uint8)))
+
+
+def hold_camera(film: Film) -> HeldCamera:
+    """Find out how the camera moves.
+
+    Parameters
+    ----------
+    film : Film
+        The clip.
+
+    Returns
+    -------
+    HeldCamera
+        With the clip as it is to be measured.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read.
+    """
+    images = [f.image for f in film.sample(frames_to_keep(film)).frames if f.image is not None]
+    steady = learn_background(images)
+    known = images if steady is None else [image for image in images if steady.at(image).known]
+    zoom = camera_zoom(known)
+    if zoom is not None:
+        why = f"the camera zooms or comes nearer, by {100.0 * (zoom - 1.0):.1f} %"
+    elif len(known) < _LEAST_KNOWN * len(images):
+        why = f"the camera moves, and how can be seen in {len(known)} of {len(images)} sampled frames only"
+    else:
+        return HeldCamera(film, steady)
+    moves = tuple(follow_plane(frame.image for frame in film.frames()))
+    if sum(move is not None for move in moves) < _LEAST_FOLLOWED * len(moves):
+        how = "from one place with fixed focus and zoom, or so that a desk or a wall with edges fills the picture"
+        return HeldCamera(film, steady, f"{film.path}: {why}; film {how}")
+    own = {field.name: getattr(film, field.name) for field in fields(film)}
+    return HeldCamera(FilmAtRest(**own, moves=moves, first=images[0]))
+
+
+def as_seen_at_rest(rig: Rig, film: Film) -> Rig:
+    """Return a rig whose mark is declared in a frame of the film, with its place in the first frame of a film at rest.
+
+    Raises
+    ------
+    InputError
+        Where the camera's place in that frame is unknown.
+    """
+    mark = rig.pointed_mark
+    if mark is None or not isinstance(film, FilmAtRest) or not 0 <= mark.frame - film.first_frame < len(film.moves):
+        return rig
+    move = film.moves[mark.frame - film.first_frame]
+    if move is None:
+        where = f"{film.path}: the camera's motion is unknown in frame {mark.frame}"
+        raise InputError(f"{where}; declare the mark in another frame")
+    left, top, right, bottom = mark.as_box or (0.0, 0.0, 0.0, 0.0)
+    corners = np.array([[[left, top]], [[right, top]], [[right, bottom]], [[left, bottom]]])
+    corners = cv2.perspectiveTransform(corners, np.linalg.inv(move))[:, 0]
+    low, high = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    placed = {"at": tuple(low)} if mark.at is not None else {"box": (*low, *high)}
+    return rig.model_copy(update={"mouth": mark.model_copy(update=placed)})

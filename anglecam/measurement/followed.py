@@ -1,0 +1,222 @@
+"""What is followed in a clip, and its angle: the mark, or else a rigid body, or else the outline of what moves.
+
+`anglecam.measurement.mark_pass` finds mark and pivot. Where more of the body than the mark is rigid and has edges,
+`anglecam.measurement.registration_pass` finds the rotation of the whole body. The result with the smaller uncertainty
+is used. Where no mark is declared and none turns, a body is followed without one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.camera.shutter import measurement_time
+from anglecam.data.command import Command
+from anglecam.data.series import OK
+from anglecam.data.typing import Flags, Floats
+from anglecam.errors import InputError
+from anglecam.io.rig import Rig
+from anglecam.measurement.angles import Angles, coarse_angles, turns
+from anglecam.measurement.camera_pass import HeldCamera
+from anglecam.measurement.carried_marks import carried_marks, smeared_marks, with_marks
+from anglecam.measurement.detections import Detections, in_all_frames
+from anglecam.measurement.fine_angles import fine_angles
+from anglecam.measurement.mark_pass import detect_mark
+from anglecam.measurement.registration_pass import Registered, Start, register_clip
+from anglecam.measurement.rigid_body_pass import detect_outline, detect_rigid_body
+from anglecam.measurement.trust import require_rotation
+from anglecam.video.film import Film
+from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
+
+_AGREE = 2.0
+"""Standard uncertainties by which two measurements of the rotation may differ."""
+_LARGER = 2.0
+"""Least size of a body, relative to the mark's radius, from which on it is not the mark."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """The angle of one of the things that can be followed in a clip."""
+
+    detections: Detections
+    ok: Flags
+    """(n,) the measured frames."""
+    time: Floats
+    """(n,) of all frames, s."""
+    angles: Angles
+    """Of the measured frames."""
+    why_coarse: str | None
+
+
+def follow_mark_or_body(
+    camera: HeldCamera, rig: Rig, command: Command | None, progress: Callable[[int, int], None] | None = None
+) -> Followed:
+    """Measure the angle of the mark or, where none is declared and none turns, of a rigid body or its outline.
+
+    Parameters
+    ----------
+    camera : HeldCamera
+        The clip, and how its camera moves.
+    rig : Rig
+        Declares mark, pivot, direction, neutral and camera.
+    command : Command, optional
+        Its first change ends the rest that defines neutral.
+    progress : callable, optional
+        Called with (frames done, frames in all) after each frame.
+
+    Returns
+    -------
+    Followed
+        The first of them that turns about a fixed pivot.
+
+    Raises
+    ------
+    InputError
+        Where none does: one line with the causes.
+    """
+    film, causes = camera.film, []
+    try:
+        if camera.unknown is not None:
+            raise InputError(camera.unknown)
+        return _measured(film, rig, command, detect_mark(film, rig, camera.steady, progress), progress)
+    except InputError as problem:
+        causes.append(str(problem))
+    for follow in _without_mark(camera, rig):
+        try:
+            body = follow(film, rig)
+            if isinstance(body, Detections):
+                return _measured(film, rig, command, body, progress)
+            causes.append(body)
+        except InputError as problem:
+            causes.append(str(problem).removeprefix(f"{film.path}: "))
+    besides = f"; nor can a body be followed without a mark: {', and '.join(causes[1:])}" if causes[1:] else ""
+    raise InputError(causes[0] + besides)
+
+
+def _without_mark(camera: HeldCamera, rig: Rig) -> list[Callable[[Film, Rig], Detections | str]]:
+    """Return the ways in which a body may be followed where no mark is declared by its colour."""
+    if rig.mark_rgb is not None or camera.film.undecodable == len(camera.film.times):
+        return []
+    by_outline = camera.steady is None and rig.pointed_mark is None
+    return [detect_rigid_body, detect_outline] if by_outline else [detect_rigid_body]
+
+
+def _measured(
+    film: Film,
+    rig: Rig,
+    command: Command | None,
+    detections: Detections,
+    progress: Callable[[int, int], None] | None,
+) -> Followed:
+    """Return the angles of what was detected, finer where more of the body than the mark can be registered."""
+    ok = np.array([s == OK for s in detections.status])
+    row = _mark_rows(detections)
+    time = measurement_time(detections.time, row, detections.size[1], rig.camera.row_time_s)
+    angles = coarse_angles(detections, ok, time, rig, command)
+    why_coarse: str | None = "the body has too few features" if detections.moves else "the mark does not move"
+    if detections.moves and detections.by != "outline":
+        start = _start(detections, ok, time, row, angles, rig)
+        registered = register_clip(film, start, detections.lens, progress)
+        why_coarse = registered if isinstance(registered, str) else None
+        if isinstance(registered, Registered):
+            registered = replace(registered, turn=registered.turn - _rolls(detections))
+            start = replace(start, turn=start.turn - _rolls(detections))
+            found = np.isfinite(registered.turn)
+            ok |= found & smeared_marks(detections, start, registered, float(np.median(angles.lever_px)))
+            carried = carried_marks(detections, ok, registered)
+            detections = with_marks(detections, carried)
+            ok |= np.array([region is not None for region in carried])
+            row = np.where(found, registered.row, row)
+            time = measurement_time(detections.time, row, detections.size[1], rig.camera.row_time_s)
+            angles = coarse_angles(detections, ok, time, rig, command)
+            filmed = detections.in_picture(in_all_frames(ok, angles.mark_px))[ok]
+            angles = fine_angles(angles, registered, np.flatnonzero(ok), filmed, time[ok], rig, command)
+        elif _pivot_from_path_alone(detections, rig):
+            # a centre fitted to the mark's path is much less certain than the centre of rotation of the whole body
+            body = detect_rigid_body(film, rig)
+            if isinstance(body, Detections) and body.body is not None and _shows_rotation(body.body, detections, ok):
+                rigid = np.array([s == OK for s in body.status])
+                other = coarse_angles(body, rigid, body.time, rig, command)
+                surer = (other.sigma**2).mean() < (angles.sigma**2).mean()
+                if surer and _agree(angles, ok, other, rigid, rig):
+                    detections, ok, time, angles = body, rigid, body.time, other
+    require_rotation(film.path, detections, ok, angles, rig)
+    return Followed(detections, ok, time, angles, why_coarse)
+
+
+def _pivot_from_path_alone(detections: Detections, rig: Rig) -> bool:
+    """Return whether the pivot is only the centre of the mark's path, and a rigid body could be followed instead."""
+    followable = detections.body is None and detections.camera_moves is None and detections.lens.is_identity
+    return followable and detections.pivot.source == "centre of rotation" and rig.pivot.expected is None
+
+
+def _shows_rotation(body: RigidMotion, detections: Detections, ok: Flags) -> bool:
+    """Return whether a body is larger than the mark, which shows its own rotation no better, and as often seen."""
+    areas = [
+        region.area_px2 for region, seen in zip(detections.regions, ok, strict=True) if seen and region is not None
+    ]
+    larger = body.extent_px > _LARGER * float(np.sqrt(np.median(areas) / np.pi))
+    return larger and bool(np.isfinite(body.turn[ok]).all())
+
+
+def _agree(one: Angles, ok: Flags, other: Angles, other_ok: Flags, rig: Rig) -> bool:
+    """Return whether two measurements of the rotation agree within their uncertainty."""
+    both = ok & other_ok
+    apart = turns(one, rig)[both[ok]] - turns(other, rig)[both[other_ok]]
+    expected = one.sigma[both[ok]] ** 2 + other.sigma[both[other_ok]] ** 2
+    return bool(both.any()) and float(apart.var()) < _AGREE**2 * float(expected.mean())
+
+
+def _rolls(detections: Detections) -> Floats:
+    """Return (n,) roll of the camera in each frame, rad."""
+    return (
+        np.zeros(len(detections.time))
+        if detections.camera_moves is None
+        else np.array([move.roll for move in detections.camera_moves])
+    )
+
+
+def _mark_rows(detections: Detections) -> Floats:
+    """Return (n,) rows of the picture in which the mark was found, px."""
+    places = detections.places_px
+    if detections.body is not None:
+        seen = np.isfinite(detections.body.turn)[:, None]
+        places = np.where(seen, detections.lens.rectify(detections.body.centre_px), np.nan)
+    return np.asarray(detections.in_picture(places)[:, 1])
+
+
+def _start(detections: Detections, ok: NDArray[np.bool_], time: Floats, row: Floats, angles: Angles, rig: Rig) -> Start:
+    """Return the coarse rotation in all frames, as the fine pass starts from it."""
+    n = len(time)
+    turn, sigma, speed = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n)
+    turn[ok], sigma[ok] = turns(angles, rig), angles.sigma
+    guessed = np.flatnonzero(detections.smeared)
+    if len(guessed):
+        arm = np.array([r.centre_px for i in guessed if (r := detections.regions[i])]) - detections.pivot.centre_px
+        line = np.arctan2(-arm[:, 1], arm[:, 0] if rig.facing == "right" else -arm[:, 0])
+        near = line - np.median(angles.line)
+        near -= 2.0 * np.pi * np.round(near / (2.0 * np.pi))
+        turn[guessed] = near if rig.facing == "right" else -near
+    known = np.isfinite(turn)
+    turn = np.interp(time, time[known], turn[known])
+    row = np.interp(time, time[known], row[known])
+    if rig.camera.row_time_s is not None and known.sum() > 1:
+        speed = np.gradient(turn, time)
+    pivots, covariance = np.broadcast_to(detections.pivot.centre_px, (n, 2)), None
+    if detections.camera_moves is not None:
+        pivots = detections.lens.rectify(detections.in_picture(pivots))
+        filmed = detections.lens.distort(detections.pivot.centre_px)
+        covariance = np.array([move.place_covariance(filmed) for move in detections.camera_moves])
+        turn = turn + _rolls(detections)
+    return Start(
+        turn=turn,
+        sigma=sigma,
+        pivot=detections.pivot,
+        pivots_px=pivots,
+        pivot_covariance_px2=covariance,
+        turn_per_row=speed * (rig.camera.row_time_s or 0.0),
+        row=row,
+    )
