@@ -73,7 +73,7 @@ FILMS = {
     "bauble": RealFilm("films/bauble/pendulum.mp4", lambda path: blob(path, _bauble), {}, "T 2.629 s, L 1.70 m"),
     "blue ball": RealFilm(
         "films/blue-ball/film2_vga.mp4",
-        lambda path: blob(path, _bluer),
+        lambda path: blob(path, _bluer, (265.0, -620.0)),
         {"mouth": {"rgb": [40, 90, 150]}},
         "T 1.601 s, L 0.636 m",
     ),
@@ -110,7 +110,7 @@ FILMS = {
     "wooden gear": RealFilm(
         "films/wooden-gears/WorkingGears.MOV",
         lambda path: gear(path, (1236.0, 464.0), (428.0, 375.0), 13.0),
-        {"pivot": {"near": [1193, 410]}},
+        {"pivot": {"near": [670, 1193]}},
         periodic=False,
     ),
 }

@@ -162,16 +162,20 @@ def why_not_rigid(detections: Detections, ok: Flags) -> str | None:
 
 
 def _turns_elsewhere(detections: Detections, rig: Rig) -> str | None:
-    """Return a message where the path's centre is not where the hint at the pivot is."""
-    if rig.pivot.near is None or not _shows_its_centre(detections):
+    """Return a message where the centre of rotation is not where the hint at the pivot is."""
+    body, circle = detections.body, detections.circle
+    if rig.pivot.near is None or detections.lens.tilt != 0.0:
         return None
-    assert detections.circle is not None
-    hint = detections.lens.rectify(np.array(rig.pivot.near))
-    off = detections.circle.centre_px - hint
-    spread = detections.circle.centre_covariance_px2 + HINT_PX**2 * np.eye(2)
-    if detections.lens.tilt != 0.0 or off @ np.linalg.solve(spread, off) < _HINT_SIGMAS**2:
+    if body is not None:
+        centre, covariance = body.pivot_px, body.pivot_covariance_px2
+    elif circle is not None and _shows_its_centre(detections):
+        centre, covariance = circle.centre_px, circle.centre_covariance_px2
+    else:
         return None
-    x, y = detections.lens.distort(detections.circle.centre_px)
+    off = centre - detections.lens.rectify(np.array(rig.pivot.near))
+    if off @ np.linalg.solve(covariance + HINT_PX**2 * np.eye(2), off) < _HINT_SIGMAS**2:
+        return None
+    x, y = detections.lens.distort(centre)
     expected = "{:g}, {:g}".format(*rig.pivot.near)
     return (
         f"what moves turns about {x:.0f},{y:.0f}, {np.hypot(*off):.0f} px from the hint pivot: {{near: [{expected}]}};"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ import pytest
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig, RigPivot
 from anglecam.measurement.clip import measure_clip
-from anglecam.measurement.trust import why_few
+from anglecam.measurement.trust import why_few, why_not_rigid
 from anglecam.video.film import open_film
 
 SIZE = (240, 180)
@@ -102,3 +104,23 @@ def test_few_measured_frames_are_counted_with_their_causes():
     message = why_few(status, 0.5)
     assert message is not None
     assert message.startswith("only 9 of 20 frames are measured (occluded in 6, no_mouth in 5)")
+
+
+def test_a_hint_away_from_the_point_that_the_motion_shows_is_one_line(tmp_path):
+    film = _film(tmp_path, _swing(40.0))
+    assert measure_clip(film, Rig(pivot=RigPivot(near=(126.0, 36.0)))).series.ok.all()
+    with pytest.raises(InputError, match=r"turns about 1(19|20|21),(29|30|31), 72 px from the hint pivot"):
+        measure_clip(film, Rig(pivot=RigPivot(near=(180.0, 70.0))))
+
+
+@pytest.mark.parametrize(("covered", "doubted"), [(0.02, False), (0.2, True)])
+def test_a_mark_that_is_seen_in_part_is_no_success(tmp_path, covered, doubted):
+    found = measure_clip(_film(tmp_path, _swing(40.0)), Rig())
+    assert found.doubt is None
+    half = np.arange(len(TIME)) < covered * len(TIME)
+    regions = tuple(
+        replace(region, moments_px2=region.moments_px2 / 4.0) if part else region
+        for region, part in zip(found.detections.regions, half, strict=True)
+    )
+    message = why_not_rigid(replace(found.detections, regions=regions), found.series.ok)
+    assert (message is not None) == doubted
