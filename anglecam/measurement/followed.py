@@ -134,23 +134,22 @@ def _measured(
             angles = coarse_angles(detections, ok, time, rig, command)
             filmed = detections.in_picture(in_all_frames(ok, angles.mark_px))[ok]
             angles = fine_angles(angles, registered, np.flatnonzero(ok), filmed, time[ok], rig, command)
-        elif _pivot_from_path_alone(detections, rig):
-            # a centre fitted to the mark's path is much less certain than the centre of rotation of the whole body
+        elif _may_follow_body(detections, rig):
+            # a centre fitted to the mark's path is often much less certain than that of the whole body's rotation
             body = detect_rigid_body(film, rig)
             if isinstance(body, Detections) and body.body is not None and _shows_rotation(body.body, detections, ok):
                 rigid = np.array([s == OK for s in body.status])
                 other = coarse_angles(body, rigid, body.time, rig, command)
-                surer = (other.sigma**2).mean() < (angles.sigma**2).mean()
-                if surer and _agree(angles, ok, other, rigid, rig):
+                if _shows_it_better(angles, ok, other, rigid, rig):
                     detections, ok, time, angles = body, rigid, body.time, other
     require_rotation(film.path, detections, ok, angles, rig)
     return Followed(detections, ok, time, angles, why_coarse)
 
 
-def _pivot_from_path_alone(detections: Detections, rig: Rig) -> bool:
-    """Return whether the pivot is only the centre of the mark's path, and a rigid body could be followed instead."""
+def _may_follow_body(detections: Detections, rig: Rig) -> bool:
+    """Return whether nobody declared the pivot, and a rigid body could be followed instead of the mark."""
     followable = detections.body is None and detections.camera_moves is None and detections.lens.is_identity
-    return followable and detections.pivot.source == "centre of rotation" and rig.pivot.expected is None
+    return followable and detections.moves and rig.pivot.expected is None
 
 
 def _shows_rotation(body: RigidMotion, detections: Detections, ok: Flags) -> bool:
@@ -162,12 +161,20 @@ def _shows_rotation(body: RigidMotion, detections: Detections, ok: Flags) -> boo
     return larger and bool(np.isfinite(body.turn[ok]).all())
 
 
-def _agree(one: Angles, ok: Flags, other: Angles, other_ok: Flags, rig: Rig) -> bool:
-    """Return whether two measurements of the rotation agree within their uncertainty."""
-    both = ok & other_ok
-    apart = turns(one, rig)[both[ok]] - turns(other, rig)[both[other_ok]]
-    expected = one.sigma[both[ok]] ** 2 + other.sigma[both[other_ok]] ** 2
-    return bool(both.any()) and float(apart.var()) < _AGREE**2 * float(expected.mean())
+def _shows_it_better(mark: Angles, ok: Flags, body: Angles, body_ok: Flags, rig: Rig) -> bool:
+    """Return whether a body's rotation agrees with the mark's and is surer.
+
+    What their uncertainties do not explain of their difference counts against the mark: light that displaces its
+    centre, or an error of the pivot, hardly changes the rotation of a body that is seen on itself.
+    """
+    both = ok & body_ok
+    if not both.any():
+        return False
+    one, other = both[ok], both[body_ok]
+    apart = float((turns(mark, rig)[one] - turns(body, rig)[other]).var())
+    of_mark, of_body = float((mark.sigma[one] ** 2).mean()), float((body.sigma[other] ** 2).mean())
+    unexplained = max(apart - of_mark - of_body, 0.0)
+    return apart < _AGREE**2 * (of_mark + of_body) and of_body < of_mark + unexplained
 
 
 def _rolls(detections: Detections) -> Floats:

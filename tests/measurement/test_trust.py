@@ -11,6 +11,7 @@ import pytest
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig, RigPivot
 from anglecam.measurement.clip import measure_clip
+from anglecam.measurement.rigid_body_pass import detect_rigid_body
 from anglecam.measurement.trust import why_few, why_not_rigid
 from anglecam.video.film import open_film
 
@@ -124,3 +125,9 @@ def test_a_mark_that_is_seen_in_part_is_no_success(tmp_path, covered, doubted):
     )
     message = why_not_rigid(replace(found.detections, regions=regions), found.series.ok)
     assert (message is not None) == doubted
+
+
+@pytest.mark.parametrize("screw", [(120, 60), (120, 45)])
+def test_a_ball_and_a_screw_at_rest_are_no_rigid_body(tmp_path, screw):
+    film = _film(tmp_path, _swing(20.0, lever=100.0), marker=screw)
+    assert isinstance(detect_rigid_body(film, Rig()), str)

@@ -30,6 +30,9 @@ _DISTINCT = 0.8
 """Lowe's ratio: largest distance of the best match, relative to that of the second best."""
 _COARSE_PX = 2.5
 """Tolerance for matched features to move as one body, px."""
+_STILL_PX = 1.0
+"""Displacement up to which a feature may be at rest, px. A ball that swings around a screw keeps its distance from it,
+but neither rotates."""
 _BODIES = 4
 """Rigid bodies that are removed from a pair of pictures in search of one that rotates."""
 _TRIALS = 200
@@ -80,7 +83,7 @@ def find_body_pose(body: Features, picture: Features) -> Floats | None:
 
 
 def find_turning_body(one: Features, other: Features) -> tuple[NDArray[np.intp], NDArray[np.intp]] | None:
-    """Find the largest set of features that moves as one rigid body and rotates.
+    """Find the largest set of features that moves as one rigid body and rotates, without those that may be at rest.
 
     Parameters
     ----------
@@ -102,7 +105,10 @@ def find_turning_body(one: Features, other: Features) -> tuple[NDArray[np.intp],
             return None
         motion, members = body
         if abs(turn_of(motion)) >= MIN_TURN:
-            return pairs, remaining[members]
+            moving = remaining[members[np.hypot(*(end - start)[remaining[members]].T) > _STILL_PX]]
+            alone = fit_body_motion(start[moving], end[moving], _COARSE_PX)
+            if alone is not None and abs(turn_of(alone[0])) >= MIN_TURN:
+                return pairs, moving[alone[1]]
         remaining = np.delete(remaining, members)
     return None
 
