@@ -136,11 +136,11 @@ def _measured(
         raise InputError(f"{job.address}: {loss}") from loss
     figures = {name: value for name, value in answer.items() if name in Row.__dataclass_fields__ and name != "cause"}
     record = replace(record, row=replace(record.row, **figures))
+    if not is_remote(record.address) and stamp(record.address) != record.stamp:
+        return record.failed("it changed while it was being measured", transient=True), {}
     if "cause" in answer:
         cause = message_of(answer["cause"], job.address, work)
         return record.failed(cause, call_is_wrong=answer["call_is_wrong"], transient=answer["transient"]), {}
-    if not is_remote(record.address) and stamp(record.address) != record.stamp:
-        return record.failed("it changed while it was being measured", transient=True), {}
     made = {job.output_path + file.name[len(clip.stem) :]: file for file in sorted(into.iterdir())}
     if job.in_session:
         made[settings.folder.cached_series(job.address)] = cached

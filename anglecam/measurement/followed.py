@@ -2,7 +2,7 @@
 
 `anglecam.measurement.mark_pass` finds mark and pivot. Where more of the body than the mark is rigid and has edges,
 `anglecam.measurement.registration_pass` finds the rotation of the whole body. The result with the smaller uncertainty
-is used. Where no mark is declared and none turns, a body is followed without one.
+is used. Where no mark is declared and none is found, a body is followed without one.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Followed:
 def follow_mark_or_body(
     camera: HeldCamera, rig: Rig, command: Command | None, progress: Callable[[int, int], None] | None = None
 ) -> Followed:
-    """Measure the angle of the mark or, where none is declared and none turns, of a rigid body or its outline.
+    """Measure the angle of the mark or, where none is declared and none is found, of a rigid body or its outline.
 
     Parameters
     ----------
@@ -70,20 +70,22 @@ def follow_mark_or_body(
     Returns
     -------
     Followed
-        The first of them that turns about a fixed pivot.
+        What is followed turns about a fixed pivot.
 
     Raises
     ------
     InputError
-        Where none does: one line with the causes.
+        Where nothing does: one line with the causes.
     """
-    film, causes = camera.film, []
+    film = camera.film
     try:
         if camera.unknown is not None:
             raise InputError(camera.unknown)
-        return _measured(film, rig, command, detect_mark(film, rig, camera.steady, progress), progress)
+        mark = detect_mark(film, rig, camera.steady, progress)
     except InputError as problem:
-        causes.append(str(problem))
+        causes = [str(problem)]
+    else:  # a mark that moves otherwise than about a fixed pivot says the same of what it is on
+        return _measured(film, rig, command, mark, progress)
     for follow in _without_mark(camera, rig):
         try:
             body = follow(film, rig)

@@ -100,7 +100,8 @@ def why_few(status: Sequence[str], least: float) -> str | None:
 
 def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig) -> str | None:
     declared = rig.pivot.expected is not None
-    elsewhere = _turns_elsewhere(detections, rig)
+    seen_to_turn = detections.body is not None or angles.registered is not None
+    elsewhere = None if seen_to_turn else _turns_elsewhere(detections, rig)
     if elsewhere is not None:
         return elsewhere
     lost = sum(s == "no_mouth" for s, measured in zip(detections.status, ok, strict=True) if not measured)
@@ -121,7 +122,6 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
             f"what moves does not turn about a fixed pivot: its distance from the centre varies by {off:.2g} px RMS"
             f" while it travels {travel:.2g} px RMS"
         )
-    seen_to_turn = detections.body is not None or angles.registered is not None
     if not declared and not seen_to_turn and not _shows_its_centre(detections):
         return (
             f"the mark's path is too short or too straight to show about which point it turns; declare it: {_DECLARE}"
@@ -163,19 +163,13 @@ def why_not_rigid(detections: Detections, ok: Flags) -> str | None:
 
 def _turns_elsewhere(detections: Detections, rig: Rig) -> str | None:
     """Return a message where the centre of rotation is not where the hint at the pivot is."""
-    body, circle = detections.body, detections.circle
-    if rig.pivot.near is None or detections.lens.tilt != 0.0:
+    circle = detections.circle
+    if rig.pivot.near is None or detections.lens.tilt != 0.0 or circle is None or not _shows_its_centre(detections):
         return None
-    if body is not None:
-        centre, covariance = body.pivot_px, body.pivot_covariance_px2
-    elif circle is not None and _shows_its_centre(detections):
-        centre, covariance = circle.centre_px, circle.centre_covariance_px2
-    else:
+    off = circle.centre_px - detections.lens.rectify(np.array(rig.pivot.near))
+    if off @ np.linalg.solve(circle.centre_covariance_px2 + HINT_PX**2 * np.eye(2), off) < _HINT_SIGMAS**2:
         return None
-    off = centre - detections.lens.rectify(np.array(rig.pivot.near))
-    if off @ np.linalg.solve(covariance + HINT_PX**2 * np.eye(2), off) < _HINT_SIGMAS**2:
-        return None
-    x, y = detections.lens.distort(centre)
+    x, y = detections.lens.distort(circle.centre_px)
     expected = "{:g}, {:g}".format(*rig.pivot.near)
     return (
         f"what moves turns about {x:.0f},{y:.0f}, {np.hypot(*off):.0f} px from the hint pivot: {{near: [{expected}]}};"

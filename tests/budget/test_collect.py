@@ -71,8 +71,8 @@ def test_a_measured_clips_terms_combine_to_its_sigma(clip, detected, registered,
         "always": registered,
         "sometimes": lambda *arguments: _sometimes(registered(*arguments)),
     }
-    monkeypatch.setattr(import_module("anglecam.measurement.clip"), "detect_mark", detected)
-    monkeypatch.setattr(import_module("anglecam.measurement.clip"), "register_clip", readings[registration])
+    monkeypatch.setattr(import_module("anglecam.measurement.followed"), "detect_mark", detected)
+    monkeypatch.setattr(import_module("anglecam.measurement.followed"), "register_clip", readings[registration])
     if neutral == "declared":
         rig = rig.model_copy(update={"neutral": -12.0})
     measured = measure_clip(open_film(path), rig, command if neutral == "rest" else None)

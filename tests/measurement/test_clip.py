@@ -194,7 +194,7 @@ def test_neutral_is_what_is_declared_else_the_rest_else_the_median(tmp_path, mon
     look = Look(marker="disc_bright", facing="left")
     clip = _film(tmp_path, look)
     detections = detect_mark(open_film(clip), _rig(look))  # they do not depend on neutral, radii and command
-    monkeypatch.setattr("anglecam.measurement.clip.detect_mark", lambda *_: detections)
+    monkeypatch.setattr("anglecam.measurement.followed.detect_mark", lambda *_: detections)
     declared = measure_clip(open_film(clip), _rig(look, neutral=look.neutral_deg - 3.0), REST).series
     rest = measure_clip(open_film(clip), _rig(look, pixel_error_px=(4.0,)), REST).series
     median = measure_clip(open_film(clip), _rig(look)).series

@@ -45,7 +45,7 @@ _PREDICTED_TURN, _PREDICTED_PX = 0.05, 6.0
 _NORMAL_ERROR = 0.1
 """Standard deviation of the normals' directions, rad; a few hundredths where light and noise disturb an edge."""
 _LEAST_INFORMATION = 1e-6
-"""Of an unknown that the outline does not show, in rad or px."""
+"""Of an unknown that the outline does not show."""
 _OFF_CENTRE_PX = 0.3
 """Standard deviation of a body's place from that for a fixed centre of rotation, px."""
 
@@ -184,7 +184,7 @@ def match_outline(outline: Outline, seen: Slopes, guess: Floats, centre: Centre)
     Returns
     -------
     OutlineMatch or None
-        ``None`` where hardly any of the outline is seen.
+        ``None`` where hardly any of the outline is seen, or its pose is not determined.
     """
     middle = outline.middle
     predicted = np.array([turn_of(guess), *(guess[:2, :2] @ middle + guess[:2, 2] - middle)])
@@ -207,6 +207,8 @@ def match_outline(outline: Outline, seen: Slopes, guess: Floats, centre: Centre)
     free = unknowns + np.linalg.pinv(information) @ (gradient - information @ step)
     along = _derivatives(arm, normals[:, ::-1] * (-1.0, 1.0))
     information, rotation_alone = _less_of_normals(information, (along * weight[:, None]).T @ along / scale**2)
+    if np.linalg.matrix_rank(information) < len(information):
+        return None
     return OutlineMatch(
         pose=_pose(unknowns, middle),
         free_pose=_pose(free, middle),
