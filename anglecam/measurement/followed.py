@@ -27,7 +27,7 @@ from anglecam.measurement.fine_angles import fine_angles
 from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
 from anglecam.measurement.rigid_body_pass import detect_outline, detect_rigid_body
-from anglecam.measurement.trust import require_rotation
+from anglecam.measurement.trust import require_rotation, why_off_circle
 from anglecam.video.film import Film
 from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 
@@ -136,7 +136,7 @@ def _measured(
             angles = coarse_angles(detections, ok, time, rig, command)
             filmed = detections.in_picture(in_all_frames(ok, angles.mark_px))[ok]
             angles = fine_angles(angles, registered, np.flatnonzero(ok), filmed, time[ok], rig, command)
-        elif _may_follow_body(detections, rig):
+        elif _may_follow_body(detections, rig) and why_off_circle(detections, angles) is None:
             # a centre fitted to the mark's path is often much less certain than that of the whole body's rotation
             body = detect_rigid_body(film, rig)
             if isinstance(body, Detections) and body.body is not None and _shows_rotation(body.body, detections, ok):

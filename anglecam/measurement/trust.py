@@ -114,19 +114,41 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
     at_rest = not detections.moves or travel < _TRAVEL_PX
     if at_rest and not declared:
         return f"nothing is seen to turn; to measure a mechanism at rest, declare {_DECLARE}"
-    off, share = _off_circle(detections, angles), _MAX_OFF_CIRCLE
-    if detections.body is not None:
-        off, share = detections.body.pivot_scatter_px, _MAX_OFF_CENTRE
-    if not at_rest and off > max(share * travel, _FLOOR_PX):
-        return (
-            f"what moves does not turn about a fixed pivot: its distance from the centre varies by {off:.2g} px RMS"
-            f" while it travels {travel:.2g} px RMS"
-        )
+    otherwise = None if at_rest else why_off_circle(detections, angles)
+    if otherwise is not None:
+        return otherwise
     if not declared and not seen_to_turn and not _shows_its_centre(detections):
         return (
             f"the mark's path is too short or too straight to show about which point it turns; declare it: {_DECLARE}"
         )
     return None
+
+
+def why_off_circle(detections: Detections, angles: Angles) -> str | None:
+    """Return a message where what moves does not keep its distance from a fixed point.
+
+    Parameters
+    ----------
+    detections : Detections
+        The coarse pass.
+    angles : Angles
+        Of the measured frames.
+
+    Returns
+    -------
+    str or None
+        With the variation of the distance, and the travel.
+    """
+    travel = _travel(angles.mark_px)
+    off, share = _off_circle(detections, angles), _MAX_OFF_CIRCLE
+    if detections.body is not None:
+        off, share = detections.body.pivot_scatter_px, _MAX_OFF_CENTRE
+    if off <= max(share * travel, _FLOOR_PX):
+        return None
+    return (
+        f"what moves does not turn about a fixed pivot: its distance from the centre varies by {off:.2g} px RMS"
+        f" while it travels {travel:.2g} px RMS"
+    )
 
 
 def why_not_rigid(detections: Detections, ok: Flags) -> str | None:
