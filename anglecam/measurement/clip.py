@@ -23,7 +23,7 @@ from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.duplicates import duplicate_frames
 from anglecam.measurement.followed import Followed, follow_mark_or_body
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
-from anglecam.measurement.trust import why_few
+from anglecam.measurement.trust import why_elsewhere, why_few, why_not_rigid
 from anglecam.video.film import Film
 from anglecam.vision.mark.outline_turn import outline_turn
 
@@ -50,8 +50,8 @@ class Measurement:
     """Message where frames show two instants, of which one is measured."""
     few: str | None = None
     """Message where less than the required share of the frames is measured."""
-    not_rigid: str | None = None
-    """Message where the mark is seen whole in some frames and in part in others."""
+    other_thing: str | None = None
+    """Message where the mark is seen in part, or turns about another point than the hint's."""
 
     @property
     def pivot(self) -> str:
@@ -73,7 +73,7 @@ class Measurement:
     @property
     def doubt(self) -> str | None:
         """Why the clip as a whole is no success although frames of it are measured; ``None`` where it is one."""
-        return self.truncated or self.few or self.not_rigid
+        return self.truncated or self.few or self.other_thing
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -131,7 +131,11 @@ def measure_clip(
     dark = changes and lamp is None and rig.sync.lamp is not None
     clock = DARK if dark else note_on(offset)
     few = why_few(series.status, rig.least_measured)
-    return Measurement(series, detections, followed.angles, followed.why_coarse, zero, clock, _interlaced(film), few)
+    other = None
+    if followed.angles.registered is None:
+        other = why_elsewhere(followed.detections, rig) or why_not_rigid(followed.detections, followed.ok)
+    interlaced = _interlaced(film)
+    return Measurement(series, detections, followed.angles, followed.why_coarse, zero, clock, interlaced, few, other)
 
 
 def _interlaced(film: Film) -> str | None:

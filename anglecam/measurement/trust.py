@@ -101,9 +101,6 @@ def why_few(status: Sequence[str], least: float) -> str | None:
 def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig) -> str | None:
     declared = rig.pivot.expected is not None
     seen_to_turn = detections.body is not None or angles.registered is not None
-    elsewhere = None if seen_to_turn else _turns_elsewhere(detections, rig)
-    if elsewhere is not None:
-        return elsewhere
     lost = sum(s == "no_mouth" for s, measured in zip(detections.status, ok, strict=True) if not measured)
     if detections.moves and lost > (1.0 - rig.least_measured) * len(ok):
         return (
@@ -183,8 +180,21 @@ def why_not_rigid(detections: Detections, ok: Flags) -> str | None:
     )
 
 
-def _turns_elsewhere(detections: Detections, rig: Rig) -> str | None:
-    """Return a message where the centre of rotation is not where the hint at the pivot is."""
+def why_elsewhere(detections: Detections, rig: Rig) -> str | None:
+    """Return a message where the centre of the mark's path is not where the hint at the pivot is.
+
+    Parameters
+    ----------
+    detections : Detections
+        The coarse pass.
+    rig : Rig
+        Declares the hint.
+
+    Returns
+    -------
+    str or None
+        With both places; ``None`` where they agree, and for a path that does not show its centre.
+    """
     circle = detections.circle
     if rig.pivot.near is None or detections.lens.tilt != 0.0 or circle is None or not _shows_its_centre(detections):
         return None

@@ -105,8 +105,10 @@ def learn_outline(samples: Sequence[Frame], frames: Iterator[Frame]) -> MovingOu
         back, centre = _follow(outline, background, stretch[start::-1], centre)
         on, centre = _follow(outline, background, stretch[start:], centre)
         seen = [match for match in (*back[:0:-1], *on) if match is not None]
+        if not seen or len(seen) < _FOLLOWED_SHARE * len(stretch):
+            return "what moves before the background is not rigid"
         follows = np.mean([match.follows for match in seen], axis=0) > _FOLLOWED_SHARE
-        if len(seen) < _FOLLOWED_SHARE * len(stretch) or follows.sum() < MIN_OUTLINE_POINTS:
+        if follows.sum() < MIN_OUTLINE_POINTS:
             return "what moves before the background is not rigid"
         if follows.all():
             break
