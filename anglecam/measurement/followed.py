@@ -24,7 +24,7 @@ from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.carried_marks import carried_marks, smeared_marks, with_marks
 from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.fine_angles import fine_angles
-from anglecam.measurement.mark_pass import detect_mark
+from anglecam.measurement.mark_pass import MarkNotFoundError, detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
 from anglecam.measurement.rigid_body_pass import detect_outline, detect_rigid_body
 from anglecam.measurement.trust import require_rotation, why_off_circle
@@ -49,6 +49,7 @@ class Followed:
     angles: Angles
     """Of the measured frames."""
     why_coarse: str | None
+    """Cause why the angle is not that of the whole body; ``None`` where it is."""
 
 
 def follow_mark_or_body(
@@ -70,21 +71,19 @@ def follow_mark_or_body(
     Returns
     -------
     Followed
-        What is followed turns about a fixed pivot.
+        The mark, or the first body that turns about a fixed pivot.
 
     Raises
     ------
     InputError
-        Where nothing does: one line with the causes.
+        Where nothing turns about a fixed pivot: one line with the causes.
     """
     film = camera.film
     try:
-        if camera.unknown is not None:
-            raise InputError(camera.unknown)
-        mark = detect_mark(film, rig, camera.steady, progress)
-    except InputError as problem:
+        mark = detect_mark(film, rig, camera, progress)
+    except MarkNotFoundError as problem:
         causes = [str(problem)]
-    else:  # a mark that moves otherwise than about a fixed pivot says the same of what it is on
+    else:
         return _measured(film, rig, command, mark, progress)
     for follow in _without_mark(camera, rig):
         try:

@@ -20,6 +20,7 @@ from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig, RigMark
+from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.detections import Detections, frame_of_mark, frames_to_keep
 from anglecam.measurement.pivot import find_pivot
 from anglecam.video.film import Film, Frame, Sample
@@ -36,10 +37,14 @@ _CLEAR = 2.0
 """Ratio of the best score to the next best from which on the choice of the mark is clear."""
 
 
+class MarkNotFoundError(InputError):
+    """No thing of the clip can be followed as a mark, so that a body without one may be tried."""
+
+
 def detect_mark(
     film: Film,
     rig: Rig,
-    steady: BackgroundMotion | None = None,
+    camera: HeldCamera | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Detections:
     """Find the mark in every frame of a clip, and the pivot.
@@ -50,8 +55,8 @@ def detect_mark(
         The clip.
     rig : Rig
         Declares mark, pivot and camera.
-    steady : BackgroundMotion, optional
-        The scenery by which the camera's motion is measured; without it the camera is at rest.
+    camera : HeldCamera, optional
+        How the camera moves; without it the camera is at rest.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
 
@@ -62,10 +67,12 @@ def detect_mark(
 
     Raises
     ------
+    MarkNotFoundError
+        Where there is no mark, or no frame in which it can be measured: one line with file, count and cause.
     InputError
-        Where the file cannot be read, or no frame of it can be measured: one line with file, count and cause.
+        Where the file cannot be read, or the mark shows no pivot: one line with file and cause.
     """
-    path = film.path
+    path, steady = film.path, None if camera is None else camera.steady
     lens = lens_from_rig(rig, film.size, path)
     sample = film.sample(frames_to_keep(film))
     noise = pixel_noise([f.image for f in sample.frames if f.image is not None])
@@ -75,7 +82,9 @@ def detect_mark(
     near = None if rig.pivot.expected is None else lens.rectify(rig.pivot.expected)
     found = find_mark(samples, rig.mark_rgb, near) if samples.images else None
     if found is None:
-        raise InputError(_no_mark(path, sample, rig))
+        raise MarkNotFoundError(_no_mark(path, sample, rig))
+    if camera is not None and camera.unknown is not None:
+        raise InputError(camera.unknown)
     time, filmed, decoded, repeated, shakes = _read_regions(film, found, sample.count, steady, progress)
     candidates = filmed if shakes is None else [_unshaken(r, move) for r, move in zip(filmed, shakes, strict=True)]
     lens, track, marker, pivot, disagreement = _follow(candidates, time, found, samples.stabilised, rig, lens)
@@ -85,7 +94,7 @@ def detect_mark(
         for s, d, h in zip(track.status, decoded, hidden, strict=True)
     )
     if OK not in status:
-        raise InputError(_nothing_measured(path, status, sample, rig))
+        raise MarkNotFoundError(_nothing_measured(path, status, sample, rig))
     if pivot is None:
         raise InputError(
             f"{path}: no pivot found: the mark's path is too short to determine its centre, and there is no round"

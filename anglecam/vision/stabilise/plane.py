@@ -36,7 +36,8 @@ def follow_plane(images: Iterable[Image | None]) -> list[Floats | None]:
     Parameters
     ----------
     images : iterable of ndarray or None
-        (h, w, 3) blue, green, red, or (h, w, 1) brightness; ``None`` where a frame cannot be decoded.
+        (h, w, 3) blue, green, red, or (h, w, 1) brightness; ``None`` where a frame cannot be decoded: the camera is
+        then taken to be where it was before.
 
     Returns
     -------
@@ -48,7 +49,7 @@ def follow_plane(images: Iterable[Image | None]) -> list[Floats | None]:
     latest: Floats = np.eye(3)
     for image in images:
         if image is None:
-            moves.append(None)
+            moves.append(latest)
             continue
         picture = subtract_local_mean(brightness(image))
         if first is None:
