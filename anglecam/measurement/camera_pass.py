@@ -20,7 +20,7 @@ from anglecam.measurement.detections import frames_to_keep
 from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.stabilise.background_motion import BackgroundMotion
 from anglecam.vision.stabilise.learn import learn_background
-from anglecam.vision.stabilise.plane import follow_plane, seen_from_first
+from anglecam.vision.stabilise.plane import follow_plane, moves_in_the_hand, seen_from_first, stands_still
 from anglecam.vision.stabilise.zoom import camera_zoom
 
 _LEAST_KNOWN = 0.5
@@ -101,15 +101,18 @@ def hold_camera(film: Film) -> HeldCamera:
     images = [f.image for f in film.sample(frames_to_keep(film)).frames if f.image is not None]
     steady = learn_background(images)
     known = images if steady is None else [image for image in images if steady.at(image).known]
-    zoom = camera_zoom(known)
+    zoom, why = camera_zoom(known), None
     if zoom is not None:
         why = f"the camera zooms or comes nearer, by {100.0 * (zoom - 1.0):.1f} %"
     elif len(known) < _LEAST_KNOWN * len(images):
         why = f"the camera moves, and how can be seen in {len(known)} of {len(images)} sampled frames only"
-    else:
+    elif steady is not None or len(images) < 2 or stands_still(images):
         return HeldCamera(film, steady)
     moves = tuple(follow_plane(frame.image for frame in film.frames()))
-    if sum(move is not None for move in moves) < _LEAST_FOLLOWED * len(moves):
+    followed = sum(move is not None for move in moves) >= _LEAST_FOLLOWED * len(moves)
+    if why is None and not (followed and moves_in_the_hand(moves, film.size)):
+        return HeldCamera(film)  # nothing says that the camera moves: what is seen to move may be the mechanism
+    if not followed:
         how = "from one place with fixed focus and zoom, or so that a desk or a wall with edges fills the picture"
         return HeldCamera(film, steady, f"{film.path}: {why}; film {how}")
     own = {field.name: getattr(film, field.name) for field in fields(film)}
