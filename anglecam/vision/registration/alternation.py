@@ -49,6 +49,8 @@ _WEIGHING_ROUNDS = 6
 _MIN_VARIANCE = 0.5
 """Least variance of a tile relative to the median. A smaller variance results from too few views, not from less
 noise."""
+_EXACT = 1e-6
+"""Least variance of a tile, grey levels squared: of equal pictures, or of a tile that no view shows."""
 _NO_MISFIT = 1e-9
 """Replaces the usual misfit, zero, of a tile that is outside most pictures."""
 _MEDIAN_OF_SQUARES = 0.455
@@ -212,7 +214,7 @@ def one_round(
     all_fits = compare_all(appearance, views, state.turns, centres)
     fits = all_fits.without(out)
     variance = fits.squares.sum(axis=1) / np.maximum(fits.count.sum(axis=1), 1)
-    variance = np.maximum(variance, _MIN_VARIANCE * np.median(variance))
+    variance = np.maximum(variance, max(_MIN_VARIANCE * np.median(variance), _EXACT))
     by_unknown = data.by_unknown(state)
     equations = centre_equations(*fits.weighted(variance * excess), state.turns, by_unknown)
     step, covariance = solve_centres(equations, data.prior_in(state), state.centres.values[data.free])
