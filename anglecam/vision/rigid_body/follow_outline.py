@@ -15,7 +15,7 @@ import numpy as np
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.video.film import Frame
-from anglecam.vision.image.median import median_picture
+from anglecam.vision.image.median import still_background
 from anglecam.vision.image.transforms import inverse_motion, rotation, turn_of
 from anglecam.vision.rigid_body.centre_of_rotation import FramePose, RigidMotion, fit_common_centre
 from anglecam.vision.rigid_body.outline import (
@@ -91,7 +91,7 @@ def learn_outline(samples: Sequence[Frame], frames: Iterator[Frame]) -> MovingOu
         The cause in a few words where nothing moves as a rigid body.
     """
     images = [frame.image for frame in samples if frame.image is not None]
-    background = median_picture(np.stack(images)).astype(np.float32)
+    background = still_background(images)
     steep = np.stack([slopes(image, background).steepness for image in images])
     level = max(_CLEAR * float(np.median(steep)), _STEEP_SHARE * float(np.quantile(steep, _STEEPEST)))
     lengths = (steep > level).sum(axis=(1, 2))
@@ -182,7 +182,7 @@ def _follow(
         match = match_outline(outline, slopes(image, background), _going_on(recent), centre)
         if match is not None:
             recent = [*recent[-1:], match.pose]
-            centre = with_pose(centre, match, outline.middle)
+            centre = with_pose(centre, match.free_pose, match.information, match.group_ratio, outline.middle)
         matches.append(match)
     return matches, centre
 

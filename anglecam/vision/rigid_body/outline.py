@@ -201,7 +201,7 @@ def match_outline(outline: Outline, seen: Slopes, guess: Floats, centre: Centre)
         J = _derivatives(arm, normals)
         information = (J * weight[:, None]).T @ J / scale**2
         gradient = J.T @ (weight * off) / scale**2
-        bound, pull = _towards_rotation(unknowns, middle, centre)
+        bound, pull = towards_rotation(unknowns, middle, centre)
         step = np.linalg.solve(information + prior + bound, gradient + prior @ (predicted - unknowns) + pull)
         unknowns = unknowns + step
     free = unknowns + np.linalg.pinv(information) @ (gradient - information @ step)
@@ -210,8 +210,8 @@ def match_outline(outline: Outline, seen: Slopes, guess: Floats, centre: Centre)
     if np.linalg.matrix_rank(information) < len(information):
         return None
     return OutlineMatch(
-        pose=_pose(unknowns, middle),
-        free_pose=_pose(free, middle),
+        pose=pose_of(unknowns, middle),
+        free_pose=pose_of(free, middle),
         follows=found & (np.abs(off) < _FOLLOWS_PX),
         information=information,
         group_ratio=_group_ratio(outline.groups, J[:, 0] * weight * off),
@@ -241,18 +241,18 @@ def _less_of_normals(information: Floats, along: Floats) -> tuple[Floats, float]
     return whole, rotation_alone
 
 
-def with_pose(centre: Centre, match: OutlineMatch, middle: Floats) -> Centre:
-    """Return a centre of rotation that is known better by a match of an outline with its mean at ``middle``."""
-    turned = np.eye(2) - match.free_pose[:2, :2]
-    shift = match.free_pose[:2, :2] @ middle + match.free_pose[:2, 2] - middle
-    covariance = np.linalg.inv(match.information)[1:, 1:] * max(match.group_ratio, 1.0) + _OFF_CENTRE_PX**2 * np.eye(2)
+def with_pose(centre: Centre, pose: Floats, information: Floats, group_ratio: float, middle: Floats) -> Centre:
+    """Return a centre of rotation that is known better by a pose of a thing with its middle at ``middle``."""
+    turned = np.eye(2) - pose[:2, :2]
+    shift = pose[:2, :2] @ middle + pose[:2, 2] - middle
+    covariance = np.linalg.inv(information)[1:, 1:] * max(group_ratio, 1.0) + _OFF_CENTRE_PX**2 * np.eye(2)
     gain = turned.T @ np.linalg.inv(covariance)
-    information = centre.information + gain @ turned
+    total = centre.information + gain @ turned
     off = shift + turned @ (middle - centre.place_px)
-    return Centre(centre.place_px + np.linalg.solve(information, gain @ off), information)
+    return Centre(centre.place_px + np.linalg.solve(total, gain @ off), total)
 
 
-def _towards_rotation(unknowns: Floats, middle: Floats, centre: Centre) -> tuple[Floats, Floats]:
+def towards_rotation(unknowns: Floats, middle: Floats, centre: Centre) -> tuple[Floats, Floats]:
     """Return the normal matrix (3, 3) and gradient (3,) that keep a pose near a rotation about the centre."""
     turned = rotation(unknowns[0]).T - np.eye(2)
     arm = middle - centre.place_px
@@ -263,7 +263,7 @@ def _towards_rotation(unknowns: Floats, middle: Floats, centre: Centre) -> tuple
     return weighted @ J, weighted @ off
 
 
-def _pose(unknowns: Floats, middle: Floats) -> Floats:
+def pose_of(unknowns: Floats, middle: Floats) -> Floats:
     """Return the pose (3, 3) for a rotation and a displacement of the mean."""
     pose = np.eye(3)
     pose[:2, :2] = rotation(unknowns[0]).T
