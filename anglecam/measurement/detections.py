@@ -55,7 +55,9 @@ class Detections:
     body: RigidMotion | None
     """Motion of the rigid body where there is no mark; ``regions`` are empty then."""
     by: str
-    """What is followed: ``mark``, ``body's keyframes`` or ``outline``."""
+    """What is followed: ``mark``, ``body's keyframes``, ``outline`` or ``layer``."""
+    clear: bool
+    """Whether nothing else in the clip may be the mark."""
     noise: float
     """Standard deviation of the pixels, grey levels."""
     repeated: NDArray[np.bool_]

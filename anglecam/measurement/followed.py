@@ -26,13 +26,15 @@ from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.fine_angles import fine_angles
 from anglecam.measurement.mark_pass import MarkNotFoundError, detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
-from anglecam.measurement.rigid_body_pass import detect_outline, detect_rigid_body
-from anglecam.measurement.trust import require_rotation, why_off_circle
+from anglecam.measurement.rigid_body_pass import detect_layer, detect_outline, detect_rigid_body
+from anglecam.measurement.trust import reaches_over_pivot, require_rotation, why_off_circle
 from anglecam.video.film import Film
 from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 
 _AGREE = 2.0
 """Standard uncertainties by which two measurements of the rotation may differ."""
+_AS_OFTEN = 0.9
+"""Least share of the frames in which another thing is measured, for a mark to count as seen as often."""
 _LARGER = 2.0
 """Least size of a body, relative to the mark's radius, from which on it is not the mark."""
 
@@ -81,11 +83,13 @@ def follow_mark_or_body(
     film = camera.film
     try:
         mark = detect_mark(film, rig, camera, progress)
+        followed = _measured(film, rig, command, mark, progress)
+        return _hinted(followed, film, rig, command) if _is_hinted(camera, rig) else followed
     except MarkNotFoundError as problem:
-        causes = [str(problem)]
-    else:
-        return _measured(film, rig, command, mark, progress)
-    for follow in _without_mark(camera, rig):
+        causes, ways = [str(problem)], _without_mark(camera, rig)
+    except InputError as problem:  # the mark moves otherwise; what turns about a hinted pivot may be another thing
+        causes, ways = [str(problem)], [detect_layer] if _is_hinted(camera, rig) else []
+    for follow in ways:
         try:
             body = follow(film, rig)
             if isinstance(body, Detections):
@@ -101,8 +105,45 @@ def _without_mark(camera: HeldCamera, rig: Rig) -> list[Callable[[Film, Rig], De
     """Return the ways in which a body may be followed where no mark is declared by its colour."""
     if rig.mark_rgb is not None or camera.film.undecodable == len(camera.film.times):
         return []
-    by_outline = camera.steady is None and rig.pointed_mark is None
-    return [detect_rigid_body, detect_outline] if by_outline else [detect_rigid_body]
+    by_outline = [detect_outline] if camera.steady is None and rig.pointed_mark is None else []
+    return [detect_rigid_body, *by_outline, *([detect_layer] if _is_hinted(camera, rig) else [])]
+
+
+def _hinted(mark: Followed, film: Film, rig: Rig, command: Command | None) -> Followed:
+    """Return the rotation about the hinted pivot, where it is not clear what the mark is, or the mark reaches over it.
+
+    Raises
+    ------
+    InputError
+        Where the mark and what turns about the hint move otherwise, and the mark is seen as often.
+    """
+    alone = mark.detections.by == "mark" and mark.angles.registered is None and mark.detections.lens.is_identity
+    if not alone or (mark.detections.clear and not reaches_over_pivot(mark.detections, mark.ok, mark.angles)):
+        return mark
+    try:
+        layer = detect_layer(film, rig)
+        other = None if isinstance(layer, str) else _measured(film, rig, command, layer, None)
+    except InputError:
+        other = None
+    if other is None:
+        return mark
+    if mark.ok.sum() < _AS_OFTEN * other.ok.sum():
+        return other
+    if _shows_it_better(mark.angles, mark.ok, other.angles, other.ok, rig):
+        return other
+    if _agree(mark.angles, mark.ok, other.angles, other.ok, rig):
+        return mark
+    raise InputError(
+        f"{film.path}: two things turn differently about the hinted pivot; declare one: mark: {{at: [x, y], frame: k}}"
+        " in rig.yaml"
+    )
+
+
+def _is_hinted(camera: HeldCamera, rig: Rig) -> bool:
+    """Return whether a thing is to be found by its pivot alone, in the picture of a camera at rest."""
+    at_rest = camera.steady is None and camera.unknown is None
+    undeclared = rig.mark_rgb is None and rig.pointed_mark is None
+    return at_rest and undeclared and rig.pivot.expected is not None
 
 
 def _measured(
@@ -118,7 +159,7 @@ def _measured(
     time = measurement_time(detections.time, row, detections.size[1], rig.camera.row_time_s)
     angles = coarse_angles(detections, ok, time, rig, command)
     why_coarse: str | None = "the body has too few features" if detections.moves else "the mark does not move"
-    if detections.moves and detections.by != "outline":
+    if detections.moves and detections.by not in ("outline", "layer"):
         start = _start(detections, ok, time, row, angles, rig)
         registered = register_clip(film, start, detections.lens, progress)
         why_coarse = registered if isinstance(registered, str) else None
@@ -168,14 +209,26 @@ def _shows_it_better(mark: Angles, ok: Flags, body: Angles, body_ok: Flags, rig:
     What their uncertainties do not explain of their difference counts against the mark: light that displaces its
     centre, or an error of the pivot, hardly changes the rotation of a body that is seen on itself.
     """
-    both = ok & body_ok
-    if not both.any():
+    if not _agree(mark, ok, body, body_ok, rig):
         return False
+    apart, of_mark, of_body = _variances(mark, ok, body, body_ok, rig)
+    return of_body < of_mark + max(apart - of_mark - of_body, 0.0)
+
+
+def _agree(mark: Angles, ok: Flags, body: Angles, body_ok: Flags, rig: Rig) -> bool:
+    """Return whether two rotations are seen together, and differ by no more than their uncertainties explain."""
+    if not (ok & body_ok).any():
+        return False
+    apart, of_mark, of_body = _variances(mark, ok, body, body_ok, rig)
+    return apart < _AGREE**2 * (of_mark + of_body)
+
+
+def _variances(mark: Angles, ok: Flags, body: Angles, body_ok: Flags, rig: Rig) -> tuple[float, float, float]:
+    """Return the variance of the difference of two rotations, and the mean of each one's own, rad²."""
+    both = ok & body_ok
     one, other = both[ok], both[body_ok]
     apart = float((turns(mark, rig)[one] - turns(body, rig)[other]).var())
-    of_mark, of_body = float((mark.sigma[one] ** 2).mean()), float((body.sigma[other] ** 2).mean())
-    unexplained = max(apart - of_mark - of_body, 0.0)
-    return apart < _AGREE**2 * (of_mark + of_body) and of_body < of_mark + unexplained
+    return apart, float((mark.sigma[one] ** 2).mean()), float((body.sigma[other] ** 2).mean())
 
 
 def _rolls(detections: Detections) -> Floats:

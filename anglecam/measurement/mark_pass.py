@@ -120,6 +120,7 @@ def detect_mark(
         camera_moves=shakes,
         body=None,
         by="mark",
+        clear=found.cue in ("declared", "pointed") or found.margin > _CLEAR,
         noise=noise,
         repeated=repeated,
         colour_rgb=found.model.mean_rgb,

@@ -1,7 +1,8 @@
 """The coarse pass over a clip without a mark: follow a body that turns rigidly.
 
 A body with texture, such as a face in profile, is followed by its features. Where too few features rotate, the outline
-of what moves before a still background is followed instead, such as that of a grey stick.
+of what moves before a still background is followed instead, such as that of a grey stick. Where the pivot is hinted,
+what turns about it is followed as a layer before the background, such as a servo's horn.
 """
 
 from __future__ import annotations
@@ -18,9 +19,14 @@ from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.circle import Circle
 from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 from anglecam.vision.rigid_body.follow import follow_rigid_body
+from anglecam.vision.rigid_body.follow_layer import follow_turning_layer, learn_turning_layer
 from anglecam.vision.rigid_body.follow_outline import follow_outline, learn_outline
 
-_NAMES = {"body's keyframes": "rigid body", "outline": "outline of what moves"}
+_NAMES = {
+    "body's keyframes": "rigid body",
+    "outline": "outline of what moves",
+    "layer": "thing that turns about the hinted pivot",
+}
 """Of what is followed, in a message."""
 
 
@@ -63,6 +69,17 @@ def detect_outline(film: Film, rig: Rig) -> Detections | str:
     return outline if isinstance(outline, str) else _detections(film, rig, sample, outline, "outline")
 
 
+def detect_layer(film: Film, rig: Rig) -> Detections | str:
+    """Follow what turns about a hinted pivot; arguments and result as of `detect_rigid_body`."""
+    near = rig.pivot.expected
+    if near is None or not (0.0 <= near[0] < film.size[0] and 0.0 <= near[1] < film.size[1]):
+        return "no pivot in the picture is hinted"
+    sample = film.sample(frames_to_keep(film))
+    learnt = learn_turning_layer(sample.frames, np.array(near))
+    layer = learnt if isinstance(learnt, str) else follow_turning_layer(film.frames(), learnt)
+    return layer if isinstance(layer, str) else _detections(film, rig, sample, layer, "layer")
+
+
 def _detections(film: Film, rig: Rig, sample: Sample, body: RigidMotion, by: str) -> Detections | str:
     """Return the detections of a body that was followed, or the cause where it has no pivot."""
     images = [f.image for f in sample.frames if f.image is not None]
@@ -97,6 +114,7 @@ def _detections(film: Film, rig: Rig, sample: Sample, body: RigidMotion, by: str
         camera_moves=None,
         body=body,
         by=by,
+        clear=True,
         noise=pixel_noise(images),
         repeated=np.array(repeated),
         colour_rgb=None,

@@ -21,6 +21,8 @@ from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.pivot import HINT_PX
+from anglecam.vision.mark.outline_turn import outline_turn
+from anglecam.vision.mark.segment import Region
 
 _MAX_OFF_CIRCLE = 0.02
 """Largest systematic variation of the distance from the pivot, as a share of the mark's travel. An error along the
@@ -42,6 +44,9 @@ _SHORTEST = 0.05
 _LEAST_LENGTH, _LENGTH_PX = 0.75, 4.0
 """Least length of a mark in the others, relative to its usual one, and the change that shows nothing, px. Motion blur
 lengthens a mark, and noise changes a small one."""
+_OTHER_TURN = 0.25
+"""Excess of the mark's own rotation over that of the line to it, as a share, from which on the line is not its own. A
+view from 37° aside has as much."""
 _DECLARE = "pivot: {at: [x, y], sigma_px: s} in rig.yaml"
 _TRAVEL_PX = 0.5
 """Least RMS travel of a mark that moves, px. Noise, rain and flicker shift the centroid of a thing at rest by 0.2."""
@@ -112,6 +117,8 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
     if at_rest and not declared:
         return f"nothing is seen to turn; to measure a mechanism at rest, declare {_DECLARE}"
     otherwise = None if at_rest else why_off_circle(detections, angles)
+    if otherwise is None and not seen_to_turn:
+        otherwise = _why_not_its_line(detections, ok, angles)
     if otherwise is not None:
         return otherwise
     if not declared and not seen_to_turn and not _shows_its_centre(detections):
@@ -140,12 +147,60 @@ def why_off_circle(detections: Detections, angles: Angles) -> str | None:
     off, share = _off_circle(detections, angles), _MAX_OFF_CIRCLE
     if detections.body is not None:
         off, share = detections.body.pivot_scatter_px, _MAX_OFF_CENTRE
+        travel = float(np.hypot(travel, detections.body.extent_px * np.nanstd(detections.body.turn)))
     if off <= max(share * travel, _FLOOR_PX):
         return None
     return (
         f"what moves does not turn about a fixed pivot: its distance from the centre varies by {off:.2g} px RMS"
         f" while it travels {travel:.2g} px RMS"
     )
+
+
+def reaches_over_pivot(detections: Detections, ok: Flags, angles: Angles) -> bool:
+    """Return whether a mark is longer than its distance from the pivot, as a servo's horn is.
+
+    Parameters
+    ----------
+    detections : Detections
+        The coarse pass.
+    ok : ndarray
+        (frames,) the measured frames.
+    angles : Angles
+        Of these frames.
+
+    Returns
+    -------
+    bool
+        False for a body without a mark.
+    """
+    regions, arm = _seen(detections, ok, angles)
+    return bool(regions) and float(np.median(np.hypot(*arm.T))) < _usual_length(regions)[0]
+
+
+def _why_not_its_line(detections: Detections, ok: Flags, angles: Angles) -> str | None:
+    """Return a message where a mark that reaches over its pivot turns by another angle than the line to its middle.
+
+    That middle is some pixels from the pivot. Where a part of the mark is not seen, it moves on another circle.
+    """
+    regions, arm = _seen(detections, ok, angles)
+    found = outline_turn(regions, np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))) if regions else None
+    if found is None or abs(found[0]) < _OTHER_TURN + _PIVOT_SIGMAS * found[1]:
+        return None
+    if not reaches_over_pivot(detections, ok, angles):
+        return None
+    return (
+        "the mark reaches over its pivot and turns by another angle than the line to its middle,"
+        f" {1.0 + found[0]:.2g} times as far; to measure its rotation, hint at its pivot: pivot: {{near: [x, y]}} in"
+        " rig.yaml"
+    )
+
+
+def _seen(detections: Detections, ok: Flags, angles: Angles) -> tuple[list[Region], Floats]:
+    """Return the mark where it is seen, and the lines (n, 2) from the pivot to its middle, px."""
+    pairs = [(detections.regions[i], place) for i, place in zip(np.flatnonzero(ok), angles.mark_px, strict=True)]
+    regions = [region for region, _ in pairs if region is not None]
+    places = [place for region, place in pairs if region is not None]
+    return regions, np.array(places).reshape(-1, 2) - angles.pivot.centre_px
 
 
 def why_not_rigid(detections: Detections, ok: Flags) -> str | None:
@@ -163,21 +218,24 @@ def why_not_rigid(detections: Detections, ok: Flags) -> str | None:
     str or None
         With its least length; ``None`` for a mark of constant length, and for a body without a mark.
     """
-    longest = [
-        float(np.linalg.eigvalsh(region.moments_px2)[1])
-        for region, seen in zip(detections.regions, ok, strict=True)
-        if seen and region is not None
-    ]
-    if not longest:
+    whole = [r for r, seen in zip(detections.regions, ok, strict=True) if seen and r is not None]
+    if not whole:
         return None
-    # a homogeneous bar is √12 times as long as its standard deviation
-    usual, least = np.sqrt(12.0 * np.quantile(longest, (0.5, _SHORTEST)))
+    usual, least = _usual_length(whole)
     if least > min(_LEAST_LENGTH * usual, usual - _LENGTH_PX):
         return None
     return (
         f"the mark is {usual:.0f} px long, but only {least:.0f} px in some frames: something covers a part of it, or it"
         " is no rigid thing; declare another: mark: {at: [x, y], frame: k} in rig.yaml"
     )
+
+
+def _usual_length(regions: Sequence[Region]) -> tuple[float, float]:
+    """Return the median and the least length of a mark, px."""
+    longest = [float(np.linalg.eigvalsh(region.moments_px2)[1]) for region in regions]
+    # a homogeneous bar is √12 times as long as its standard deviation
+    usual, least = np.sqrt(12.0 * np.quantile(longest, (0.5, _SHORTEST)))
+    return float(usual), float(least)
 
 
 def why_elsewhere(detections: Detections, rig: Rig) -> str | None:

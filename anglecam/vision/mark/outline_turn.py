@@ -38,7 +38,7 @@ def outline_turn(regions: Sequence[Region], line: Floats) -> tuple[float, float]
     if len(regions) < _MIN_FRAMES or np.ptp(line) == 0.0:
         return None
     moments = np.array([region.moments_px2 for region in regions])
-    small, large = np.linalg.eigvalsh(np.median(moments, axis=0))
+    small, large = np.median(np.linalg.eigvalsh(moments), axis=0)
     if large < _ROUND_ASPECT**2 * small:
         return None
     # The direction of an axis has period π: halve the unwrapped double angle.
