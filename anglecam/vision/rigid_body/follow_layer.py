@@ -22,8 +22,8 @@ from anglecam.vision.image.reduction import reduced, reduction
 from anglecam.vision.image.transforms import apply_motion, inverse_motion, turn_of
 from anglecam.vision.rigid_body.centre_of_rotation import FramePose, RigidMotion, fit_common_centre
 from anglecam.vision.rigid_body.layer import Layer, cut_layer, match_layer
-from anglecam.vision.rigid_body.outline import Centre, with_pose
 from anglecam.vision.rigid_body.polar_match import PolarReference, learn_polar, turned_about
+from anglecam.vision.rigid_body.rough_centre import Centre, with_pose
 from anglecam.vision.status import NO_MARK, UNDECODABLE
 
 _DIFFERS, _LARGEST = 0.2, 0.999

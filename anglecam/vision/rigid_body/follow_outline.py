@@ -20,15 +20,14 @@ from anglecam.vision.image.transforms import inverse_motion, rotation, turn_of
 from anglecam.vision.rigid_body.centre_of_rotation import FramePose, RigidMotion, fit_common_centre
 from anglecam.vision.rigid_body.outline import (
     MIN_OUTLINE_POINTS,
-    Centre,
     Outline,
     OutlineMatch,
     Slopes,
     find_outline,
     match_outline,
     slopes,
-    with_pose,
 )
+from anglecam.vision.rigid_body.rough_centre import Centre, with_pose
 from anglecam.vision.status import NO_MARK, UNDECODABLE
 
 _CLEAR = 6.0

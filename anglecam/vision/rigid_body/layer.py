@@ -14,7 +14,7 @@ import numpy as np
 
 from anglecam.data.typing import Flags, Floats, Image
 from anglecam.vision.image.transforms import turn_of
-from anglecam.vision.rigid_body.outline import Centre, pose_of, towards_rotation
+from anglecam.vision.rigid_body.rough_centre import Centre, pose_of, towards_rotation
 
 _BLURS_PX = (6.0, 3.0, 1.5, 1.5)
 """Standard deviations of the filters of successive steps, px; the first is that of the error of a guess."""
