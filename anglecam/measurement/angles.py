@@ -25,6 +25,8 @@ from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 
 _THICK = 0.25
 """Standard deviation of the height of a mark's visible part, as a share of the root of its area."""
+_LEAST_ARM_PX = 1e-3
+"""Least distance of a body's middle from its pivot that counts, px."""
 
 
 @dataclass(frozen=True)
@@ -178,9 +180,13 @@ def angles_of_places(
 def _angles_of_body(
     detections: Detections, body: RigidMotion, ok: Flags, time: Floats, rig: Rig, command: Command | None
 ) -> Angles:
-    """Return the angles of the line from the pivot to the middle of the rigid body."""
+    """Return the angles of the line from the pivot through the middle of the rigid body.
+
+    The body reaches beyond a middle that is near the pivot, as a wheel's is: the line then ends where the body does.
+    """
     turn, sigma = body.turn[ok], body.sigma[ok]
     arm = detections.lens.rectify(body.centre_px) - detections.pivot.centre_px
+    arm *= max(1.0, body.extent_px / max(float(np.hypot(*arm)), _LEAST_ARM_PX))
     mark = detections.pivot.centre_px + rotate_each(arm, turn)
     signed = turn if rig.facing == "right" else -turn
     line = float(np.arctan2(-arm[1], _ahead(arm[:1], rig)[0])) + signed

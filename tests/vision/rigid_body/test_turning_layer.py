@@ -77,6 +77,7 @@ def test_a_horn_is_followed_about_a_hinted_pivot(tmp_path, seed):
     measured = measure_clip(open_film(_film(tmp_path / "clip.mkv", TURNS, seed=seed)), NEAR)
     series = measured.series
     assert series.ok.mean() > 0.95
+    assert (np.hypot(*(series.mark_px - series.pivot_px)[series.ok].T) > 20.0).all()  # the line shows the angle
     error = _error(series, TURNS)
     assert np.sqrt((error**2).mean()) < 0.3
     assert np.abs(error / np.degrees(series.sigma[series.ok])).max() < 4.0
