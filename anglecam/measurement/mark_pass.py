@@ -22,7 +22,7 @@ from anglecam.errors import InputError
 from anglecam.io.rig import Rig, RigMark
 from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.detections import Detections, frame_of_mark, frames_to_keep
-from anglecam.measurement.pivot import find_pivot
+from anglecam.measurement.pivot import HEIGHT_SHARE, find_pivot
 from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.mark.found_mark import FoundMark, Samples
@@ -166,7 +166,8 @@ def _follow(
         marker, pivot, disagreement = find_pivot(images, rig, track.circle, lens)
         if not again or pivot is None:
             break
-        centred = lens.looking_at(lens.distort(pivot.centre_px))
+        height = 0.0 if track.circle is None else HEIGHT_SHARE * track.circle.radius_px
+        centred = lens.looking_at(lens.distort(pivot.centre_px), height)
         if found.circle is not None:
             place, radius = found.circle
             found = replace(found, circle=(centred.rectify(lens.distort(place)), radius))

@@ -30,7 +30,7 @@ _REACH = 2.0
 """Radius, in standard uncertainties of the centre of rotation, within which a marker is sought."""
 _LEAST_REACH_PX = 3.0
 """Lower limit of that radius."""
-_DEPTH = 0.15
+HEIGHT_SHARE = 0.15
 """Standard uncertainty of the marker's height above the mark's, as a share of the lever arm."""
 
 
@@ -128,7 +128,7 @@ def _reconciled(
     """
     if marker is not None and not lens.is_identity:
         J = lens.jacobian(marker.centre_px)
-        along = lens.parallax * (0.0 if circle is None else _DEPTH * circle.radius_px)
+        along = lens.parallax * (0.0 if circle is None else HEIGHT_SHARE * circle.radius_px)
         covariance = J @ marker.covariance_px2 @ J.T + np.outer(along, along)
         marker = replace(marker, centre_px=lens.rectify(marker.centre_px), covariance_px2=covariance)
     if circle is not None and marker is not None and lens.neglects_perspective:

@@ -175,6 +175,12 @@ def register_clip(
         if progress is not None:
             progress(i + 1, n)
     registered = _gathered(found, rows, appearance)
+    if lens.neglects_perspective:
+        displaced = lens.neglected_displacement(
+            float(np.hypot(*(appearance.middle_px - appearance.pivot_px))), film.width
+        )
+        covariance = registered.pivot_covariance_px2 + np.outer(displaced, displaced)
+        registered = replace(registered, pivot_covariance_px2=covariance)
     both = np.isfinite(registered.turn) & np.isfinite(start.sigma)
     if not both.any() or np.median(registered.sigma[both]) > np.median(start.sigma[both]):
         return "the mark alone is more certain than the body"

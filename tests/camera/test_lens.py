@@ -93,6 +93,32 @@ def test_nearer_points_turn_by_the_same_angle_about_a_different_centre(height):
     assert np.ptp(np.hypot(*arm.T)) < 1e-8
 
 
+def _circle(places: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the centre of the circle through places (n, 2), px, and their RMS distance from it."""
+    solution = np.linalg.lstsq(np.column_stack([2.0 * places, np.ones(len(places))]), (places**2).sum(axis=1))[0]
+    distance = np.hypot(*(places - solution[:2]).T)
+    return solution[:2], float(np.std(distance))
+
+
+def test_a_line_of_sight_to_another_height_of_the_axis_leans_otherwise():
+    declared = lens_from_rig(_rig(tilt_deg=15, tilt_axis_deg=60, focal_px=800.0), SIZE, None)
+    lens = declared.looking_at(_filmed(15.0, 60.0, radius=0.0, height=30.0)[0], 30.0)
+    assert np.degrees(lens.tilt_sigma) == pytest.approx(0.56, abs=0.01)
+    path = _filmed(15.0, 60.0)
+    _, off = _circle(lens.rectify(path))
+    leaning = [dataclasses.replace(lens, tilt=lens.tilt + sign * lens.tilt_sigma) for sign in (1.0, -1.0)]
+    assert min(_circle(one.rectify(path))[1] for one in leaning) < 0.1 * off
+
+
+def test_an_unknown_focal_length_displaces_the_centre_by_as_much_as_is_stated():
+    focal = SIZE[0] / 0.7
+    path = _filmed(15.0, 60.0, focal=focal)
+    lens = lens_from_rig(_rig(tilt_deg=15, tilt_axis_deg=60), SIZE, None)
+    displaced = _circle(lens.rectify(path))[0] - lens.pivot_px
+    stated = lens.neglected_displacement(200.0, SIZE[0])
+    assert np.abs(displaced @ stated) / (stated @ stated) == pytest.approx(1.0, abs=0.4)
+
+
 def test_distortion_and_tilt_together_are_undone(tmp_path):
     write_calibration(_calibration(), tmp_path / "c.yaml")
     rig = _rig(calibration=str(tmp_path / "c.yaml"), tilt_deg=15, tilt_axis_deg=60)

@@ -114,10 +114,11 @@ def test_a_declared_tilt_is_undone_for_parts_at_every_height(tmp_path):
         effects={"camera_tilt": {"tilt_deg": 15.0}},
         declare={"camera": {"tilt_deg": 15.0, "calibration": "lens.yaml"}},
     )
-    error, _ = _errors(measured, truth)
+    error, sigma = _errors(measured, truth)
     assert measured.why_coarse is None
     assert measured.series.ok.all()
     assert np.sqrt((error**2).mean()) < 0.02
+    assert np.sqrt(((error / sigma) ** 2).mean()) < 1.5
 
 
 def test_a_declared_rolling_shutter_moves_the_time_of_each_row(tmp_path):
