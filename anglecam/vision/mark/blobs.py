@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.data.typing import Floats
+from anglecam.data.typing import Floats, Image
 from anglecam.vision.mark.segment import Region
 
 _MIN_AREA_PX2 = 12.0
@@ -34,8 +34,38 @@ class Blobs:
     """px²."""
     contrast: Floats
     """Hue contrast over the picture's usual one, units of a*, b*."""
-    label: NDArray[np.int64]
-    """Label of the connected component in its picture."""
+    box_px: NDArray[np.int64]
+    """(n, 4) left, top, width and height in the picture, px."""
+    pixel_px: NDArray[np.int64]
+    """(n, 2) column and row of one of its pixels."""
+
+    def mask(self, k: int, above: Image, margin_px: int) -> tuple[Image, tuple[slice, slice]]:
+        """Return the pixels of a blob, and the part of the picture that they are given for.
+
+        Parameters
+        ----------
+        k : int
+            Index of the blob.
+        above : ndarray
+            (h, w) bytes: 1 where its picture is above the level at which the blobs were found.
+        margin_px : int
+            Around the blob's box.
+
+        Returns
+        -------
+        mask : ndarray
+            Bytes, 1 inside.
+        part : tuple of slice
+            Rows and columns.
+        """
+        left, top, width, height = self.box_px[k]
+        _, labels = cv2.connectedComponents(above[top : top + height, left : left + width], connectivity=8)
+        x, y = self.pixel_px[k]
+        low = np.maximum([top - margin_px, left - margin_px], 0)
+        high = np.minimum([top + height + margin_px, left + width + margin_px], above.shape)
+        mask = np.zeros(high - low, np.uint8)
+        mask[top - low[0] :, left - low[1] :][:height, :width] = labels == labels[y - top, x - left]
+        return mask, (slice(low[0], high[0]), slice(low[1], high[1]))
 
 
 def find_blobs(
@@ -59,9 +89,9 @@ def find_blobs(
     Blobs
         At most twelve for each picture, without those that are too small or too large for a mark.
     """
-    frame, picture_px, plane_px, area, contrast, label = [], [], [], [], [], []
+    frame, picture_px, plane_px, area, contrast, box, pixel = [], [], [], [], [], [], []
     for t, hue in enumerate(maps):
-        _, _, stats, centres = cv2.connectedComponentsWithStats((hue > level).astype(np.uint8), connectivity=8)
+        _, labels, stats, centres = cv2.connectedComponentsWithStats((hue > level).astype(np.uint8), connectivity=8)
         sizes = stats[:, cv2.CC_STAT_AREA]
         largest = _MAX_AREA_SHARE * hue.size
         chosen = [k for k in np.argsort(-sizes) if k and _MIN_AREA_PX2 <= sizes[k] <= largest][:_MAX_PER_PICTURE]
@@ -73,14 +103,17 @@ def find_blobs(
             plane_px.append(to_plane(t, centres[k]))
             area.append(sizes[k])
             contrast.append(np.percentile(part[part > level], 75) - usual)
-            label.append(k)
+            box.append(stats[k, :4])
+            row, column = divmod(int((labels[y : y + h, x : x + w] == k).argmax()), w)
+            pixel.append((x + column, y + row))
     return Blobs(
         np.array(frame, np.int64),
         np.array(picture_px, float).reshape(-1, 2),
         np.array(plane_px, float).reshape(-1, 2),
         np.array(area, float),
         np.array(contrast, float),
-        np.array(label, np.int64),
+        np.array(box, np.int64).reshape(-1, 4),
+        np.array(pixel, np.int64).reshape(-1, 2),
     )
 
 
@@ -94,5 +127,6 @@ def blobs_of_regions(regions: Sequence[Sequence[Region]]) -> Blobs:
         plane_px=places,
         area=np.array([region.area_px2 for _, region in whole]),
         contrast=np.ones(len(whole)),
-        label=np.zeros(len(whole), np.int64),
+        box_px=np.zeros((len(whole), 4), np.int64),
+        pixel_px=np.zeros((len(whole), 2), np.int64),
     )

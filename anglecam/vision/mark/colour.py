@@ -55,13 +55,13 @@ class ColourModel:
         return cv2.transform(image, matrix)
 
 
-def hue_contrast(image: Image, rgb: tuple[int, int, int] | None) -> NDArray[Any]:
+def hue_contrast(lab: Image, rgb: tuple[int, int, int] | None) -> NDArray[Any]:
     """Return how strongly each pixel has the mark's hue, insensitive to skin and little affected by shading.
 
     Parameters
     ----------
-    image : ndarray
-        (h, w, 3) blue, green, red.
+    lab : ndarray
+        (h, w, 3) CIE Lab, bytes.
     rgb : tuple of int, optional
         The declared colour. Without it the hue is red as opposed to skin: a* − 0.5·b* of CIE Lab.
 
@@ -71,7 +71,6 @@ def hue_contrast(image: Image, rgb: tuple[int, int, int] | None) -> NDArray[Any]
         (h, w), units of CIE Lab's a* and b*. With a declared colour: the component of (a*, b*) along the declared hue
         minus the magnitude of the component across it.
     """
-    lab = cv2.cvtColor(image, cv2.COLOR_BGR2LAB)
     if rgb is None:
         row = np.array([[0.0, 1.0, -_SKIN_SLOPE, -128.0 * (1.0 - _SKIN_SLOPE)]])
         return cv2.transform(lab.astype(np.float32), row)

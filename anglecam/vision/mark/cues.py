@@ -14,6 +14,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 
@@ -50,7 +51,7 @@ class Cue:
     name: str
     """``declared``, ``pointed``, ``red`` or ``moving``."""
     contrast: Callable[[Image], NDArray[Any]]
-    """Maps a picture (h, w, 3) to (h, w): larger is more like the colour, Lab units."""
+    """Maps a picture in CIE Lab (h, w, 3), bytes, to (h, w): larger is more like the colour, Lab units."""
     rgb: tuple[int, int, int] | None
     """The colour; ``None`` for red as opposed to skin, whatever its shade."""
 
@@ -60,21 +61,35 @@ class Cue:
         return self.name in ("red", "declared")
 
 
-RED = Cue("red", lambda image: hue_contrast(image, None), None)
+RED = Cue("red", lambda lab: hue_contrast(lab, None), None)
 
 
 def declared_cue(rgb: tuple[int, int, int]) -> Cue:
     """Return the cue of a declared colour, accurate to some tens of grey levels."""
     if np.hypot(*lab_of(rgb)[1:]) >= _COLOURED:
-        return Cue("declared", lambda image: hue_contrast(image, rgb), rgb)
-    return Cue("declared", lambda image: closeness(image, rgb), rgb)
+        return Cue("declared", lambda lab: hue_contrast(lab, rgb), rgb)
+    return Cue("declared", lambda lab: closeness(lab, rgb), rgb)
 
 
-def closeness(image: Image, rgb: tuple[int, int, int]) -> NDArray[Any]:
-    """Return how close each pixel's colour is to a given one: (h, w), minus the distance in CIE Lab."""
-    colour = (lab_of(rgb) / _SCALE + _OFFSET).astype(np.float32)
-    off = (cv2.cvtColor(image, cv2.COLOR_BGR2LAB) - colour) * _SCALE.astype(np.float32)
-    return -np.sqrt((off * off).sum(axis=2))
+def closeness(lab: Image, rgb: tuple[int, int, int]) -> NDArray[Any]:
+    """Return how close each pixel's colour is to a given one: (h, w), minus the distance in CIE Lab.
+
+    ``lab`` is a picture in CIE Lab (h, w, 3), as OpenCV stores it in bytes.
+    """
+    return _minus_distance(lab, (lab_of(rgb) / _SCALE + _OFFSET).astype(np.float32), _SCALE.astype(np.float32))
+
+
+@njit(cache=True)
+def _minus_distance(lab, colour, scale):  # type: ignore[no-untyped-def]
+    found = np.empty(lab.shape[:2], np.float32)
+    for y in range(lab.shape[0]):
+        for x in range(lab.shape[1]):
+            square = np.float32(0.0)
+            for k in range(3):
+                off = (np.float32(lab[y, x, k]) - colour[k]) * scale[k]
+                square += off * off
+            found[y, x] = -np.sqrt(square)
+    return found
 
 
 def pointed_cues(image: Image, box_px: Floats) -> list[Cue]:
@@ -159,4 +174,4 @@ def _of_colour(name: str, lab: Floats) -> Cue:
     stored = np.clip(np.round(lab / _SCALE + _OFFSET), 0, 255).astype(np.uint8)
     blue, green, red = cv2.cvtColor(stored.reshape(1, 1, 3), cv2.COLOR_LAB2BGR)[0, 0]
     rgb = int(red), int(green), int(blue)
-    return Cue(name, lambda image: closeness(image, rgb), rgb)
+    return Cue(name, lambda lab: closeness(lab, rgb), rgb)

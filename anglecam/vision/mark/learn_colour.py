@@ -15,6 +15,8 @@ from anglecam.vision.mark.colour import ColourModel, fit_discriminant, lab_of
 
 MIN_CONTRAST = 8.0
 """Lab units by which the mark's colour must stand out; JPEG's chroma errors reach 3 or 4."""
+_EDGE_PX = 4
+"""Reach of a filmed edge, px."""
 _HUE_TOLERANCE = np.radians(25.0)
 _COLOURED = 20.0
 """Chroma, units of a*, b*, from which on a declared colour has a hue that can be compared."""
@@ -27,23 +29,23 @@ def learn_colour(
 ) -> ColourModel | None:
     """Learn the colour from a track's blobs; ``None`` where they do not stand out from their neighbourhood."""
     inside, around, elsewhere, contrast = [], [], [], []
+    edge = np.ones((2 * _EDGE_PX + 1, 2 * _EDGE_PX + 1), np.uint8)
     for m in track.members:
         t = int(track.blobs.frame[m])
         coloured = (maps[t] > track.level).astype(np.uint8)
-        _, labels = cv2.connectedComponents(coloured, connectivity=8)
-        blob = (labels == track.blobs.label[m]).astype(np.uint8)
+        collar_px = max(8, round(float(np.sqrt(track.blobs.area[m])) / 2.0))
+        blob, part = track.blobs.mask(m, coloured, _EDGE_PX + collar_px)
         core = cv2.erode(blob, np.ones((3, 3), np.uint8))
         core = core if core.sum() >= 6 else blob
         # Edge pixels belong to neither. Beyond them lies a collar as wide as the mark, without other blobs.
-        grown = cv2.dilate(blob, np.ones((9, 9), np.uint8))
-        wide = 2 * max(8, round(float(np.sqrt(blob.sum())) / 2.0)) + 1
-        collar: Image = cv2.dilate(grown, np.ones((wide, wide), np.uint8)) - grown
-        near_coloured: Image = cv2.dilate(coloured, np.ones((9, 9), np.uint8))
-        collar = collar & (1 - near_coloured)
-        inside.append(images[t][core > 0])
-        around.append(images[t][collar > 0])
+        grown = cv2.dilate(blob, edge)
+        collar: Image = cv2.dilate(grown, np.ones((2 * collar_px + 1, 2 * collar_px + 1), np.uint8)) - grown
+        near_coloured: Image = cv2.dilate(coloured, edge)
+        collar = collar & (1 - near_coloured[part])
+        inside.append(images[t][part][core > 0])
+        around.append(images[t][part][collar > 0])
         if collar.any():
-            contrast.append(float(np.median(maps[t][core > 0]) - np.median(maps[t][collar > 0])))
+            contrast.append(float(np.median(maps[t][part][core > 0]) - np.median(maps[t][part][collar > 0])))
         rest = np.s_[::8, ::8]
         elsewhere.append(images[t][rest][near_coloured[rest] == 0])
     parts = [np.concatenate(p).astype(float) for p in (inside, around, elsewhere)]

@@ -74,7 +74,8 @@ def find_mark(samples: Samples, rgb: tuple[int, int, int] | None, near_px: Float
         cues = pointed_cues(samples.images[0], samples.pointed_px)
     else:
         cues = [RED, *([] if at_rest else moving_cues(samples.stabilised))]
-    found = [mark for cue in cues if (mark := _mark_of_cue(cue, samples, near_px, at_rest)) is not None]
+    labs = [cv2.cvtColor(image, cv2.COLOR_BGR2LAB) for image in samples.images]
+    found = [mark for cue in cues if (mark := _mark_of_cue(cue, samples, labs, near_px, at_rest)) is not None]
     ranked = sorted(found, key=lambda mark: -mark.score)
     if not ranked:
         return None
@@ -83,10 +84,15 @@ def find_mark(samples: Samples, rgb: tuple[int, int, int] | None, near_px: Float
     return replace(best, margin=best.score / rivals[0]) if rivals else best
 
 
-def _mark_of_cue(cue: Cue, samples: Samples, near_px: Floats | None, at_rest: bool) -> FoundMark | None:
-    """Return the thing of one colour that is most like a mark; ``None`` where there is none."""
+def _mark_of_cue(
+    cue: Cue, samples: Samples, labs: Sequence[Image], near_px: Floats | None, at_rest: bool
+) -> FoundMark | None:
+    """Return the thing of one colour that is most like a mark; ``None`` where there is none.
+
+    ``labs`` are the samples in CIE Lab.
+    """
     images = samples.images
-    maps = [cv2.GaussianBlur(cue.contrast(image), (0, 0), 1.0) for image in images]
+    maps = [cv2.GaussianBlur(cue.contrast(lab), (0, 0), 1.0) for lab in labs]
     usual, top = _contrast_range(maps, at_rest)
     if top - usual < MIN_CONTRAST:
         return None
@@ -127,7 +133,9 @@ def _pointed_blobs(blobs: Blobs, contrast: NDArray[Any], level: float, box_px: F
     _, labels = cv2.connectedComponents((contrast > level).astype(np.uint8), connectivity=8)
     left, top, right, bottom = np.round(box_px).astype(int)
     inside = np.unique(labels[max(top, 0) : bottom + 1, max(left, 0) : right + 1])
-    return np.flatnonzero((blobs.frame == 0) & np.isin(blobs.label, inside))
+    first = np.flatnonzero(blobs.frame == 0)
+    x, y = blobs.pixel_px[first].T
+    return first[np.isin(labels[y, x], inside)]
 
 
 def _in_box(places: Floats, box_px: Floats, margin: float) -> NDArray[np.bool_]:
@@ -138,9 +146,8 @@ def _opening(track: BlobTrack, maps: Sequence[NDArray[Any]]) -> int:
     """Return half the radius of the largest disc in a track's blobs, px, if thinner parts are attached, else 0."""
     radii, shares = [], []
     for m in track.members:
-        coloured = (maps[int(track.blobs.frame[m])] > track.level).astype(np.uint8)
-        _, labels = cv2.connectedComponents(coloured, connectivity=8)
-        blob = (labels == track.blobs.label[m]).astype(np.uint8)
+        above = (maps[int(track.blobs.frame[m])] > track.level).astype(np.uint8)
+        blob, _ = track.blobs.mask(m, above, int(track.blobs.box_px[m, 2:].max()))
         radius = int(cv2.distanceTransform(np.pad(blob, 1), cv2.DIST_L2, 5).max() / 2.0)
         opened = cv2.morphologyEx(blob, cv2.MORPH_OPEN, disc(radius))
         radii.append(radius)

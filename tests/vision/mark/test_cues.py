@@ -1,5 +1,6 @@
 """The colours that move, and those of a thing that is pointed at, are found whatever they are."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -43,5 +44,5 @@ def test_a_box_outside_the_picture_has_no_colours():
 
 
 def test_closeness_is_the_distance_in_lab():
-    image = np.array([[[0, 0, 0], [255, 255, 255]]], np.uint8)
-    np.testing.assert_allclose(closeness(image, (0, 0, 0)), [[0.0, -100.0]], atol=0.5)
+    lab = cv2.cvtColor(np.array([[[0, 0, 0], [255, 255, 255]]], np.uint8), cv2.COLOR_BGR2LAB)
+    np.testing.assert_allclose(closeness(lab, (0, 0, 0)), [[0.0, -100.0]], atol=0.5)
