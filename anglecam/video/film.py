@@ -70,6 +70,8 @@ class _Memory:
     interlaced: int = 0
     rows: list[Row] | None = None
     """All rows of a short film."""
+    samples: dict[int, Sample] = field(default_factory=dict)
+    """By the upper limit of their frames: several stages look at the same ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +161,7 @@ class Film:
             yield Frame(index, time, image, predicted)
 
     def sample(self, most: int) -> Sample:
-        """Read the whole film and keep at most ``most`` evenly spaced frames of it.
+        """Read the whole film, if it was not sampled before, and keep at most ``most`` evenly spaced frames of it.
 
         The film's length is not known beforehand: when more than ``most`` frames are kept, every second one is dropped
         and the stride doubles.
@@ -179,6 +181,8 @@ class Film:
         InputError
             As `frames`.
         """
+        if most in self._memory.samples:
+            return self._memory.samples[most]
         kept: list[Frame] = []
         stride, count, decoded = 1, 0, 0
         for index, (time, picture) in enumerate(self._rows()):
@@ -190,7 +194,8 @@ class Film:
             if len(kept) > most:
                 stride *= 2
                 kept = [frame for frame in kept if frame.index % stride == 0]
-        return Sample(tuple(kept), count, decoded)
+        self._memory.samples[most] = sample = Sample(tuple(kept), count, decoded)
+        return sample
 
     def why_truncated(self, sample: Sample) -> str | None:
         """Return how much could be read of a file that ends too early, ``None`` for a complete one."""

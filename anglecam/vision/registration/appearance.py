@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from anglecam.data.typing import Floats, Integers
-from anglecam.vision.registration.kernels import gain_equations, normal_equations, turn_equations
+from anglecam.vision.registration.kernels import gain_equations, normal_equations, place_on_tiles
+from anglecam.vision.registration.turn_kernel import turn_equations
 
 KNOT_SPACING_PX = 0.5
 """Distance between neighbouring knots, px: fine enough for an edge that only the pixels have blurred."""
@@ -218,20 +219,19 @@ def compare_tiles(tiles: TileAppearance, views: TileViews, turns: Floats, pivots
     TileFit
         A row for each view.
     """
+    places, away, gains, rises = place_on_tiles(
+        views.offsets,
+        views.starts,
+        turns,
+        pivots,
+        tiles.corners,
+        tiles.side,
+        tiles.gains,
+        tiles.parallax,
+        tiles.leans,
+    )
     return TileFit(
-        *turn_equations(
-            views.offsets,
-            views.values,
-            views.starts,
-            turns,
-            pivots,
-            tiles.corners,
-            tiles.side,
-            tiles.coefficients,
-            tiles.gains,
-            tiles.parallax,
-            tiles.leans,
-        )
+        *turn_equations(views.values, views.starts, places, away, gains, rises, tiles.side, tiles.coefficients)
     )
 
 

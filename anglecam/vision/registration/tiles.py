@@ -160,7 +160,7 @@ def view_tiles(
     centres_px : ndarray
         (views, 2) the tiles' middles in the picture, px.
     """
-    offsets, values, starts, centres = [], [], [0], []
+    offsets, values, counts, centres = [], [], [], []
     parallax = heights[:, None] * plane.axis.parallax
     reach = (0.71 * TILE_SIDE_PX + 1.5) * plane.stretch
     for f in frames:
@@ -169,25 +169,25 @@ def view_tiles(
         if f.turn_per_row:
             extra = f.turn_per_row * (middles[:, 1] - f.row)
             middles = plane.lens.distort(rotate_each(arm, f.turn + extra) + f.pivot_px + parallax)
-        for corner, middle, shift in zip(corners, middles, parallax, strict=True):
-            offset, value = _gather(
-                f.image,
-                plane.ground,
-                middle,
-                reach,
-                f.pivot_px + shift,
-                f.turn,
-                f.turn_per_row,
-                f.row,
-                corner,
-                TILE_SIDE_PX,
-                pivot_px + shift,
-            )
-            offsets.append(offset)
-            values.append(value)
-            starts.append(starts[-1] + len(offset))
+        offset, value, count = _gather(
+            f.image,
+            plane.ground,
+            middles,
+            reach,
+            f.pivot_px + parallax,
+            f.turn,
+            f.turn_per_row,
+            f.row,
+            corners,
+            TILE_SIDE_PX,
+            pivot_px + parallax,
+        )
+        offsets.append(offset)
+        values.append(value)
+        counts.append(count)
         centres.append(middles)
-    return TileViews(np.concatenate(offsets), np.concatenate(values), np.array(starts)), np.concatenate(centres)
+    starts = np.append(0, np.cumsum(np.concatenate(counts)))
+    return TileViews(np.concatenate(offsets), np.concatenate(values), starts), np.concatenate(centres)
 
 
 def _find_heights(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats) -> Floats:
@@ -261,26 +261,30 @@ def _by_tile(part: Image, side: int = TILE_SIDE_PX) -> Image:
 
 
 @njit(cache=True)
-def _gather(image, ground, middle, reach, pivot_here, turn, per_row, row, corner, side, pivot):  # type: ignore[no-untyped-def]
-    """Collect one tile's pixels: offsets from its pivot in this frame, and values."""
-    top, bottom = max(0, int(middle[1] - reach)), min(image.shape[0], int(middle[1] + reach) + 2)
-    left, right = max(0, int(middle[0] - reach)), min(image.shape[1], int(middle[0] + reach) + 2)
-    room = max(0, bottom - top) * max(0, right - left)
-    offsets, values, count = np.empty((room, 2)), np.empty((room, image.shape[2]), np.float32), 0
+def _gather(image, ground, middles, reach, pivots_here, turn, per_row, row, corners, side, pivots):  # type: ignore[no-untyped-def]
+    """Collect the tiles' pixels: offsets from their pivots in this frame, values, and how many each tile has."""
+    most = len(corners) * (int(2 * reach) + 4) ** 2
+    offsets, values = np.empty((most, 2)), np.empty((most, image.shape[2]), np.float32)
+    counts, count = np.zeros(len(corners), np.int64), 0
     c, s = np.cos(turn), np.sin(turn)
-    for y in range(top, bottom):
-        # A row exposed later shows the body rotated further: its pixels are rotated back around the pivot.
-        late = per_row * (y - row)
-        cl, sl = np.cos(late), np.sin(late)
-        for x in range(left, right):
-            gx, gy = ground[y, x, 0] - pivot_here[0], ground[y, x, 1] - pivot_here[1]
-            vx, vy = cl * gx - sl * gy, sl * gx + cl * gy
-            at_x = pivot[0] + c * vx - s * vy - corner[0]
-            at_y = pivot[1] + s * vx + c * vy - corner[1]
-            if at_x < -0.5 or at_y < -0.5 or at_x > side + 0.5 or at_y > side + 0.5:
-                continue
-            offsets[count, 0], offsets[count, 1] = vx, vy
-            for channel in range(image.shape[2]):
-                values[count, channel] = image[y, x, channel]
-            count += 1
-    return offsets[:count], values[:count]
+    for t in range(len(corners)):
+        top, bottom = max(0, int(middles[t, 1] - reach)), min(image.shape[0], int(middles[t, 1] + reach) + 2)
+        left, right = max(0, int(middles[t, 0] - reach)), min(image.shape[1], int(middles[t, 0] + reach) + 2)
+        before = count
+        for y in range(top, bottom):
+            # A row exposed later shows the body rotated further: its pixels are rotated back around the pivot.
+            late = per_row * (y - row)
+            cl, sl = np.cos(late), np.sin(late)
+            for x in range(left, right):
+                gx, gy = ground[y, x, 0] - pivots_here[t, 0], ground[y, x, 1] - pivots_here[t, 1]
+                vx, vy = cl * gx - sl * gy, sl * gx + cl * gy
+                at_x = pivots[t, 0] + c * vx - s * vy - corners[t, 0]
+                at_y = pivots[t, 1] + s * vx + c * vy - corners[t, 1]
+                if at_x < -0.5 or at_y < -0.5 or at_x > side + 0.5 or at_y > side + 0.5:
+                    continue
+                offsets[count, 0], offsets[count, 1] = vx, vy
+                for channel in range(image.shape[2]):
+                    values[count, channel] = image[y, x, channel]
+                count += 1
+        counts[t] = count - before
+    return offsets[:count].copy(), values[:count].copy(), counts
