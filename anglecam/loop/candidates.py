@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -20,7 +19,7 @@ from anglecam.loop.cross_validation import Prediction, predict_held_out
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_of, plant_of, refit_without
 from anglecam.loop.screen import Forecast
-from anglecam.threads import native_threads
+from anglecam.threads import map_in_threads
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -315,12 +314,6 @@ def find_rivals(
 def rms_difference(one: Fit, other: Fit) -> float:
     """Return the RMS difference, rad, between the predictions of two fits to the same recordings."""
     return float(np.sqrt(np.mean((np.concatenate(one.residuals) - np.concatenate(other.residuals)) ** 2)))
-
-
-def map_in_threads(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    """Apply ``work`` to all items in parallel; the integrator, which takes most of the time, releases the GIL."""
-    with ThreadPoolExecutor(native_threads()) as pool:
-        return list(pool.map(work, items))
 
 
 def log_likelihood_gain(before: float, after: float, n: int) -> float:

@@ -25,7 +25,6 @@ from anglecam.loop.candidates import (
     fit_from_candidates,
     fit_with,
     log_likelihood_gain,
-    map_in_threads,
     promising,
     rms_difference,
 )
@@ -34,6 +33,7 @@ from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_left, effects_of, refit_with_phi, refit_without
 from anglecam.loop.residual_test import ResidualTest, run_residual_test
 from anglecam.loop.screen import Change, Forecast, changes, directions, forecasts
+from anglecam.threads import map_in_threads
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ from anglecam.video.decode import Row, decode, decode_container, to_brightness, 
 from anglecam.video.display import Display, read_display
 from anglecam.video.fields import STILL_CODECS, fill_rows, first_field, is_bottom_first
 from anglecam.video.images import decode_images
+from anglecam.video.read_ahead import read_ahead
 from anglecam.video.truncation import is_cut_short
 
 MOST_BYTES = 256 * 2**20
@@ -155,6 +156,9 @@ class Film:
         InputError
             As `anglecam.video.decode.decode`, and where the film ends before the first frame that is wanted.
         """
+        yield from read_ahead(self._frames(brightness))
+
+    def _frames(self, brightness: bool) -> Iterator[Frame]:
         for index, (time, picture) in enumerate(self._rows()):
             image = None if picture is None else self._shown(picture, brightness)
             predicted = picture is not None and picture.pict_type in _PREDICTED

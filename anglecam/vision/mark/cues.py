@@ -79,7 +79,7 @@ def closeness(lab: Image, rgb: tuple[int, int, int]) -> NDArray[Any]:
     return _minus_distance(lab, (lab_of(rgb) / _SCALE + _OFFSET).astype(np.float32), _SCALE.astype(np.float32))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _minus_distance(lab, colour, scale):  # type: ignore[no-untyped-def]
     found = np.empty(lab.shape[:2], np.float32)
     for y in range(lab.shape[0]):

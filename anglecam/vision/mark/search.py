@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
+from anglecam.threads import map_in_threads
 from anglecam.vision.mark.blob_tracks import BlobTrack, moving_track, resting_track
 from anglecam.vision.mark.blobs import Blobs, blobs_of_regions, find_blobs
 from anglecam.vision.mark.cues import RED, Cue, declared_cue, moving_cues, pointed_cues
@@ -75,7 +76,8 @@ def find_mark(samples: Samples, rgb: tuple[int, int, int] | None, near_px: Float
     else:
         cues = [RED, *([] if at_rest else moving_cues(samples.stabilised))]
     labs = [cv2.cvtColor(image, cv2.COLOR_BGR2LAB) for image in samples.images]
-    found = [mark for cue in cues if (mark := _mark_of_cue(cue, samples, labs, near_px, at_rest)) is not None]
+    marks = map_in_threads(lambda cue: _mark_of_cue(cue, samples, labs, near_px, at_rest), cues)
+    found = [mark for mark in marks if mark is not None]
     ranked = sorted(found, key=lambda mark: -mark.score)
     if not ranked:
         return None

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
+from anglecam.threads import map_in_threads
 from anglecam.vision.registration.acceleration import AitkenSteps, AndersonSteps, PlainSteps
 from anglecam.vision.registration.appearance import (
     HIDDEN_MISFIT,
@@ -256,15 +257,22 @@ def _learn_all(
 ) -> list[TileAppearance]:
     """Learn every tile in a state from views with offsets from its centres."""
     parallax, gains = data.axis_in(state).parallax, [None] * len(views) if gains is None else gains
-    each = zip(data.tiles.corners, views, data.centres(state), state.centres.leans, gains, strict=True)
-    return [learn_tile(c, TILE_SIDE_PX, v, state.turns, o, parallax, lean, g) for c, v, o, lean, g in each]
+    centres, leans = data.centres(state), state.centres.leans
+
+    def learnt(t: int) -> TileAppearance:
+        corner = data.tiles.corners[t]
+        return learn_tile(corner, TILE_SIDE_PX, views[t], state.turns, centres[t], parallax, leans[t], gains[t])
+
+    return map_in_threads(learnt, range(len(views)))
 
 
 def compare_all(
     appearance: Sequence[TileAppearance], views: Sequence[TileViews], turns: Floats, centres: Floats
 ) -> TileFit:
     """Compare every tile with every frame: rows are tiles, columns frames."""
-    fits = [compare_tiles(t, v, turns, c[None]) for t, v, c in zip(appearance, views, centres, strict=True)]
+    fits = map_in_threads(
+        lambda t: compare_tiles(appearance[t], views[t], turns, centres[t][None]), range(len(appearance))
+    )
     return TileFit(
         np.stack([f.normal for f in fits]),
         np.stack([f.gradient for f in fits]),

@@ -39,7 +39,7 @@ def _leaning(c, s, parallax, lean, across):  # type: ignore[no-untyped-def]
     across[2], across[3] = lean[0] / rest, lean[1] / rest
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gains, parallax, lean):  # type: ignore[no-untyped-def]
     """Accumulate the normal equations for a tile's coefficients from views at known turns and gains.
 
@@ -100,7 +100,7 @@ def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gai
     return band, right
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def gain_equations(offsets, values, starts, turns, pivot, corner, side, coefficients, parallax, lean):  # type: ignore[no-untyped-def]
     """Accumulate the normal equations for a tile's gain, with the coefficients given.
 
@@ -158,7 +158,7 @@ def gain_equations(offsets, values, starts, turns, pivot, corner, side, coeffici
     return normal, gradient
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def place_on_tiles(offsets, starts, turns, pivots, corners, side, all_gains, parallax, leans):  # type: ignore[no-untyped-def]
     """Rotate the pixels of views onto their tiles.
 

@@ -260,7 +260,7 @@ def _by_tile(part: Image, side: int = TILE_SIDE_PX) -> Image:
     return part[: rows * side, : columns * side].reshape(rows, side, columns, side)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _gather(image, ground, middles, reach, pivots_here, turn, per_row, row, corners, side, pivots):  # type: ignore[no-untyped-def]
     """Collect the tiles' pixels: offsets from their pivots in this frame, values, and how many each tile has."""
     most = len(corners) * (int(2 * reach) + 4) ** 2

@@ -99,7 +99,7 @@ def _product(one, other, pixels):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _eliminate_light(product, light):  # type: ignore[no-untyped-def]
     """Eliminate brightness, offset and blur from the upper triangle of normal equations (9, 9); write them."""
     for a in range(9):
@@ -120,7 +120,7 @@ def _eliminate_light(product, light):  # type: ignore[no-untyped-def]
         light[p - 5] = rest / product[p, p]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit(cache=True, nogil=True, fastmath=_FAST)
 def turn_equations(values, starts, places, away, gains, rises, side, splines):  # type: ignore[no-untyped-def]
     """Accumulate each view's normal equations for its turn, its centre's place and its lean, given the appearance.
 
