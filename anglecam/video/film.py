@@ -23,6 +23,7 @@ from anglecam.data.typing import Floats, Image
 from anglecam.errors import InputError, RigError
 from anglecam.io.numbered_images import find_numbered_images
 from anglecam.io.rig import RigFrames
+from anglecam.threads import native_threads
 from anglecam.video.container import open_container
 from anglecam.video.decode import Row, decode, decode_container, to_brightness, to_colours
 from anglecam.video.display import Display, read_display
@@ -156,7 +157,8 @@ class Film:
         InputError
             As `anglecam.video.decode.decode`, and where the film ends before the first frame that is wanted.
         """
-        yield from read_ahead(self._frames(brightness))
+        frames = self._frames(brightness)
+        yield from read_ahead(frames) if native_threads() > 1 else frames
 
     def _frames(self, brightness: bool) -> Iterator[Frame]:
         for index, (time, picture) in enumerate(self._rows()):
