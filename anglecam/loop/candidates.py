@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 from scipy import special
@@ -20,9 +19,6 @@ from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_of, plant_of, refit_without
 from anglecam.loop.screen import Forecast
 from anglecam.threads import map_in_threads
-
-T = TypeVar("T")
-R = TypeVar("R")
 
 STAGED_STARTS = 8
 """Start values of a staged parameter from which a fit is made: those with the smallest cost before fitting."""

@@ -103,17 +103,15 @@ def test_in_the_hand_a_horn_is_measured_about_its_pivot(tmp_path):
     assert np.abs(error / np.degrees(series.sigma[series.ok])).max() < 4.0
 
 
-def test_a_horn_that_is_hidden_for_a_while_is_never_found_the_wrong_way_round(tmp_path):
+def test_a_horn_that_is_hidden_for_a_while_is_no_success(tmp_path):
     # on the right, both arms are before white paper, which is as bright as they are
     desk = _desk(np.random.default_rng(1))
     desk[:, 180:] = 235
     turns = np.concatenate([np.full(10, 120.0), 120.0 - 12.0 * np.arange(1, 25), np.full(15, -168.0)])
     turns = np.concatenate([turns, turns[::-1]])
-    try:
-        measured = measure_clip(open_film(_film(tmp_path / "clip.mkv", turns, desk=desk)), NEAR)
-    except InputError:
-        return
-    assert measured.doubt or np.abs(_error(measured.series, turns)).max() < 5.0
+    measured = measure_clip(open_film(_film(tmp_path / "clip.mkv", turns, desk=desk)), NEAR)
+    assert measured.doubt is not None  # the mark that is found is not the horn: exit status 1
+    assert "px from the hint" in measured.doubt
 
 
 def test_a_jump_by_any_angle_is_found():
