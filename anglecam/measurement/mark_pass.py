@@ -27,7 +27,7 @@ from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.mark.found_mark import FoundMark, Samples
 from anglecam.vision.mark.search import find_mark
-from anglecam.vision.mark.segment import SMALLEST_SHARE, Region, find_regions
+from anglecam.vision.mark.segment import LARGEST_SHARE, SMALLEST_SHARE, Region, find_regions
 from anglecam.vision.mark.track import MarkTrack, follow_mark
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.pivot.marker import RoundMarker
@@ -145,8 +145,8 @@ def _samples(
         images=[image for _, image, _ in kept],
         stabilised=[image if steady is None else _stabilised(image, move) for _, image, move in kept],
         time=np.array([time for time, _, _ in kept]),
-        to_plane=lambda i, point: lens.rectify(kept[i][2].to_reference(point)),
-        in_plane=lambda i, region: _in_plane(_unshaken([region], kept[i][2])[0], lens),
+        to_plane=lambda i, point: lens.rectify(point if steady is None else kept[i][2].to_reference(point)),
+        in_plane=lambda i, region: _in_plane(region if steady is None else _unshaken([region], kept[i][2])[0], lens),
         pointed_px=None if pointed is None else np.array(pointed.as_box),
     )
 
@@ -239,6 +239,7 @@ def _read_regions(
     repeated: list[bool] = []
     moves: list[CameraMove] = []
     before = None
+    areas = SMALLEST_SHARE * found.area_px2, LARGEST_SHARE * found.area_px2
     for frame in film.frames():
         image = frame.image
         if steady is not None:
@@ -246,9 +247,7 @@ def _read_regions(
         time.append(frame.time)
         decoded.append(image is not None)
         repeated.append(image is not None and before is not None and np.array_equal(image, before))
-        regions = (
-            [] if image is None else find_regions(image, found.model, SMALLEST_SHARE * found.area_px2, found.opening_px)
-        )
+        regions = [] if image is None else find_regions(image, found.model, areas, found.opening_px)
         candidates.append(regions)
         before = image
         if progress is not None:

@@ -39,6 +39,8 @@ _LEAST_SHARE = 0.3
 """Share of the samples in which the mark must be found again, whole and on its circle."""
 _LARGEST_SHARE = 0.06
 """Share of the picture's area above which a region is no mark: the whole face, where a part of it was found first."""
+_SURELY = 2.0
+"""Area, relative to that, above which a region is not looked at: the wall."""
 _STEADY = 20.0
 """Travel, in units of the scatter around the circle, at which a mark's score is halved. Filmed marks reach hundreds,
 and ten where an undeclared tilt makes the circle an ellipse."""
@@ -163,11 +165,10 @@ def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hi
     The threshold that found the blobs may have cut off a part of the mark, or joined it to something. A disc that
     another thing passes in front of seems to move, but its area changes.
     """
+    largest = _LARGEST_SHARE * samples.images[0].shape[0] * samples.images[0].shape[1]
+    areas = SMALLEST_SHARE * mark.area_px2, _SURELY * largest
     regions = [
-        [
-            samples.in_plane(i, region)
-            for region in find_regions(image, mark.model, SMALLEST_SHARE * mark.area_px2, mark.opening_px)
-        ]
+        [samples.in_plane(i, region) for region in find_regions(image, mark.model, areas, mark.opening_px)]
         for i, image in enumerate(samples.images)
     ]
     blobs = blobs_of_regions(regions)
@@ -181,7 +182,7 @@ def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hi
         if track is None or track.circle is None:
             continue
         area, place = _typical(track)
-        if area > _LARGEST_SHARE * samples.images[0].shape[0] * samples.images[0].shape[1]:
+        if area > largest:
             continue
         again = replace(mark, area_px2=area, place_px=place, circle=track.circle)
         followed = follow_mark(regions, samples.time, again)

@@ -8,6 +8,7 @@ outline does not.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import cv2
@@ -17,8 +18,8 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.mark.colour import EMPTY_LEVEL, FULL_LEVEL, ColourModel
 
-SMALLEST_SHARE = 0.25
-"""Of the mark's area; a smaller region is not the mark, even if partly hidden."""
+SMALLEST_SHARE, LARGEST_SHARE = 0.25, 8.0
+"""Of the mark's area; a smaller region is not the mark, even if partly hidden, nor is a larger one, even if merged."""
 _MARGIN_PX = 12
 """Margin around a region, px, that contains the foot of its edges."""
 _FOOT_PX = 3
@@ -53,7 +54,7 @@ class Region:
     """False where the region touches the picture's edge or another region."""
 
 
-def find_regions(image: Image, model: ColourModel, smallest_px2: float, opening_px: int = 0) -> list[Region]:
+def find_regions(image: Image, model: ColourModel, areas_px2: tuple[float, float], opening_px: int = 0) -> list[Region]:
     """Find the regions of the mark's colour in an image.
 
     Parameters
@@ -62,8 +63,8 @@ def find_regions(image: Image, model: ColourModel, smallest_px2: float, opening_
         (h, w, 3) blue, green, red.
     model : ColourModel
         The mark's colour.
-    smallest_px2 : float
-        Regions with a smaller area within the contour of the half level are left out.
+    areas_px2 : tuple of float
+        Regions with a smaller or a larger area within the contour of the half level are left out.
     opening_px : int
         Radius of a disc that must fit into a region everywhere; thinner parts, such as the thread of a ball, are cut
         off.
@@ -80,8 +81,9 @@ def find_regions(image: Image, model: ColourModel, smallest_px2: float, opening_
     compact = cv2.morphologyEx(core, cv2.MORPH_OPEN, disc(opening_px)) if opening_px else core
     patches, _ = cv2.findContours(compact, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     sized = sorted(((cv2.contourArea(p), k) for k, p in enumerate(patches) if len(p) >= _MIN_OUTLINE_PX), reverse=True)
-    large = [patches[k] for area, k in sized[:_MAX_REGIONS] if area >= smallest_px2]
-    measured = (_measure(fraction, smooth, compact, patch, model) for patch in large)
+    least, most = areas_px2
+    likely = [patches[k] for area, k in sized[:_MAX_REGIONS] if least <= area <= most]
+    measured = (_measure(fraction, smooth, compact, patch, model) for patch in likely)
     return [region for region in measured if region is not None]
 
 
@@ -109,24 +111,30 @@ def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], m
     # A highlight or the teeth inside the outline belong to the mark: away from the edge the outline is filled.
     weight[cv2.erode(filled, disc(_FOOT_PX)) > 0] = 1.0
 
-    y, x = np.mgrid[0 : inner.shape[0], 0 : inner.shape[1]].astype(np.float64)
     area = float(weight.sum())
     if area <= 0.0:
         return None
-    cx, cy = float((weight * x).sum() / area), float((weight * y).sum() / area)
-    dx, dy = x - cx, y - cy
-    xx, yy, xy = ((weight * m).sum() / area for m in (dx * dx, dy * dy, dx * dy))
-    soft = (weight > 0.0) & (weight < 1.0)
+    centre, moments = _moments(weight, area)
     slope = float(np.linalg.norm(model.weights)) / (1.0 - 2.0 * low)
-    d = np.column_stack([dx[soft], dy[soft]])
+    soft = ((weight > 0.0) & (weight < 1.0)).astype(float)
     return Region(
-        centre_px=np.array([cx + x0, cy + y0]),
+        centre_px=centre + [x0, y0],
         area_px2=area,
-        moments_px2=np.array([[xx, xy], [xy, yy]]),
-        noise_px2=(slope / area) ** 2 * d.T @ d,
+        moments_px2=moments,
+        noise_px2=(slope / area) ** 2 * _moments(soft, 1.0, centre)[1],
         contour_px=(outline.reshape(-1, 2) + [x0, y0]).astype(np.int32),
         whole=not (cut or touched),
     )
+
+
+def _moments(weight: Floats, total: float, about: Floats | None = None) -> tuple[Floats, Floats]:
+    """Return the centroid (2,) of weights (h, w) and the second moments (2, 2) about it, or about another place."""
+    columns, rows = weight.sum(axis=0), weight.sum(axis=1)
+    x, y = np.arange(len(columns), dtype=float), np.arange(len(rows), dtype=float)
+    centre = np.array([columns @ x, rows @ y]) / total if about is None else about
+    dx, dy = x - centre[0], y - centre[1]
+    xy = dy @ weight @ dx
+    return centre, np.array([[columns @ dx**2, xy], [xy, rows @ dy**2]]) / total
 
 
 def _outline(smooth: Image, inner: Image) -> NDArray[Any]:
@@ -158,16 +166,14 @@ def _cover(fraction: Image, filled: Image, reach: Image) -> NDArray[Any]:
     value = (fraction.astype(np.float32) - EMPTY_LEVEL) / (FULL_LEVEL - EMPTY_LEVEL)
     inside = cv2.erode(filled, disc(2)).astype(np.float32)
     outside = (1 - reach).astype(np.float32)
-    within = _spread(value * inside + _PRIOR, _PRIOR + inside)
-    without = _spread(value * outside, _PRIOR + outside)
+    # normalised convolution (Knutsson & Westin 1993) extends known values smoothly to where none is known
+    known = cv2.merge([value * inside + _PRIOR, _PRIOR + inside, value * outside, _PRIOR + outside])
+    within, of_within, without, of_without = cv2.split(cv2.GaussianBlur(known, (0, 0), _LOCAL_PX))
+    within, without = within / of_within, without / of_without
     return (value - without) / np.maximum(within - without, 0.3)
 
 
-def _spread(value: NDArray[Any], weight: NDArray[Any]) -> NDArray[Any]:
-    """Extend known values smoothly to where none is known (normalised convolution, Knutsson & Westin 1993)."""
-    return cv2.GaussianBlur(value, (0, 0), _LOCAL_PX) / cv2.GaussianBlur(weight, (0, 0), _LOCAL_PX)
-
-
+@cache
 def disc(radius_px: int) -> Image:
     """Return a filled disc as a structuring element, (2r + 1, 2r + 1)."""
     size = 2 * radius_px + 1

@@ -19,7 +19,7 @@ def _picture(red: np.ndarray) -> np.ndarray:
 def test_a_square_has_its_true_centre_and_area():
     red = np.zeros((60, 80))
     red[20:40, 30:60] = 255
-    (region,) = find_regions(_picture(red), RED, 10.0)
+    (region,) = find_regions(_picture(red), RED, (10.0, np.inf))
     assert region.whole
     assert region.centre_px == pytest.approx([44.5, 29.5], abs=1e-6)
     assert region.area_px2 == pytest.approx(600.0, rel=0.02)
@@ -29,7 +29,7 @@ def test_a_thread_between_two_larger_patches_is_not_a_separate_region():
     red = np.zeros((60, 80))
     red[10:50, 10:37] = red[10:50, 43:70] = 255
     red[12:48, 39:41] = 255
-    regions = find_regions(_picture(red), RED, 10.0)
+    regions = find_regions(_picture(red), RED, (10.0, np.inf))
     assert len(regions) == 2
     assert all(np.isfinite(region.centre_px).all() and region.area_px2 > 500.0 for region in regions)
     assert not any(region.whole for region in regions)
