@@ -7,9 +7,10 @@ transformed to the place of the first one, from which the clip is then measured.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 
+import av
 import cv2
 import numpy as np
 
@@ -17,7 +18,9 @@ from anglecam.data.typing import Floats, Image
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.detections import frames_to_keep
-from anglecam.video.film import Film, Frame, Sample
+from anglecam.video.decode import Row
+from anglecam.video.film import Film, Sample
+from anglecam.video.picture import Picture
 from anglecam.vision.stabilise.background_motion import BackgroundMotion
 from anglecam.vision.stabilise.learn import learn_background
 from anglecam.vision.stabilise.plane import follow_plane, moves_in_the_hand, seen_from_first, stands_still
@@ -51,16 +54,13 @@ class FilmAtRest(Film):
     first: Image | None = None
     """The first frame, shown where a transformed frame ends."""
 
-    def frames(self, *, brightness: bool = False) -> Iterator[Frame]:
-        """Yield the transformed frames; without a picture where the camera's place is unknown."""
-        for frame in super().frames(brightness=brightness):
-            yield self._at_rest(frame)
+    def thinned(self) -> None:
+        """Return ``None``: such a film is not measured from evenly spaced frames."""
 
     def sample(self, most: int) -> Sample:
         """Return evenly spaced transformed frames."""
         sample = super().sample(most)
-        known = (self._at_rest(frame) for frame in sample.frames)
-        return replace(sample, frames=tuple(frame for frame in known if frame.image is not None))
+        return replace(sample, frames=tuple(frame for frame in sample.frames if frame.image is not None))
 
     def in_picture(self, places_px: Floats) -> Floats:
         """Return the places in the filmed frames of (frames, 2) places in the first one, px."""
@@ -71,13 +71,31 @@ class FilmAtRest(Film):
             ]
         )
 
-    def _at_rest(self, frame: Frame) -> Frame:
-        move = self.moves[frame.index]
-        if frame.image is None or move is None:
-            return replace(frame, image=None)
+    def _picture(self, index: int, row: Row) -> Picture:
+        move = self.moves[index]
+        time, stored = row
         assert self.first is not None
-        behind = self.first if frame.image.shape == self.first.shape else self.first.mean(axis=2, keepdims=True)
-        return replace(frame, image=seen_from_first(frame.image, move, behind.astype(np.uint8)))
+        return _PictureAtRest(
+            index, time, None if move is None else stored, self.display, self.bottom_first, move, self.first
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _PictureAtRest(Picture):
+    """A picture that is transformed to the camera's first place."""
+
+    move: Floats | None
+    first: Image
+
+    def _is_as_stored(self, stored: av.VideoFrame) -> bool:
+        return False
+
+    def _shown(self, convert: Callable[[av.VideoFrame], Image]) -> Image | None:
+        image = super()._shown(convert)
+        if image is None or self.move is None:
+            return None
+        behind = self.first if image.shape == self.first.shape else self.first.mean(axis=2, keepdims=True)
+        return seen_from_first(image, self.move, behind.astype(np.uint8))
 
 
 def hold_camera(film: Film) -> HeldCamera:

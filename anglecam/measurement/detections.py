@@ -15,6 +15,7 @@ from anglecam.camera.lens import Lens
 from anglecam.data.typing import Floats
 from anglecam.errors import InputError
 from anglecam.io.rig import RigMark
+from anglecam.measurement.body_ahead import TurnsAhead
 from anglecam.video.film import Film, Frame
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle
@@ -70,6 +71,8 @@ class Detections:
     """``truncated: 71 of 120 frames could be read`` where the file ends too early."""
     notes: tuple[str, ...]
     """Messages to the user, a line each."""
+    turns: TurnsAhead | None = None
+    """Rotation of the body, where it was learnt before all frames were read."""
 
     @property
     def places_px(self) -> Floats:
@@ -100,7 +103,7 @@ def frame_of_mark(film: Film, mark: RigMark) -> Frame:
     """
     found = next((frame for frame in film.frames() if film.first_frame + frame.index == mark.frame), None)
     if found is None:
-        left_out = film.wanted.first is not None or film.wanted.last is not None
+        left_out = film.rows.wanted.first is not None or film.rows.wanted.last is not None
         why = "is not among the frames that are measured" if left_out else "the film does not have"
         raise InputError(f"{film.path}: the mark is declared in frame {mark.frame}, which {why}")
     if found.image is None:

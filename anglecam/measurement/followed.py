@@ -161,7 +161,7 @@ def _measured(
     why_coarse: str | None = "the body has too few features" if detections.moves else "the mark does not move"
     if detections.moves and detections.by not in ("outline", "layer"):
         start = _start(detections, ok, time, row, angles, rig)
-        registered = register_clip(film, start, detections.lens, progress)
+        registered = register_clip(film, start, detections.lens, progress, detections.turns)
         why_coarse = registered if isinstance(registered, str) else None
         if isinstance(registered, Registered):
             registered = replace(registered, turn=registered.turn - _rolls(detections))

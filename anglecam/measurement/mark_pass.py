@@ -1,7 +1,7 @@
 """The coarse pass over a clip: find the mark in every frame, and the pivot.
 
-The first reading keeps a few frames, from which the mark's colour, its rough path and the pivot's marker are learnt.
-The second reading finds the mark in every frame.
+The mark's colour, its rough path and the pivot's marker are learnt from evenly spaced frames. One reading then finds
+the mark in every frame.
 """
 
 from __future__ import annotations
@@ -13,25 +13,26 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from anglecam.camera.lens import Lens, lens_from_rig
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig, RigMark
+from anglecam.measurement.body_ahead import BodyAhead, learn_body_ahead
 from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.detections import Detections, frame_of_mark, frames_to_keep
+from anglecam.measurement.frame_reading import read_frames
 from anglecam.measurement.pivot import HEIGHT_SHARE, find_pivot
 from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.image.noise import pixel_noise
-from anglecam.vision.mark.found_mark import FoundMark, Samples
+from anglecam.vision.mark.found_mark import FoundMark, Samples, region_in_plane
 from anglecam.vision.mark.search import find_mark
-from anglecam.vision.mark.segment import LARGEST_SHARE, SMALLEST_SHARE, Region, find_regions
+from anglecam.vision.mark.segment import Region
 from anglecam.vision.mark.track import MarkTrack, follow_mark
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.pivot.marker import RoundMarker
-from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
+from anglecam.vision.stabilise.background_motion import BackgroundMotion, CameraMove
 
 _CLEAR = 2.0
 """Ratio of the best score to the next best from which on the choice of the mark is clear."""
@@ -85,13 +86,15 @@ def detect_mark(
         raise MarkNotFoundError(_no_mark(path, sample, rig))
     if camera is not None and camera.unknown is not None:
         raise InputError(camera.unknown)
-    time, filmed, decoded, repeated, shakes = _read_regions(film, found, sample.count, steady, progress)
+    body = _body_ahead(film, found, samples, rig, lens) if steady is None else None
+    reading = read_frames(film, found, sample.count, steady, body, progress)
+    time, filmed, shakes = reading.time, reading.regions, reading.moves
     candidates = filmed if shakes is None else [_unshaken(r, move) for r, move in zip(filmed, shakes, strict=True)]
     lens, track, marker, pivot, disagreement = _follow(candidates, time, found, samples.stabilised, rig, lens)
     hidden = np.zeros(len(time), bool) if shakes is None else np.array([not move.known for move in shakes])
     status = tuple(
         "undecodable" if not d else "occluded" if h else s
-        for s, d, h in zip(track.status, decoded, hidden, strict=True)
+        for s, d, h in zip(track.status, reading.decoded, hidden, strict=True)
     )
     if OK not in status:
         raise MarkNotFoundError(_nothing_measured(path, status, sample, rig))
@@ -122,12 +125,20 @@ def detect_mark(
         by="mark",
         clear=found.cue in ("declared", "pointed") or found.margin > _CLEAR,
         noise=noise,
-        repeated=repeated,
+        repeated=reading.repeated,
         colour_rgb=found.model.mean_rgb,
         size=film.size,
         truncated=film.why_truncated(sample),
         notes=tuple(notes),
+        turns=reading.turns,
     )
+
+
+def _body_ahead(film: Film, found: FoundMark, samples: Samples, rig: Rig, lens: Lens) -> BodyAhead | None:
+    """Learn the body before all frames are read, where nothing but evenly spaced frames is needed for it."""
+    simple = found.circle is not None and rig.camera.row_time_s is None and lens.tilt == 0.0
+    some = film.thinned() if simple else None
+    return None if some is None else learn_body_ahead(some, found, samples.images, rig, lens)
 
 
 def _samples(
@@ -146,7 +157,9 @@ def _samples(
         stabilised=[image if steady is None else _stabilised(image, move) for _, image, move in kept],
         time=np.array([time for time, _, _ in kept]),
         to_plane=lambda i, point: lens.rectify(point if steady is None else kept[i][2].to_reference(point)),
-        in_plane=lambda i, region: _in_plane(region if steady is None else _unshaken([region], kept[i][2])[0], lens),
+        in_plane=lambda i, region: region_in_plane(
+            region if steady is None else _unshaken([region], kept[i][2])[0], lens
+        ),
         pointed_px=None if pointed is None else np.array(pointed.as_box),
     )
 
@@ -161,7 +174,7 @@ def _follow(
 ) -> tuple[Lens, MarkTrack, RoundMarker | None, PivotEstimate | None, str | None]:
     """Follow the mark in the plane of motion; in a tilted perspective, repeat it with the lens centred on the pivot."""
     for again in (lens.tilt != 0.0 and lens.focal_px is not None, False):
-        placed = [[_in_plane(region, lens) for region in regions] for regions in candidates]
+        placed = [[region_in_plane(region, lens) for region in regions] for regions in candidates]
         track = follow_mark(placed, time, found)
         marker, pivot, disagreement = find_pivot(images, rig, track.circle, lens)
         if not again or pivot is None:
@@ -207,52 +220,6 @@ def _stabilised(image: Image, move: CameraMove) -> Image:
 def _rms_shift(moves: Sequence[CameraMove]) -> float:
     shifts = np.array([move.shift_px for move in moves if move.known])
     return float(np.sqrt(((shifts - shifts.mean(axis=0)) ** 2).mean())) if len(shifts) else 0.0
-
-
-def _in_plane(region: Region, lens: Lens) -> Region:
-    if lens.is_identity:
-        return region
-    J = lens.jacobian(region.centre_px)
-    return replace(
-        region,
-        centre_px=lens.rectify(region.centre_px),
-        area_px2=region.area_px2 * float(np.linalg.det(J)),
-        moments_px2=J @ region.moments_px2 @ J.T,
-        noise_px2=J @ region.noise_px2 @ J.T,
-    )
-
-
-def _read_regions(
-    film: Film,
-    found: FoundMark,
-    count: int,
-    steady: BackgroundMotion | None,
-    progress: Callable[[int, int], None] | None,
-) -> tuple[Floats, list[list[Region]], list[bool], NDArray[np.bool_], tuple[CameraMove, ...] | None]:
-    """Find the regions of the mark's colour in every frame.
-
-    Also return which frames equal the previous one bit for bit, and the camera's motion where it moves.
-    """
-    time: list[float] = []
-    candidates: list[list[Region]] = []
-    decoded: list[bool] = []
-    repeated: list[bool] = []
-    moves: list[CameraMove] = []
-    before = None
-    areas = SMALLEST_SHARE * found.area_px2, LARGEST_SHARE * found.area_px2
-    for frame in film.frames():
-        image = frame.image
-        if steady is not None:
-            moves.append(UNKNOWN_MOVE if image is None else steady.at(image, frame.predicted))
-        time.append(frame.time)
-        decoded.append(image is not None)
-        repeated.append(image is not None and before is not None and np.array_equal(image, before))
-        regions = [] if image is None else find_regions(image, found.model, areas, found.opening_px)
-        candidates.append(regions)
-        before = image
-        if progress is not None:
-            progress(frame.index + 1, count)
-    return np.array(time), candidates, decoded, np.array(repeated), tuple(moves) if steady is not None else None
 
 
 def _colour(rig: Rig) -> str:

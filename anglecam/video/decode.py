@@ -6,13 +6,11 @@ derived from a frame's number. A packet that cannot be decoded keeps its row: a 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import av
-import numpy as np
 
-from anglecam.data.typing import Image
 from anglecam.errors import InputError
 from anglecam.threads import native_threads
 from anglecam.video.container import LONGEST_S, MOST_FRAMES, open_container
@@ -23,7 +21,13 @@ Row = tuple[float, av.VideoFrame | None]
 """Time, s, and picture of a frame; ``None`` where it cannot be decoded."""
 
 
-def decode(path: Path) -> Iterator[Row]:
+INTRA_CODECS = ("mjpeg", "prores", "dnxhd", "huffyuv", "ffvhuff", "utvideo", "rawvideo")
+"""Every packet of these is a picture of its own, which is decoded without the others."""
+Wants = Callable[[int], bool]
+"""Whether the picture of the row with a given number is wanted; the first row has 0."""
+
+
+def decode(path: Path, wants: Wants | None = None) -> Iterator[Row]:
     """Yield a film's rows in the order of presentation.
 
     A packet that the container marks to be discarded is no frame: an edit list leaves out the start of a film that was
@@ -33,6 +37,8 @@ def decode(path: Path) -> Iterator[Row]:
     ----------
     path : Path
         The film.
+    wants : callable, optional
+        Which pictures of a codec in `INTRA_CODECS` are wanted; the other rows have none.
 
     Yields
     ------
@@ -46,10 +52,10 @@ def decode(path: Path) -> Iterator[Row]:
         size, or the film has no frame, more frames than `MOST_FRAMES` or a longer duration than `LONGEST_S`.
     """
     with open_container(path) as container:
-        yield from decode_container(path, container)
+        yield from decode_container(path, container, wants)
 
 
-def decode_container(path: Path, container: av.container.InputContainer) -> Iterator[Row]:
+def decode_container(path: Path, container: av.container.InputContainer, wants: Wants | None = None) -> Iterator[Row]:
     """Yield the rows of a film that is open, and of which nothing was decoded; see `decode`."""
     stream = container.streams.video[0]
     decoder = stream.codec_context
@@ -72,7 +78,7 @@ def decode_container(path: Path, container: av.container.InputContainer) -> Iter
         last = stamp
         return stamp * base, picture
 
-    for number, (packet, pictures) in enumerate(_packets(path, container, stream, is_avi)):
+    for number, (packet, pictures) in enumerate(_packets(path, container, stream, is_avi, wants)):
         if number > MOST_FRAMES:
             raise InputError(f"{path}: more than {MOST_FRAMES:,} frames are not read")
         if not packet.is_discard:
@@ -126,10 +132,15 @@ class OneSize:
 
 
 def _packets(
-    path: Path, container: av.container.InputContainer, stream: av.VideoStream, number_them: bool
+    path: Path,
+    container: av.container.InputContainer,
+    stream: av.VideoStream,
+    number_them: bool,
+    wants: Wants | None,
 ) -> Iterator[tuple[av.Packet, list[av.VideoFrame] | None]]:
-    """Yield each packet with the pictures decoded from it, ``None`` where it could not be decoded."""
+    """Yield each packet with the pictures decoded from it, ``None`` where it is not wanted or cannot be decoded."""
     packets = container.demux(stream)
+    row = -1
     while True:
         try:
             packet = next(packets)
@@ -139,36 +150,19 @@ def _packets(
             if is_cut_short(path):
                 return
             raise InputError(f"{path}: cannot be read to its end ({error.strerror})") from error
+        row += not packet.is_discard
         if packet.size == 0 and packet.dts is not None:
             # An empty packet would flush the decoder; in AVI it means a frame that was dropped in recording.
             yield packet, None
             continue
         if number_them:
             packet.pts = packet.dts
+        if packet.size and wants is not None and not wants(row):
+            yield packet, None
+            continue
         try:
             yield packet, packet.decode()
         except av.error.EOFError:
             return
         except av.error.FFmpegError:
             yield packet, None
-
-
-def to_colours(picture: av.VideoFrame) -> Image:
-    """Convert a picture to (height, width, 3) bytes: blue, green, red."""
-    return picture.to_ndarray(format="bgr24", threads=1)  # starting threads takes longer than they save
-
-
-def to_brightness(picture: av.VideoFrame) -> Image:
-    """Return a picture's brightness, (height, width, 1) bytes: the stored plane where there is one, else converted.
-
-    Of samples of 9 to 16 bits the upper eight are returned.
-    """
-    bits = picture.format.components[0].bits
-    if not picture.format.name.startswith(("yuv4", "yuvj4", "yuva4", "nv", "gray")) or not 8 <= bits <= 16:
-        return picture.to_ndarray(format="gray")[..., None]
-    plane = picture.planes[0]
-    rows = np.frombuffer(memoryview(plane), np.uint8).reshape(plane.height, plane.line_size)
-    if bits == 8:
-        return rows[:, : plane.width, None].copy()
-    samples = rows[:, : 2 * plane.width].view(">u2" if picture.format.is_big_endian else "<u2")
-    return (samples >> (bits - 8)).astype(np.uint8)[..., None]

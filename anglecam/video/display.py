@@ -56,6 +56,11 @@ class Display:
         width, height = (round(side * factor) for side, factor in zip(self.stored_size, self.stretch, strict=True))
         return (height, width) if self.transposed else (width, height)
 
+    @property
+    def is_as_stored(self) -> bool:
+        """Whether the shown picture is the stored one."""
+        return self.pixel_aspect == SQUARE and not (self.transposed or self.mirrored or self.upside_down)
+
     def show(self, image: Image) -> Image:
         """Return the shown picture of a stored one.
 

@@ -2,39 +2,34 @@
 
 The frames are those that a player shows, as it shows them: upright, with square pixels, one instant each.
 
-Measuring reads a film several times, and decoding a lossless picture takes as long as measuring in it. A `Film` keeps
-the decoded pictures of a short film in a bounded memory from its first complete reading on; a longer film is decoded
-again for every reading.
+The pictures of a short film are kept in a bounded memory from its first reading on (`anglecam.video.kept_rows`). A
+longer film is decoded again for every reading; evenly spaced pictures of it are kept.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Set
+from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import islice
 from pathlib import Path
 
 import av
 import numpy as np
-from av.video.frame import PictureType
 
 from anglecam.data.typing import Floats, Image
-from anglecam.errors import InputError, RigError
+from anglecam.errors import RigError
 from anglecam.io.numbered_images import find_numbered_images
 from anglecam.io.rig import RigFrames
 from anglecam.threads import native_threads
 from anglecam.video.container import open_container
-from anglecam.video.decode import Row, decode, decode_container, to_brightness, to_colours
+from anglecam.video.decode import INTRA_CODECS, Row, decode, decode_container
 from anglecam.video.display import Display, read_display
-from anglecam.video.fields import STILL_CODECS, fill_rows, first_field, is_bottom_first
+from anglecam.video.fields import STILL_CODECS, is_bottom_first
+from anglecam.video.film_rows import FilmRows, picture_bytes
 from anglecam.video.images import decode_images
+from anglecam.video.picture import Picture
 from anglecam.video.read_ahead import read_ahead
 from anglecam.video.truncation import is_cut_short
-
-MOST_BYTES = 256 * 2**20
-"""Of decoded pictures that a film keeps: 220 lossless ones of 640 × 480 px, 580 of an ordinary codec."""
-_PREDICTED = (PictureType.P, PictureType.B)
 
 
 @dataclass(frozen=True)
@@ -60,20 +55,7 @@ class Sample:
     count: int
     """Frames in the film, those without a picture included."""
     decoded: int
-    """Frames with a picture."""
-
-
-@dataclass
-class _Memory:
-    """What a film's first complete reading leaves behind."""
-
-    times: list[float] | None = None
-    undecodable: int = 0
-    interlaced: int = 0
-    rows: list[Row] | None = None
-    """All rows of a short film."""
-    samples: dict[int, Sample] = field(default_factory=dict)
-    """By the upper limit of their frames: several stages look at the same ones."""
+    """Frames with a picture, of those that were decoded to take the sample."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,14 +74,13 @@ class Film:
     """Whether colour is stored at a lower resolution than brightness."""
     cut_short: bool
     """Whether bytes are missing at the end of the file."""
-    decode: Callable[[], Iterator[Row]] = field(repr=False)
-    """Decodes all its rows from the start, because seeking may end on a wrong frame."""
+    rows: FilmRows = field(repr=False)
+    """Its frames as they are stored."""
     bottom_first: bool | None = None
     """Whether the second line of an interlaced picture belongs to its first field; ``None`` where all lines of a
     picture are of one instant, as in photographs."""
-    wanted: RigFrames = field(default_factory=RigFrames)
-    """Which frames are measured: only these are yielded."""
-    _memory: _Memory = field(default_factory=_Memory, repr=False)
+    _samples: dict[int, Sample] = field(default_factory=dict, repr=False)
+    """By the upper limit of their frames: several stages look at the same ones."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -119,33 +100,32 @@ class Film:
     @property
     def first_frame(self) -> int:
         """Number in the film of the first frame that is measured; the film's first frame has 0."""
-        return self.wanted.first or 0
+        return self.rows.first
 
     @property
     def times(self) -> Floats:
         """(n,) presentation times of the frames, s; reads the film if it was not read before."""
-        self._read_once()
-        return np.array(self._memory.times)
+        return np.array(self.rows.times)
 
     @property
     def undecodable(self) -> int:
         """Number of frames that cannot be decoded; reads the film if it was not read before."""
-        self._read_once()
-        return self._memory.undecodable
+        return self.rows.undecodable
 
     @property
     def interlaced(self) -> int:
         """Number of frames of which only the first field is shown; reads the film if it was not read before."""
-        self._read_once()
-        return self._memory.interlaced
+        return 0 if self.bottom_first is None else self.rows.interlaced
 
-    def frames(self, *, brightness: bool = False) -> Iterator[Frame]:
+    def frames(self, *, brightness: bool = False, only: Set[int] | None = None) -> Iterator[Frame]:
         """Yield the frames in the order of presentation; memory does not grow with the film's length.
 
         Parameters
         ----------
         brightness : bool
             Yield the brightness alone, as the codec stored it, instead of colours.
+        only : set of int, optional
+            Numbers of the frames to yield; without it all are.
 
         Yields
         ------
@@ -157,20 +137,41 @@ class Film:
         InputError
             As `anglecam.video.decode.decode`, and where the film ends before the first frame that is wanted.
         """
-        frames = self._frames(brightness)
+        pictures = (p for p in self._pictures(only) if only is None or p.index in only)
+        frames = (Frame(p.index, p.time, p.brightness if brightness else p.colours, p.predicted) for p in pictures)
         yield from read_ahead(frames) if native_threads() > 1 else frames
 
-    def _frames(self, brightness: bool) -> Iterator[Frame]:
-        for index, (time, picture) in enumerate(self._rows()):
-            image = None if picture is None else self._shown(picture, brightness)
-            predicted = picture is not None and picture.pict_type in _PREDICTED
-            yield Frame(index, time, image, predicted)
+    def pictures(self, convert: Callable[[Picture], object] | None = None) -> Iterator[Picture]:
+        """Yield the frames as `frames` does, each with a picture that is converted when it is needed.
+
+        Parameters
+        ----------
+        convert : callable, optional
+            A conversion that every picture needs: it is made ahead, as the decoding.
+
+        Yields
+        ------
+        Picture
+            Of every frame.
+        """
+
+        def converted() -> Iterator[Picture]:
+            for picture in self._pictures(None):
+                if convert is not None:
+                    convert(picture)
+                yield picture
+
+        yield from read_ahead(converted()) if native_threads() > 1 else converted()
+
+    def _pictures(self, only: Set[int] | None) -> Iterator[Picture]:
+        for index, row in enumerate(self.rows.read(None if only is None else only.__contains__)):
+            yield self._picture(index, row)
+
+    def _picture(self, index: int, row: Row) -> Picture:
+        return Picture(index, *row, self.display, self.bottom_first)
 
     def sample(self, most: int) -> Sample:
-        """Read the whole film, if it was not sampled before, and keep at most ``most`` evenly spaced frames of it.
-
-        The film's length is not known beforehand: when more than ``most`` frames are kept, every second one is dropped
-        and the stride doubles.
+        """Return at most ``most`` evenly spaced frames; read the film if it was not read before.
 
         Parameters
         ----------
@@ -187,75 +188,34 @@ class Film:
         InputError
             As `frames`.
         """
-        if most in self._memory.samples:
-            return self._memory.samples[most]
-        kept: list[Frame] = []
-        stride, count, decoded = 1, 0, 0
-        for index, (time, picture) in enumerate(self._rows()):
-            count += 1
-            decoded += picture is not None
-            if index % stride or picture is None:
-                continue
-            kept.append(Frame(index, time, self._shown(picture)))
-            if len(kept) > most:
+        if most not in self._samples:
+            decoded = [(number, row) for number, row in self.rows.kept.rows if row[1] is not None]
+            stride = 1
+            while sum(number % stride == 0 for number, _ in decoded) > most:
                 stride *= 2
-                kept = [frame for frame in kept if frame.index % stride == 0]
-        self._memory.samples[most] = sample = Sample(tuple(kept), count, decoded)
-        return sample
+            pictures = [self._picture(number, row) for number, row in decoded if number % stride == 0]
+            frames = tuple(Frame(p.index, p.time, p.colours) for p in pictures)
+            intact = self.rows.count - self.rows.undecodable if self.rows.is_read else len(decoded)
+            self._samples[most] = Sample(frames, self.rows.count, intact)
+        return self._samples[most]
+
+    def thinned(self) -> Film | None:
+        """Return the film that consists of the frames kept in memory; ``None`` where these are all of its frames."""
+        kept = self.rows.kept
+        if kept.stride == 1:
+            return None
+        rows = [row for _, row in kept.rows]
+        return replace(self, rows=FilmRows(self.path, lambda wants: iter(rows)), _samples={})
 
     def why_truncated(self, sample: Sample) -> str | None:
         """Return how much could be read of a file that ends too early, ``None`` for a complete one."""
-        last = self.wanted.last
+        last = self.rows.wanted.last
         if not self.cut_short or 0 < self.declared_frames <= sample.decoded:
             return None
         if last is not None and sample.count == last - self.first_frame + 1:
             return None
         of = f" of {self.declared_frames}" if self.declared_frames else ""
         return f"truncated: {sample.decoded}{of} frames could be read"
-
-    def _shown(self, picture: av.VideoFrame, brightness: bool = False) -> Image:
-        """Return a picture as a player shows it, of an interlaced one the first field."""
-        convert = to_brightness if brightness else to_colours
-        if self.bottom_first is None or not picture.interlaced_frame:
-            return self.display.show(convert(picture))
-        field = convert(first_field(picture, self.bottom_first))
-        return self.display.show(fill_rows(field, self.display.stored_size[1], self.bottom_first))
-
-    def _read_once(self) -> None:
-        """Read the film unless it was read completely before."""
-        if self._memory.times is None:
-            for _ in self._rows():
-                pass
-
-    def _rows(self) -> Iterator[Row]:
-        """Yield the wanted rows from memory, or decode them; the first complete reading fills the memory."""
-        memory = self._memory
-        if memory.times is not None:
-            yield from self._decoded() if memory.rows is None else memory.rows
-            return
-        times: list[float] = []
-        undecodable = interlaced = 0
-        rows: list[Row] = []
-        room = MOST_BYTES
-        for row in self._decoded():
-            times.append(row[0])
-            undecodable += row[1] is None
-            interlaced += self.bottom_first is not None and row[1] is not None and row[1].interlaced_frame
-            room -= _bytes(row)
-            if room >= 0:
-                rows.append(row)
-            else:
-                rows.clear()
-            yield row
-        if not times:
-            raise InputError(f"{self.path}: it ends before frame {self.first_frame}, the first that is wanted")
-        memory.times, memory.undecodable, memory.interlaced = times, undecodable, interlaced
-        memory.rows = rows if room >= 0 else None
-
-    def _decoded(self) -> Iterator[Row]:
-        """Decode the wanted rows."""
-        stop = None if self.wanted.last is None else self.wanted.last + 1
-        return islice(self.decode(), self.first_frame, stop)
 
 
 def open_film(path: Path, frames: RigFrames | None = None) -> Film:
@@ -300,9 +260,10 @@ def open_film(path: Path, frames: RigFrames | None = None) -> Film:
             codec=codec,
             coarse_colour=coarse_colour,
             cut_short=is_cut_short(path),
-            decode=partial(decode, path),
+            rows=FilmRows(
+                path, partial(decode, path), wanted, codec in INTRA_CODECS, declared * picture_bytes(picture)
+            ),
             bottom_first=None if codec in STILL_CODECS else is_bottom_first(stream.codec_context.field_order),
-            wanted=wanted,
         )
 
 
@@ -311,7 +272,7 @@ def _open_images(folder: Path, wanted: RigFrames) -> Film:
     if wanted.rate_hz is None:
         raise RigError(f"{folder}: numbered pictures have no times: declare frames: {{rate_hz: …}} in rig.yaml")
     decode_all = partial(decode_images, folder, images, wanted.rate_hz)
-    picture = _first_picture(decode_all())
+    picture = _first_picture(decode_all(None))
     assert picture is not None  # else its decoder has raised
     return Film(
         path=folder,
@@ -320,8 +281,7 @@ def _open_images(folder: Path, wanted: RigFrames) -> Film:
         codec=images[min(images)].suffix[1:].lower(),
         coarse_colour=_has_coarse_colour(picture.format),
         cut_short=False,
-        decode=decode_all,
-        wanted=wanted,
+        rows=FilmRows(folder, decode_all, wanted, True),
     )
 
 
@@ -340,8 +300,3 @@ def _declared_frames(container: av.container.InputContainer, stream: av.VideoStr
 def _has_coarse_colour(form: av.VideoFormat | None) -> bool:
     planes = form.components if form else ()
     return any(plane.width < planes[0].width for plane in planes)
-
-
-def _bytes(row: Row) -> int:
-    picture = row[1]
-    return 0 if picture is None else sum(plane.buffer_size for plane in picture.planes)

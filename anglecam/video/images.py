@@ -9,14 +9,16 @@ import av
 
 from anglecam.errors import InputError
 from anglecam.video.container import MOST_FRAMES, MOST_PIXELS
-from anglecam.video.decode import OneSize, Row
+from anglecam.video.decode import OneSize, Row, Wants
 
 _CODECS = {".png": "png", ".jpg": "mjpeg", ".jpeg": "mjpeg", ".tif": "tiff", ".tiff": "tiff", ".bmp": "bmp"}
 _MOST_BYTES = 8 * MOST_PIXELS
 """Of one file: the largest picture that is read, with four planes of 16 bits."""
 
 
-def decode_images(folder: Path, images: Mapping[int, Path], rate_hz: float) -> Iterator[Row]:
+def decode_images(
+    folder: Path, images: Mapping[int, Path], rate_hz: float, wants: Wants | None = None
+) -> Iterator[Row]:
     """Yield the pictures of a folder in the order of their numbers.
 
     Parameters
@@ -27,6 +29,8 @@ def decode_images(folder: Path, images: Mapping[int, Path], rate_hz: float) -> I
         From `anglecam.io.numbered_images.find_numbered_images`.
     rate_hz : float
         Pictures per second. The first one is at 0 s.
+    wants : callable, optional
+        Which rows' pictures are wanted; the other rows have none.
 
     Yields
     ------
@@ -44,12 +48,13 @@ def decode_images(folder: Path, images: Mapping[int, Path], rate_hz: float) -> I
     one_size: OneSize | None = None
     for number in range(first, last + 1):
         time = (number - first) / rate_hz
-        picture = _decode_image(images[number]) if number in images else None
+        wanted = number in images and (wants is None or wants(number - first))
+        picture = _decode_image(images[number]) if wanted else None
         if picture is not None:
             one_size = one_size or OneSize(folder, (picture.width, picture.height))
             picture = picture if one_size.allows(picture, time) else None
         yield time, picture
-    if one_size is None:
+    if one_size is None and wants is None:
         raise InputError(f"{folder}: none of its {len(images)} pictures can be decoded")
 
 

@@ -13,9 +13,12 @@ import pytest
 
 from anglecam.errors import InputError
 from anglecam.io.rig import RigFrames
-from anglecam.video import film as film_module
+from anglecam.video import decode as decode_module
+from anglecam.video import film_rows
+from anglecam.video import picture as picture_module
 from anglecam.video.display import Display
 from anglecam.video.film import Film, open_film
+from anglecam.video.film_rows import FilmRows
 from support.drawn import Look, draw_frames, write_clip
 
 BYTES = 1000
@@ -28,6 +31,7 @@ class Picture:
     planes = (SimpleNamespace(buffer_size=BYTES - 300), SimpleNamespace(buffer_size=300))
     pict_type = None
     interlaced_frame = False
+    format = SimpleNamespace(name="bgr0")
 
 
 class Decoder:
@@ -37,7 +41,7 @@ class Decoder:
         self.calls = 0
         self.pictures = []
 
-    def __call__(self):
+    def __call__(self, wants):
         self.calls += 1
         for k in range(12):
             picture = None if k == 3 else Picture()
@@ -49,16 +53,15 @@ class Decoder:
 @pytest.fixture
 def decoder(monkeypatch):
     decoder = Decoder()
-    monkeypatch.setattr(film_module, "to_colours", lambda picture: np.zeros((2, 2, 3), np.uint8))
+    monkeypatch.setattr(picture_module, "to_colours", lambda picture: np.zeros((2, 2, 3), np.uint8))
     return decoder
 
 
 def new_film(decode, **wanted):
     display = Display((2, 2))
     frames = RigFrames.model_validate(wanted)
-    return Film(
-        Path("film.avi"), display, 12, "ffv1", coarse_colour=False, cut_short=False, decode=decode, wanted=frames
-    )
+    path = Path("film.avi")
+    return Film(path, display, 12, "ffv1", coarse_colour=False, cut_short=False, rows=FilmRows(path, decode, frames))
 
 
 def test_a_short_film_is_decoded_once_and_its_pictures_are_released_with_it(decoder):
@@ -72,13 +75,54 @@ def test_a_short_film_is_decoded_once_and_its_pictures_are_released_with_it(deco
     assert all(picture() is None for picture in decoder.pictures)
 
 
-def test_a_long_film_is_decoded_at_every_reading_and_none_of_it_is_kept(decoder, monkeypatch):
-    monkeypatch.setattr(film_module, "MOST_BYTES", 10 * BYTES)  # there are eleven pictures
+def test_a_long_film_is_decoded_at_every_reading_and_evenly_spaced_pictures_are_kept(decoder, monkeypatch):
+    monkeypatch.setattr(film_rows, "MOST_BYTES", 10 * BYTES)  # there are eleven pictures
+    monkeypatch.setattr(film_rows, "_FEWEST", 4)
     film = new_film(decoder)
     for calls in (1, 2, 3):
         assert len(list(film.frames())) == 12
         assert decoder.calls == calls
-        assert all(picture() is None for picture in decoder.pictures)
+        in_memory = [picture() is not None for picture in decoder.pictures]
+        assert in_memory == [k in (0, 2, 3, 5, 7, 9) for k in range(11)] + [False] * 11 * (calls - 1)  # row 3 has none
+
+
+def test_a_long_film_is_thinned_to_the_frames_that_are_kept(decoder, monkeypatch):
+    monkeypatch.setattr(film_rows, "MOST_BYTES", 10 * BYTES)
+    monkeypatch.setattr(film_rows, "_FEWEST", 4)
+    film = new_film(decoder)
+    thinned = film.thinned()
+    assert [frame.time for frame in thinned.frames()] == pytest.approx([k / 30 for k in range(0, 12, 2)])
+    assert [frame.index for frame in thinned.frames(only={1, 3})] == [1, 3]
+    assert thinned.thinned() is None
+    assert decoder.calls == 1
+
+
+def test_pictures_that_are_not_needed_are_not_decoded(monkeypatch, tmp_path):
+    clip = tmp_path / "clip.avi"
+    write_clip(clip, draw_frames(Look(), np.linspace(-8.0, 8.0, 40)))
+    whole = [frame.image for frame in open_film(clip).frames()]
+    monkeypatch.setattr(film_rows, "MOST_BYTES", 4 * whole[0].size)
+    decoded = []
+    to_packets = decode_module._packets
+
+    def counted(*args):
+        for packet, pictures in to_packets(*args):
+            decoded.extend(pictures or ())
+            yield packet, pictures
+
+    monkeypatch.setattr(decode_module, "_packets", counted)
+    film = open_film(clip)
+    decoded.clear()
+    sample = film.sample(8)
+    assert sample.count == 40
+    assert len(decoded) < 30
+    assert [frame.index for frame in sample.frames] == list(range(0, 40, 8))
+    for frame in sample.frames:
+        np.testing.assert_array_equal(frame.image, whole[frame.index])
+    decoded.clear()
+    assert [frame.index for frame in film.frames(only={5, 17})] == [5, 17]
+    assert len(decoded) == 2
+    assert len(list(film.frames())) == 40
 
 
 def test_times_and_lost_frames_are_known_after_one_reading(decoder):
@@ -96,11 +140,11 @@ def test_an_interrupted_reading_is_not_taken_for_the_whole_film(decoder):
 
 
 def test_an_error_is_raised_at_every_reading(monkeypatch):
-    def decode():
+    def decode(wants):
         yield 0.0, Picture()
         raise InputError("film.avi: timestamps do not increase")
 
-    monkeypatch.setattr(film_module, "to_colours", lambda picture: np.zeros((2, 2, 3), np.uint8))
+    monkeypatch.setattr(picture_module, "to_colours", lambda picture: np.zeros((2, 2, 3), np.uint8))
     film = new_film(decode)
     for _ in range(2):
         with pytest.raises(InputError, match="do not increase"):
@@ -141,7 +185,7 @@ def test_frames_from_memory_equal_those_from_the_file(tmp_path):
 )
 @pytest.mark.parametrize("room", [100, 0])
 def test_a_range_has_its_frames_at_their_times_in_the_film(decoder, monkeypatch, wanted, frames, room):
-    monkeypatch.setattr(film_module, "MOST_BYTES", room * BYTES)
+    monkeypatch.setattr(film_rows, "MOST_BYTES", room * BYTES)
     film = new_film(decoder, **wanted)
     for _ in range(2):
         read = list(film.frames())

@@ -143,7 +143,7 @@ def collect_on_circles(
         (n, pictures) indices of the blobs; -1 where a picture shows none.
     """
     log_contrast = np.log(np.maximum(blobs.contrast, _LEAST_CONTRAST))
-    return _collect(  # type: ignore[no-any-return]
+    return _collect(
         blobs.plane_px, blobs.frame, blobs.area, blobs.contrast, log_contrast, circles, np.log(typical), pictures
     )
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from anglecam.camera.lens import Lens
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.mark.colour import ColourModel
 from anglecam.vision.mark.segment import Region
@@ -49,3 +52,17 @@ class Samples:
     pointed_px: Floats | None = None
     """(4,) box in the first of these pictures in which somebody pointed at the mark: left, top, right, bottom, px; a
     point is a box without extent."""
+
+
+def region_in_plane(region: Region, lens: Lens) -> Region:
+    """Return a region of the picture as it lies in the plane of motion; its contour stays that of the picture."""
+    if lens.is_identity:
+        return region
+    J = lens.jacobian(region.centre_px)
+    return replace(
+        region,
+        centre_px=lens.rectify(region.centre_px),
+        area_px2=region.area_px2 * float(np.linalg.det(J)),
+        moments_px2=J @ region.moments_px2 @ J.T,
+        noise_px2=J @ region.noise_px2 @ J.T,
+    )

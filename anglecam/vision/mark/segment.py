@@ -20,7 +20,7 @@ from anglecam.vision.mark.colour import EMPTY_LEVEL, FULL_LEVEL, ColourModel
 
 SMALLEST_SHARE, LARGEST_SHARE = 0.25, 8.0
 """Of the mark's area; a smaller region is not the mark, even if partly hidden, nor is a larger one, even if merged."""
-_MARGIN_PX = 12
+MARGIN_PX = 12
 """Margin around a region, px, that contains the foot of its edges."""
 _FOOT_PX = 3
 """Reach of a filmed edge from the half level, px: optics, chroma at half resolution, a codec's ringing."""
@@ -93,8 +93,8 @@ def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], m
     left, top, across, down = cv2.boundingRect(patch)
     right, bottom = left + across, top + down
     cut = left <= 0 or top <= 0 or right >= width or bottom >= height
-    x0, y0 = max(left - _MARGIN_PX, 0), max(top - _MARGIN_PX, 0)
-    box = np.s_[y0 : min(bottom + _MARGIN_PX, height), x0 : min(right + _MARGIN_PX, width)]
+    x0, y0 = max(left - MARGIN_PX, 0), max(top - MARGIN_PX, 0)
+    box = np.s_[y0 : min(bottom + MARGIN_PX, height), x0 : min(right + MARGIN_PX, width)]
     inner = np.zeros_like(core[box])
     cv2.drawContours(inner, [patch], -1, 1, cv2.FILLED, offset=(-x0, -y0))
     others = core[box] & (1 - inner)
@@ -169,8 +169,8 @@ def _cover(fraction: Image, filled: Image, reach: Image) -> NDArray[Any]:
     # normalised convolution (Knutsson & Westin 1993) extends known values smoothly to where none is known
     known = cv2.merge([value * inside + _PRIOR, _PRIOR + inside, value * outside, _PRIOR + outside])
     within, of_within, without, of_without = cv2.split(cv2.GaussianBlur(known, (0, 0), _LOCAL_PX))
-    within, without = within / of_within, without / of_without
-    return (value - without) / np.maximum(within - without, 0.3)
+    low = without / of_without
+    return (value - low) / np.maximum(within / of_within - low, 0.3)
 
 
 @cache

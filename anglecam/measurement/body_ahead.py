@@ -1,0 +1,187 @@
+"""The body's appearance, learnt from evenly spaced frames of a long film before all of its frames are read.
+
+So the film is decoded once more only, and each frame is measured while it is at hand: first the mark, then the body's
+rotation, from the place of the mark. `anglecam.measurement.registration_pass` takes these rotations over where the
+angles that the whole film shows are those at which they began, and repeats the others.
+
+It is done for a camera at rest, seen without tilt, with a shutter that opens for all rows at once. In other clips the
+rotation in a frame depends on what only the whole film shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anglecam.camera.lens import Lens
+from anglecam.data.series import OK
+from anglecam.data.typing import Flags, Floats, Image
+from anglecam.io.rig import Rig
+from anglecam.measurement.body_learning import FEWEST, learn_from_frames, spread_out
+from anglecam.measurement.pivot import find_pivot
+from anglecam.video.film import Film
+from anglecam.video.picture import Picture
+from anglecam.vision.mark.found_mark import FoundMark, region_in_plane
+from anglecam.vision.mark.segment import LARGEST_SHARE, SMALLEST_SHARE, Region, find_regions
+from anglecam.vision.mark.track import follow_mark
+from anglecam.vision.pivot.estimate import PivotEstimate
+from anglecam.vision.registration.tiles import FrameView, motion_plane
+from anglecam.vision.registration.turn import NO_TURN, BodyAppearance, TurnEstimate, find_turn
+
+_OFF_CIRCLE_PX = 6.0
+"""Largest distance of the mark from its circle, px."""
+_BASIN_PX = 1.0
+"""Distance at the body's middle, px, between two angles from which the search ends at the same one."""
+_LIKE = 2.0
+"""Largest ratio of the mark's area to that in other frames."""
+
+
+@dataclass(frozen=True)
+class BodyAhead:
+    """A body that was learnt from some of a film's frames."""
+
+    appearance: BodyAppearance
+    pivot: PivotEstimate
+    """By these frames."""
+    circle: tuple[Floats, float]
+    """Centre and radius of the mark's path in the plane of motion, px."""
+    area_px2: float
+    """The mark's."""
+    lens: Lens
+    poses: int
+    """Number of frames from which it was learnt."""
+
+    def is_mark(self, region: Region) -> bool:
+        """Return whether a region may be the mark by its place and size."""
+        centre, radius = self.circle
+        off = abs(float(np.hypot(*(self.lens.rectify(region.centre_px) - centre))) - radius)
+        return off < _OFF_CIRCLE_PX and self.area_px2 / _LIKE < region.area_px2 < _LIKE * self.area_px2
+
+    def turn_of(self, region: Region) -> float:
+        """Return the direction from the pivot to a region, counter-clockwise as seen, rad."""
+        x, y = self.lens.rectify(region.centre_px) - self.pivot.centre_px
+        return float(np.arctan2(-y, x))
+
+
+def learn_body_ahead(film: Film, found: FoundMark, images: Sequence[Image], rig: Rig, lens: Lens) -> BodyAhead | None:
+    """Learn the body from the frames of a film.
+
+    Parameters
+    ----------
+    film : Film
+        Evenly spaced frames of a clip (`Film.thinned`), by a camera at rest.
+    found : FoundMark
+        The mark.
+    images : sequence of ndarray
+        (h, w, 3) some frames, in which the pivot's marker is sought.
+    rig : Rig
+        What is declared about the pivot.
+    lens : Lens
+        From the picture to the plane of motion.
+
+    Returns
+    -------
+    BodyAhead or None
+        ``None`` where these frames do not suffice, or the body cannot be registered.
+    """
+    areas = SMALLEST_SHARE * found.area_px2, LARGEST_SHARE * found.area_px2
+    time, regions = [], []
+    for frame in film.frames():
+        time.append(frame.time)
+        image = frame.image
+        regions.append([] if image is None else find_regions(image, found.model, areas, found.opening_px))
+    in_plane = [[region_in_plane(region, lens) for region in of_frame] for of_frame in regions]
+    track = follow_mark(in_plane, np.array(time), found)
+    pivot = find_pivot(images, rig, track.circle, lens)[1]
+    known = np.flatnonzero([status == OK for status in track.status])
+    if track.circle is None or pivot is None or len(known) < FEWEST:
+        return None
+    marks = [region for k in known if (region := track.regions[k]) is not None]
+    arm = np.array([mark.centre_px for mark in marks]) - pivot.centre_px
+    turn = np.full(len(time), np.nan)
+    turn[known] = np.unwrap(np.arctan2(-arm[:, 1], arm[:, 0]))
+    wanted = spread_out(turn, known, film)
+    views = [
+        FrameView(frame.image, float(turn[frame.index]), pivot.centre_px, 0.0, 0.0)
+        for frame in film.frames(brightness=film.coarse_colour, only=wanted)
+        if frame.image is not None
+    ]
+    appearance = learn_from_frames(views, motion_plane(lens, film.size), pivot)
+    if isinstance(appearance, str):
+        return None
+    circle = track.circle.centre_px, track.circle.radius_px
+    return BodyAhead(appearance, pivot, circle, float(np.median([mark.area_px2 for mark in marks])), lens, len(views))
+
+
+class TurnsAhead:
+    """The rotation of such a body, frame by frame.
+
+    Parameters
+    ----------
+    body : BodyAhead
+        As it was learnt.
+    """
+
+    def __init__(self, body: BodyAhead) -> None:
+        self.body = body
+        self.begun: list[float] = []
+        """Angle at which the search in each frame began, rad, in (-π, π]; NaN where there was none."""
+        self.found: list[TurnEstimate] = []
+
+    def add(self, film: Film, picture: Picture, before: Picture | None, regions: Sequence[Region]) -> None:
+        """Find the rotation in the next frame, from the only region that may be the mark."""
+        marks = [region for region in regions if self.body.is_mark(region)]
+        image = _registered(film, picture)
+        if image is None or len(marks) != 1:
+            self.begun.append(np.nan)
+            self.found.append(NO_TURN)
+            return
+        begin = self.body.turn_of(marks[0])
+        view = FrameView(image, begin, self.body.appearance.pivot_px, 0.0, 0.0)
+        copied = None if before is None or not picture.predicted else _registered(film, before)
+        self.begun.append(begin)
+        self.found.append(find_turn(self.body.appearance, view, copied))
+
+    def in_turns_of(self, turn: Floats) -> tuple[list[TurnEstimate], Flags, float]:
+        """Return the rotations counted in whole turns as another measurement of the same film counts them.
+
+        Parameters
+        ----------
+        turn : ndarray
+            (n,) the direction of the mark by the whole film, from another reference, rad; NaN where it is unknown.
+
+        Returns
+        -------
+        found : list of TurnEstimate
+            An entry a frame.
+        settled : ndarray
+            (n,) frames in which the search began where the mark is by the whole film: nothing else would be found.
+        reference : float
+            What is to be added to ``turn`` for the reference of ``found``, rad.
+        """
+        apart = np.array(self.begun) - turn
+        both = np.isfinite(apart)
+        reference = float(np.angle(np.exp(1j * apart[both]).sum())) if both.any() else 0.0
+        reference += float(np.median(_wrapped(apart[both] - reference))) if both.any() else 0.0
+        appearance = self.body.appearance
+        lever = float(np.hypot(*(appearance.middle_px - appearance.pivot_px)))
+        with np.errstate(invalid="ignore"):
+            settled = np.abs(_wrapped(apart - reference)) * lever < _BASIN_PX
+        whole = np.where(both, np.round((turn + reference - self.begun) / (2.0 * np.pi)), 0.0) * 2.0 * np.pi
+        found = [
+            replace(one, turn=one.turn + k) if ends_there else NO_TURN
+            for one, k, ends_there in zip(self.found, whole.tolist(), settled, strict=True)
+        ]
+        return found, settled, reference
+
+
+def _wrapped(angle: Floats) -> Floats:
+    """Return angles in [-π, π), rad."""
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def _registered(film: Film, picture: Picture) -> Image | None:
+    """Return the planes by which a body is registered."""
+    return picture.brightness if film.coarse_colour else picture.colours

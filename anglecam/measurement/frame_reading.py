@@ -1,0 +1,113 @@
+"""One reading of a film: the regions of the mark's colour in every frame, and what needs the same pictures.
+
+A camera that shakes is followed on the background. Where the body was learnt beforehand from evenly spaced frames
+(`anglecam.measurement.body_ahead`), its rotation is found in the same reading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from anglecam.data.typing import Flags, Floats
+from anglecam.measurement.body_ahead import BodyAhead, TurnsAhead
+from anglecam.video.film import Film
+from anglecam.video.picture import Picture
+from anglecam.vision.mark.found_mark import FoundMark
+from anglecam.vision.mark.mark_search import MarkSearch
+from anglecam.vision.mark.segment import Region
+from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
+
+_LIKE = 2.0
+"""Largest ratio of areas at which a region may be the mark."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What one reading of a film finds; sequences have an entry a frame."""
+
+    time: Floats
+    """Time stamps, s."""
+    regions: tuple[list[Region], ...]
+    """Regions of the mark's colour, in the picture."""
+    decoded: Flags
+    """Frames with a picture."""
+    repeated: Flags
+    """Frames that equal the previous frame bit for bit."""
+    moves: tuple[CameraMove, ...] | None
+    """Motion of the camera; ``None`` where it stands still."""
+    turns: TurnsAhead | None
+    """Rotation of the body that was learnt beforehand."""
+
+
+def read_frames(
+    film: Film,
+    found: FoundMark,
+    count: int,
+    steady: BackgroundMotion | None = None,
+    body: BodyAhead | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Reading:
+    """Read a film once.
+
+    Parameters
+    ----------
+    film : Film
+        The clip.
+    found : FoundMark
+        The mark's colour and size, from a sample of frames.
+    count : int
+        Number of frames, for ``progress``.
+    steady : BackgroundMotion, optional
+        The scenery, where the camera shakes.
+    body : BodyAhead, optional
+        The body, where it was learnt beforehand.
+    progress : callable, optional
+        Called with (frames done, frames in all) after each frame.
+
+    Returns
+    -------
+    Reading
+        Of all frames.
+    """
+    time: list[float] = []
+    regions: list[list[Region]] = []
+    decoded: list[bool] = []
+    repeated: list[bool] = []
+    moves: list[CameraMove] = []
+    turns = None if body is None else TurnsAhead(body)
+    search = MarkSearch(found, _is_mark(found) if body is None else body.is_mark)
+    before: Picture | None = None
+    for picture in film.pictures(_ready(film, body, steady)):
+        time.append(picture.time)
+        decoded.append(picture.stored is not None)
+        if picture.stored is None:
+            search.lose()
+            regions.append([])
+        else:
+            regions.append(search.regions(picture.index, film.size, picture.colours_in))
+        repeated.append(before is not None and picture.is_same_as(before))
+        if steady is not None:
+            image = picture.colours
+            moves.append(UNKNOWN_MOVE if image is None else steady.at(image, picture.predicted))
+        if turns is not None:
+            turns.add(film, picture, before, regions[-1])
+        before = picture
+        if progress is not None:
+            progress(picture.index + 1, count)
+    shakes = None if steady is None else tuple(moves)
+    return Reading(np.array(time), tuple(regions), np.array(decoded), np.array(repeated), shakes, turns)
+
+
+def _is_mark(found: FoundMark) -> Callable[[Region], bool]:
+    """Return whether a region has the mark's size."""
+    return lambda region: found.area_px2 / _LIKE < region.area_px2 < _LIKE * found.area_px2
+
+
+def _ready(film: Film, body: BodyAhead | None, steady: BackgroundMotion | None) -> Callable[[Picture], object] | None:
+    """Return the conversion that every picture needs, which is made while the picture before it is measured."""
+    if body is None and steady is None:
+        return None
+    return (lambda picture: picture.brightness) if film.coarse_colour and steady is None else lambda p: p.colours

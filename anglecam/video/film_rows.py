@@ -1,0 +1,191 @@
+"""A film's rows, a time and a stored picture each: all of a short film are kept, evenly spaced ones of a long film.
+
+Measuring reads a film several times, and decoding a lossless picture takes as long as measuring in it. So the pictures
+of a short film are kept from its first reading on. Of a long film, what it shows is learnt from evenly spaced ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+
+import av
+
+from anglecam.errors import InputError
+from anglecam.io.rig import RigFrames
+from anglecam.video.decode import Row, Wants
+
+MOST_BYTES = 256 * 2**20
+"""Of decoded pictures: 220 lossless ones of 640 × 480 px, 580 of an ordinary codec."""
+MOST_SPREAD = 240
+"""Evenly spaced rows of a film of which not all are kept: twice the number from which a body is learnt."""
+_FEWEST = 16
+"""Rows of which none is dropped, however large their pictures are."""
+
+
+@dataclass
+class KeptRows:
+    """Keeps evenly spaced rows; when their pictures need too much memory, every second one is dropped."""
+
+    stride: int = 1
+    """Every row whose number is a multiple of this is kept."""
+    rows: list[tuple[int, Row]] = field(default_factory=list)
+    """With their numbers."""
+    _bytes: int = 0
+
+    def wants(self, number: int) -> bool:
+        """Return whether the row of this number will be kept."""
+        return number % self.stride == 0
+
+    def add(self, number: int, row: Row) -> None:
+        """Keep a row if it is wanted; rows come in their order."""
+        if not self.wants(number):
+            return
+        self.rows.append((number, row))
+        self._bytes += picture_bytes(row[1])
+        while self._too_many():
+            self.stride *= 2
+            self.rows = [(kept, one) for kept, one in self.rows if self.wants(kept)]
+            self._bytes = sum(picture_bytes(one[1]) for _, one in self.rows)
+
+    def _too_many(self) -> bool:
+        count = len(self.rows)
+        return (self._bytes > MOST_BYTES and count > _FEWEST) or (self.stride > 1 and count > MOST_SPREAD)
+
+
+class FilmRows:
+    """The rows of a film, as often as they are needed.
+
+    Parameters
+    ----------
+    path : Path
+        The film, for messages.
+    decode : callable
+        Decodes the rows from the start, because seeking may end on a wrong frame. It is called with which pictures are
+        wanted, or with ``None`` for all.
+    wanted : RigFrames
+        Which frames are measured: only these are yielded.
+    independent : bool
+        Whether each picture is decoded without the others, so that some can be left out.
+    declared_bytes : int
+        Memory of all pictures, as many as the container states; 0 where that is not to be relied on.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        decode: Callable[[Wants | None], Iterator[Row]],
+        wanted: RigFrames | None = None,
+        independent: bool = False,
+        declared_bytes: int = 0,
+    ) -> None:
+        self.wanted = RigFrames() if wanted is None else wanted
+        self.first = self.wanted.first or 0
+        self._path, self._decode, self._independent, self._declared_bytes = path, decode, independent, declared_bytes
+        self._times: list[float] | None = None
+        self._undecodable = self._interlaced = self._count = 0
+        self._kept: KeptRows | None = None
+
+    @property
+    def times(self) -> list[float]:
+        """Presentation times, s; reads the film unless it was read before. So do the other properties."""
+        self._read_once()
+        assert self._times is not None
+        return self._times
+
+    @property
+    def undecodable(self) -> int:
+        """Number of rows without a picture."""
+        self._read_once()
+        return self._undecodable
+
+    @property
+    def interlaced(self) -> int:
+        """Number of pictures that show two instants."""
+        self._read_once()
+        return self._interlaced
+
+    @property
+    def is_read(self) -> bool:
+        """Whether all pictures were decoded before."""
+        return self._times is not None
+
+    @property
+    def count(self) -> int:
+        """Number of rows, of which not all were decoded."""
+        return len(self.kept.rows) if self.kept.stride == 1 else self._count
+
+    @property
+    def kept(self) -> KeptRows:
+        """The rows that are kept."""
+        if self._kept is None:
+            # where they are more than are kept for sure, the others are not decoded
+            if self._independent and self._declared_bytes > MOST_BYTES:
+                self._keep_some()
+            else:
+                self._read_once()
+        assert self._kept is not None
+        return self._kept
+
+    def read(self, wants: Wants | None = None) -> Iterator[Row]:
+        """Yield the rows from memory, or decode them; the first complete reading fills the memory.
+
+        Parameters
+        ----------
+        wants : callable, optional
+            Which pictures are wanted, by the numbers of the rows; others may be missing.
+
+        Yields
+        ------
+        tuple of (float, VideoFrame or None)
+            Time, s, and picture.
+        """
+        if self._kept is not None and self._kept.stride == 1:
+            yield from (row for _, row in self._kept.rows)
+        elif self.is_read or wants is not None:
+            yield from self._decoded(wants)
+        else:
+            yield from self._read_all()
+
+    def _read_once(self) -> None:
+        if not self.is_read:
+            for _ in self._read_all():
+                pass
+
+    def _read_all(self) -> Iterator[Row]:
+        times: list[float] = []
+        undecodable = interlaced = 0
+        kept = KeptRows()
+        for row in self._decoded(None):
+            kept.add(len(times), row)
+            times.append(row[0])
+            undecodable += row[1] is None
+            interlaced += row[1] is not None and row[1].interlaced_frame
+            yield row
+        self._times, self._undecodable, self._interlaced, self._count = times, undecodable, interlaced, len(times)
+        self._kept = self._kept or kept
+
+    def _keep_some(self) -> None:
+        kept, count = KeptRows(), 0
+        for row in self._decoded(kept.wants):
+            kept.add(count, row)
+            count += 1
+        self._kept, self._count = kept, count
+
+    def _decoded(self, wants: Wants | None) -> Iterator[Row]:
+        """Decode the wanted rows; raise an `InputError` where there are none."""
+        stop = None if self.wanted.last is None else self.wanted.last + 1
+        some = None if wants is None or not self._independent else lambda number: wants(number - self.first)
+        empty = True
+        for row in islice(self._decode(some), self.first, stop):
+            empty = False
+            yield row
+        if empty:
+            raise InputError(f"{self._path}: it ends before frame {self.first}, the first that is wanted")
+
+
+def picture_bytes(picture: av.VideoFrame | None) -> int:
+    """Return the memory of a decoded picture."""
+    return 0 if picture is None else sum(plane.buffer_size for plane in picture.planes)
