@@ -152,9 +152,10 @@ def _samples(
         where = f"{film.path}: the camera's motion is unknown in frame {pointed.frame}"
         raise InputError(f"{where}; declare the mark in another frame")
     kept = [(time, image, move) for (time, image), move in zip(pictures, moves, strict=True) if move.known]
+    images = [image for _, image, _ in kept]
     return Samples(
-        images=[image for _, image, _ in kept],
-        stabilised=[image if steady is None else _stabilised(image, move) for _, image, move in kept],
+        images=images,
+        stabilised=images if steady is None else [_stabilised(image, move) for _, image, move in kept],
         time=np.array([time for time, _, _ in kept]),
         to_plane=lambda i, point: lens.rectify(point if steady is None else kept[i][2].to_reference(point)),
         in_plane=lambda i, region: region_in_plane(

@@ -23,8 +23,10 @@ def rotation(turns: float | Floats) -> Floats:
     ndarray
         (…, 2, 2).
     """
+    matrices = np.empty((*np.shape(turns), 2, 2))
     c, s = np.cos(turns), np.sin(turns)
-    return np.stack([np.stack([c, -s], axis=-1), np.stack([s, c], axis=-1)], axis=-2)
+    matrices[..., 0, 0], matrices[..., 0, 1], matrices[..., 1, 0], matrices[..., 1, 1] = c, -s, s, c
+    return matrices
 
 
 def rotate_each(arms: Floats, turns: Floats) -> Floats:

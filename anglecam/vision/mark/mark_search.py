@@ -62,15 +62,16 @@ class MarkSearch:
         list of Region
             The mark alone where it was found where it was expected; else all of the picture, largest first.
         """
-        mark = None
-        if index % _WHOLE_EVERY and self._last is not None:
-            mark = self._near(self._last, size, colours_in)
+        mark, expected = None, index % _WHOLE_EVERY != 0 and self._last is not None
+        if expected:
+            mark = self._near(self._last, size, colours_in)  # type: ignore[arg-type]
+        jumped = expected and mark is None
         regions = [mark] if mark is not None else self._in_part(_whole(size), colours_in)
         if mark is None:
             likely = [region for region in regions if self._is_mark(region)]
             mark = likely[0] if len(likely) == 1 and likely[0].whole else None
-        known = mark is not None and self._last is not None
-        self._step = mark.centre_px - self._last.centre_px if known else None  # type: ignore[union-attr]
+        goes_on = mark is not None and self._last is not None and not jumped
+        self._step = mark.centre_px - self._last.centre_px if goes_on else None  # type: ignore[union-attr]
         self._last = mark
         return regions
 

@@ -1,0 +1,95 @@
+"""A long film, whose body is learnt from evenly spaced frames, is measured as a short one, in one reading."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from anglecam.io.rig import Rig, RigPivot
+from anglecam.measurement import registration_pass
+from anglecam.measurement.clip import measure_clip
+from anglecam.video import film_rows
+from anglecam.video.film import open_film
+from support.drawn import Look, draw_frames, write_clip
+
+N = 150
+TIME = np.arange(N) / 30
+SWING = 14.0 * np.sin(2 * np.pi * 0.7 * TIME) * np.cos(0.4 * TIME)
+
+
+@pytest.fixture(scope="module")
+def look():
+    return Look()
+
+
+@pytest.fixture(scope="module")
+def clip(look, tmp_path_factory):
+    path = tmp_path_factory.mktemp("film") / "clip.avi"
+    write_clip(path, draw_frames(look, SWING, TIME, seed=3))
+    return path
+
+
+@pytest.fixture(scope="module")
+def short(look, clip):
+    return measure_clip(open_film(clip), _rig(look)).series
+
+
+@pytest.fixture
+def long(monkeypatch):
+    """Let the films be too long to be kept: every second frame is."""
+    monkeypatch.setattr(film_rows, "MOST_BYTES", 150 * 640 * 480)
+
+
+def _rig(look):
+    x, y = look.pivot
+    return Rig(pivot=RigPivot(near=(x + 5, y - 4)))
+
+
+def _off(series, angle):
+    off = np.degrees(series.angle)[series.ok] - angle[series.ok]
+    return off - np.median(off), np.degrees(series.sigma)[series.ok]
+
+
+def test_a_long_film_is_measured_as_a_short_one(clip, short, look, long, monkeypatch):
+    readings = []
+    monkeypatch.setattr(registration_pass, "learn_from_frames", lambda *args: readings.append(args))
+    film = open_film(clip)
+    assert film.thinned() is not None
+    measured = measure_clip(film, _rig(look))
+    assert measured.by == "whole body"
+    assert not readings  # what was learnt ahead is used
+    series = measured.series
+    assert series.ok.sum() == short.ok.sum() == N
+    off, sigma = _off(series, SWING)
+    of_short, _ = _off(short, SWING)
+    assert off.std() < 1.3 * of_short.std()
+    assert np.sqrt(np.mean((off / sigma) ** 2)) < 1.5
+
+
+def test_frames_in_which_the_mark_is_hidden_are_measured_afterwards(look, long, tmp_path):
+    frames = list(draw_frames(look, SWING, TIME, seed=4))
+    marks = look.mouth(SWING)
+    hidden = np.arange(70, 76)
+    for k in hidden:
+        x, y = np.round(marks[k]).astype(int)
+        cv2.circle(frames[k], (int(x), int(y)), 26, (60, 120, 60), -1)
+    path = tmp_path / "clip.avi"
+    write_clip(path, iter(frames))
+    series = measure_clip(open_film(path), _rig(look)).series
+    seen = np.setdiff1d(np.arange(N), hidden)
+    assert series.ok[seen].all()
+    off, sigma = _off(series, SWING)
+    assert (np.abs(off) < 4.5 * sigma).all()
+
+
+def test_a_film_whose_evenly_spaced_frames_show_too_few_poses_is_learnt_as_a_whole(look, tmp_path, monkeypatch):
+    steps = np.repeat([0.0, 8.0], [60, 90])
+    steps[60:76] = 8.0 * (1.0 - np.cos(np.pi * np.arange(16) / 16)) / 2.0
+    path = tmp_path / "clip.avi"
+    write_clip(path, draw_frames(look, steps, TIME, seed=5))
+    short = measure_clip(open_film(path), _rig(look)).series
+    monkeypatch.setattr(film_rows, "MOST_BYTES", 30 * 640 * 480)
+    series = measure_clip(open_film(path), _rig(look)).series
+    np.testing.assert_allclose(series.angle, short.angle, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(series.sigma, short.sigma, rtol=1e-6)
