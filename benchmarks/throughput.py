@@ -4,9 +4,8 @@
 
 Time: `measure_clip` without overlay or plot, relative to decoding the same file by PyAV with the threads that
 `anglecam.video.frames` uses and without colour conversion. The two alternate, so that the machine's load affects both;
-figures are medians over the rounds. `measure`'s progress reports divide its time into sample (until the mouth is
-searched in the first frame), coarse (the mouth in every frame), learn (the head) and fine (the head's rotation in every
-frame).
+figures are medians over the rounds. `measure`'s progress reports divide its time into readings (from the first frame of
+a reading to its last) and learning (what is before and between them).
 
 Memory: the highest resident size of a fresh process that measures one clip. The long clips repeat the packets of a
 short one: MJPEG's packets are independent, and a motion played forwards and backwards is continuous.
@@ -36,11 +35,11 @@ from synth.render import workers
 from synth.session import render
 
 FILMS: dict[str, dict[str, Any]] = {
-    "640 × 480, MJPEG": {"size": [640, 480], "codec": "mjpeg"},
-    "1920 × 1080, H.264": {"size": [1920, 1080], "codec": "h264"},
+    "640 × 480, MJPEG, 300 frames": {"size": [640, 480], "codec": "mjpeg"},
+    "1920 × 1080, H.264, 600 frames": {"size": [1920, 1080], "codec": "h264"},
 }
-SECONDS = 10.0
-LENGTHS = (100, 1_000, 10_000)
+SECONDS = {"mjpeg": 10.0, "h264": 20.0}
+LENGTHS = (100, 1_000, 3_000, 10_000)
 """Lengths of the clips, frames."""
 
 
@@ -87,10 +86,7 @@ def read(clip: Path) -> None:
 
 
 def measure(clip: Path) -> list[float]:
-    """Measure a clip; return the seconds of sample, coarse, learn and fine.
-
-    A clip without a fine pass has only the first two.
-    """
+    """Measure a clip; return the seconds of learning and of reading all frames."""
     ends = [time.perf_counter()]
 
     def progress(done: int, of: int) -> None:
@@ -98,7 +94,8 @@ def measure(clip: Path) -> list[float]:
             ends.append(time.perf_counter())
 
     measure_clip(open_film(clip), Rig(), progress=progress)
-    return [after - before for before, after in pairwise(ends)]
+    parts = [after - before for before, after in pairwise(ends)]
+    return [sum(parts[::2]), sum(parts[1::2])]
 
 
 def seconds(work: Callable[[Path], object], clip: Path) -> tuple[float, object]:
@@ -121,7 +118,7 @@ def times(clip: Path, rounds: int) -> list[str]:
     parts = [f"{median(of):.2f}" for of in zip(*stages, strict=True)]
     frames = sum(1 for _ in open_film(clip).frames())
     rates = [frames / median(decoded), frames / median(d * m for d, m in zip(decoded, measured, strict=True))]
-    ratios = [f"{median(reads):.2f}", *parts, *["–"] * (4 - len(parts)), f"**{median(measured):.2f}**"]
+    ratios = [f"{median(reads):.2f}", *parts, f"**{median(measured):.2f}**"]
     return [*(f"{rate:.0f}" for rate in rates), *ratios]
 
 
@@ -144,15 +141,17 @@ def main(rounds: int) -> None:
     print(f"{date.today():%d %B %Y}, {workers()} cores, {rounds} rounds\n")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        clips = {title: film(folder / camera["codec"], camera, SECONDS)[0] for title, camera in FILMS.items()}
-        print(
-            "| film | decode, fps | measure, fps | read ÷ decode | sample | coarse | learn | fine | measure ÷ decode |"
-        )
-        print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+        clips = {
+            title: film(folder / camera["codec"], camera, SECONDS[camera["codec"]])[0]
+            for title, camera in FILMS.items()
+        }
+        print("| film | decode, fps | measure, fps | read ÷ decode | learning | readings | measure ÷ decode |")
+        print("| --- | --- | --- | --- | --- | --- | --- |")
         for title, clip in clips.items():
             print(f"| {title} | {' | '.join(times(clip, rounds))} |", flush=True)
-        title, clip = next(iter(clips.items()))
-        print(f"\n| {title}, frames | only decode, MB | measure, MB | measure ÷ decode |\n| --- | --- | --- | --- |")
+        clip = next(iter(clips.values()))
+        print("\n| 640 × 480, MJPEG, frames | only decode, MB | measure, MB | measure ÷ decode |")
+        print("| --- | --- | --- | --- |")
         for frames in LENGTHS:
             long = repeat(clip, frames, folder / "long.avi")
             (decoding, least), (measuring, most) = alone(decode, long), alone(measure, long)
