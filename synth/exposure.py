@@ -11,9 +11,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+Light = NDArray[np.float32]
 
 STILL_PX = 0.1
 """If the mark moves less than this during the exposure, a single instant is drawn, px."""
@@ -79,6 +81,23 @@ def instants(shutter: Shutter, taken: float, path_px: float, step_px: float) -> 
         return Instants(times, np.maximum(0.0, 1 - np.abs(away)))
     half = shutter.exposure_s / spacing / 2
     return Instants(times, (_below_hat(away + half) - _below_hat(away - half)) / (2 * half))
+
+
+@njit(cache=True, error_model="numpy")
+def expose(weights: Light, drawn: Light, total: Light) -> None:
+    """Add the drawing of one instant to the light of a frame; in one pass, as pictures are larger than caches.
+
+    Parameters
+    ----------
+    weights : ndarray
+        (rows,) or (1,), weight of the drawing in each row.
+    drawn, total : ndarray
+        (rows, width, 3); the second is written.
+    """
+    for row in range(len(drawn)):
+        weight, light, exposed = weights[row % len(weights)], drawn[row].ravel(), total[row].ravel()
+        for n in range(len(light)):
+            exposed[n] += weight * light[n]
 
 
 def _below_hat(x: Floats) -> Floats:

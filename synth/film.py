@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.draw.engine import make_engine
+from synth.exposure import expose
 from synth.mechanism import build, poses, prop_poses, props, suspension
 from synth.sensor import develop
 from synth.spec import Spec
@@ -36,7 +37,7 @@ class Stage:
                 **poses(self._spec.rig, float(exposure.angles[k]), float(exposure.appendage[k]), self._hung),
                 **prop_poses(self._spec, self._camera, float(exposure.times[k]), bool(exposure.lamp[k])),
             }
-            total[rows] += share.astype(np.float32)[:, None, None] * self._engine.draw(camera, placed, rows)
+            expose(share.astype(np.float32), self._engine.draw(camera, placed, rows), total[rows])
         return total[:, ::-1] if self._camera.mirrored else total
 
     def picture(self, recording: int, exposure: Exposure) -> NDArray[np.uint8]:
