@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-_NOTHING = -1
+_NOTHING = _APART = -1
 _ON_LINE = 1e-9
 """A corner this close to a line counts as on it, px; bounds the thinness of pieces and the error of areas."""
 _SAME_DEPTH = 1e-9
@@ -30,120 +30,30 @@ _PIECES, _CORNERS = 256, 24
 """Capacity per pixel. Beyond it a piece is not divided but goes to the side on which its centre lies."""
 
 
-@njit(cache=True, error_model="numpy")
-def number(marked: NDArray[np.bool_]) -> tuple[Ints, Ints]:
-    """Count the marked pixels row by row.
-
-    Parameters
-    ----------
-    marked : ndarray
-        (rows, width).
-
-    Returns
-    -------
-    tuple of ndarray
-        (s, 2), row and column of each; and (rows, width + 1), the count before each pixel and each row's end.
-    """
-    rows, width = marked.shape
-    before = np.empty((rows, width + 1), np.int32)
-    count = 0
-    for row in range(rows):
-        for x in range(width):
-            before[row, x] = count
-            count += marked[row, x]
-        before[row, width] = count
-    places = np.empty((count, 2), np.int32)
-    for row in range(rows):
-        if before[row, 0] == before[row, width]:
-            continue
-        for x in range(width):
-            if marked[row, x]:
-                places[before[row, x], 0], places[before[row, x], 1] = row, x
-    return places, before
-
-
-@njit(cache=True, error_model="numpy")
-def gather(
-    seen: Ints, faces: Ints, pixels: Floats, places: Ints, before: Ints, first: int, heads: Ints
-) -> tuple[Ints, Ints]:
-    """List for each marked pixel the triangles that reach into it.
-
-    Parameters
-    ----------
-    seen, faces, pixels : ndarray
-        (k,) triangles that look at the camera, (m, 3) and (n, 2).
-    places, before : ndarray
-        `number`.
-    first : int
-        Row of the picture that is the first one of `before`.
-    heads : ndarray
-        (s,), written: where each marked pixel's list begins, below zero for an empty one.
-
-    Returns
-    -------
-    tuple of ndarray
-        Entries of the lists: index into `seen`, and where the list goes on, below zero at its end.
-    """
-    rows, width = before.shape[0], before.shape[1] - 1
-    heads[:] = _NOTHING
-    triangles, following = np.empty(8 * len(heads) + 64, np.int32), np.empty(8 * len(heads) + 64, np.int32)
-    count = 0
-    lines = np.empty((3, 3))
-    for k in range(len(seen)):
-        a, b, c = faces[seen[k], 0], faces[seen[k], 1], faces[seen[k], 2]
-        xs, ys = (pixels[a, 0], pixels[b, 0], pixels[c, 0]), (pixels[a, 1], pixels[b, 1], pixels[c, 1])
-        left, right = max(int(np.floor(min(xs) + 0.5)), 0), min(int(np.floor(max(xs) + 0.5)), width - 1)
-        if left > right:
-            continue
-        top = max(int(np.floor(min(ys) + 0.5)), first) - first
-        bottom = min(int(np.floor(max(ys) + 0.5)), first + rows - 1) - first
-        ready = False
-        for row in range(top, bottom + 1):
-            for slot in range(before[row, left], before[row, right + 1]):
-                if not ready:
-                    _sides(seen[k], faces, pixels, 0.0, 0.0, lines)
-                    ready = True
-                reaches, x = True, places[slot, 1]
-                for e in range(3):
-                    reach = (0.5 - _ON_LINE) * (abs(lines[e, 0]) + abs(lines[e, 1]))
-                    reaches &= lines[e, 0] * x + lines[e, 1] * (row + first) + lines[e, 2] + reach > 0.0
-                if not reaches:
-                    continue
-                if count == len(triangles):
-                    triangles, following = _longer(triangles), _longer(following)
-                triangles[count], following[count] = k, heads[slot]
-                heads[slot] = count
-                count += 1
-    return triangles[:count], following[:count]
-
-
-@njit(cache=True, error_model="numpy")
-def _longer(values: Ints) -> Ints:
-    twice = np.empty(2 * len(values), np.int32)
-    twice[: len(values)] = values
-    return twice
-
-
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _sides(triangle: int, faces: Ints, pixels: Floats, x: float, y: float, lines: Floats) -> None:
-    """Write the lines (a, b, c) along a triangle's sides: a·(x' − x) + b·(y' − y) + c is positive inside."""
+def _sides(t: int, shapes: Floats, x: float, y: float, at: int, lines: Floats) -> int:
+    """Write to lines[at] (a, b, c) along a triangle's sides: a·(x' − x) + b·(y' − y) + c is positive inside.
+
+    Return their number. Sides that have all of the pixel at (x, y) on their inner side are left out.
+    """
+    count = 0
     for e in range(3):
-        p, q = faces[triangle, e], faces[triangle, e + 1 if e < 2 else 0]
-        a, b = pixels[q, 1] - pixels[p, 1], pixels[p, 0] - pixels[q, 0]
-        lines[e, 0], lines[e, 1], lines[e, 2] = a, b, a * (x - pixels[p, 0]) + b * (y - pixels[p, 1])
+        p, q = 2 * e, 2 * e + 2 if e < 2 else 0
+        a, b = shapes[t, q + 1] - shapes[t, p + 1], shapes[t, p] - shapes[t, q]
+        c = a * (x - shapes[t, p]) + b * (y - shapes[t, p + 1])
+        lines[at, count, 0], lines[at, count, 1], lines[at, count, 2] = a, b, c
+        count += c < 0.5 * (abs(a) + abs(b))
+    return count
 
 
 @njit(cache=True, error_model="numpy")
 def cover(
     places: Ints,
-    heads: Ints,
-    triangles: Ints,
-    following: Ints,
-    seen: Ints,
-    faces: Ints,
-    pixels: Floats,
-    inverse_depth: Floats,
-    planes: Floats,
+    starts: Ints,
+    listed: Ints,
+    depths: Floats,
+    shapes: Floats,
+    shades: Floats,
     first: int,
     light: NDArray[np.float32],
 ) -> None:
@@ -153,10 +63,10 @@ def cover(
     ----------
     places : ndarray
         (s, 2), row and column of each marked pixel in `light`.
-    heads, triangles, following : ndarray
-        `gather`.
-    seen, faces, pixels, inverse_depth, planes : ndarray
-        As in `synth.draw.depth.lay_planes`.
+    starts, listed, depths : ndarray
+        `synth.draw.lists.gather`; each list is sorted by depth.
+    shapes, shades : ndarray
+        `synth.draw.depth.lay_planes`.
     first : int
         Row of the picture that is the first one of `light`.
     light : ndarray
@@ -164,26 +74,42 @@ def cover(
     """
     xs, ys = np.empty((_PIECES, _CORNERS)), np.empty((_PIECES, _CORNERS))
     sizes, owners, farthest = np.empty(_PIECES, np.int64), np.empty(_PIECES, np.int64), np.empty(_PIECES)
-    lines, spare = np.empty((4, 3)), np.empty((3, _CORNERS))
-    listed, upper, lower = np.empty(len(triangles), np.int64), np.empty(len(triangles)), np.empty(len(triangles))
+    longest = 0
+    for slot in range(len(places)):
+        longest = max(longest, starts[slot + 1] - starts[slot])
+    lines, sides, spare = np.empty((longest, 4, 3)), np.empty(longest, np.int64), np.empty((3, _CORNERS))
     for slot in range(len(places)):
         x, y = float(places[slot, 1]), float(places[slot, 0] + first)
-        count = _sort(heads[slot], triangles, following, seen, faces, inverse_depth, planes, x, y, listed, upper, lower)
+        begin, end = starts[slot], starts[slot + 1]
+        _sort(begin, end, listed, depths)
+        # fetched at once, before any decision, the triangles need not be waited for one by one
+        for i in range(begin, end):
+            sides[i - begin] = _sides(listed[i], shapes, x, y, i - begin, lines)
         xs[0, 0], xs[0, 1], xs[0, 2], xs[0, 3] = -0.5, 0.5, 0.5, -0.5
         ys[0, 0], ys[0, 1], ys[0, 2], ys[0, 3] = -0.5, -0.5, 0.5, 0.5
         sizes[0], owners[0], farthest[0], pieces = 4, _NOTHING, -np.inf, 1
-        for i in range(count):
-            k, hidden = listed[i], True
-            _sides(seen[k], faces, pixels, x, y, lines)
+        for i in range(begin, end):
+            k, at, hidden = listed[i], i - begin, True
             for p in range(pieces):
-                if upper[i] <= farthest[p]:
+                if depths[i, 0] <= farthest[p]:
                     continue
                 hidden = False
-                if _apart(p, lines, xs, ys, sizes[p]):
-                    continue
-                bounds = _bounds(p, owners[p], k, planes, x, y, xs, ys, sizes[p], lines)
-                if bounds > 0:
-                    pieces = _take(p, k, lower[i], lines, bounds, xs, ys, sizes, owners, farthest, pieces, spare)
+                cutting = _cutting(p, lines, at, sides[at], xs, ys, sizes[p])
+                if cutting >= 0 and owners[p] != _NOTHING:
+                    ahead = _ahead(p, owners[p], k, shapes, x, y, xs, ys, sizes[p], lines, at, sides[at])
+                    cutting = cutting | ahead << sides[at] if ahead >= 0 else _APART
+                for e in range(sides[at] + 1):
+                    if cutting < 0 or not cutting >> e & 1:
+                        continue
+                    within, without = _cut(p, pieces, lines, at, e, xs, ys, sizes[p], spare)
+                    if within == 0:
+                        cutting = _APART
+                    elif without > 0:
+                        sizes[p], sizes[pieces] = within, without
+                        owners[pieces], farthest[pieces] = owners[p], farthest[p]
+                        pieces += 1
+                if cutting >= 0:
+                    owners[p], farthest[p] = k, depths[i, 1]
             if hidden:
                 break  # and so are all that follow
         red = green = blue = 0.0
@@ -193,120 +119,113 @@ def cover(
                 continue
             area, u, v = _centroid(p, xs, ys, sizes[p])
             u, v = u + x, v + y
-            weight = area / (planes[k, 0, 0] * u + planes[k, 0, 1] * v + planes[k, 0, 2])
-            red += weight * (planes[k, 1, 0] * u + planes[k, 1, 1] * v + planes[k, 1, 2])
-            green += weight * (planes[k, 2, 0] * u + planes[k, 2, 1] * v + planes[k, 2, 2])
-            blue += weight * (planes[k, 3, 0] * u + planes[k, 3, 1] * v + planes[k, 3, 2])
+            weight = area / (shapes[k, 6] * u + shapes[k, 7] * v + shapes[k, 8])
+            red += weight * (shades[k, 0, 0] * u + shades[k, 0, 1] * v + shades[k, 0, 2])
+            green += weight * (shades[k, 1, 0] * u + shades[k, 1, 1] * v + shades[k, 1, 2])
+            blue += weight * (shades[k, 2, 0] * u + shades[k, 2, 1] * v + shades[k, 2, 2])
         light[places[slot, 0], places[slot, 1], 0] = red
         light[places[slot, 0], places[slot, 1], 1] = green
         light[places[slot, 0], places[slot, 1], 2] = blue
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _sort(
-    head: int, triangles: Ints, following: Ints, seen: Ints, faces: Ints, inverse_depth: Floats, planes: Floats,
-    x: float, y: float, listed: NDArray[np.int64], upper: Floats, lower: Floats,
-) -> int:  # fmt: skip
-    """List a pixel's triangles, nearest first, with bounds of their 1/depth within it."""
-    count = 0
-    while head >= 0:
-        k = triangles[head]
-        a, b, c = faces[seen[k], 0], faces[seen[k], 1], faces[seen[k], 2]
-        middle = planes[k, 0, 0] * x + planes[k, 0, 1] * y + planes[k, 0, 2]
-        reach = 0.5 * (abs(planes[k, 0, 0]) + abs(planes[k, 0, 1]))
-        high = min(middle + reach, max(inverse_depth[a], inverse_depth[b], inverse_depth[c]))
-        at = count
-        # the lists run backwards; of two equal ones the earlier triangle comes first
-        while at > 0 and upper[at - 1] <= high:
-            listed[at], upper[at], lower[at] = listed[at - 1], upper[at - 1], lower[at - 1]
+def _sort(begin: int, end: int, listed: Ints, depths: Floats) -> None:
+    """Sort a pixel's triangles, nearest first; of two equal ones the earlier stays first."""
+    for i in range(begin + 1, end):
+        t, high, low, at = listed[i], depths[i, 0], depths[i, 1], i
+        while at > begin and depths[at - 1, 0] < high:
+            listed[at], depths[at, 0], depths[at, 1] = listed[at - 1], depths[at - 1, 0], depths[at - 1, 1]
             at -= 1
-        listed[at], upper[at] = k, high
-        lower[at] = max(middle - reach, min(inverse_depth[a], inverse_depth[b], inverse_depth[c]))
-        count += 1
-        head = following[head]
-    return count
+        listed[at], depths[at, 0], depths[at, 1] = t, high, low
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _apart(p: int, lines: Floats, xs: Floats, ys: Floats, size: int) -> bool:
-    """Return whether one side of a triangle separates it from piece p."""
-    for e in range(3):
-        a, b, c = lines[e, 0], lines[e, 1], lines[e, 2]
-        most = -np.inf
+def _cutting(p: int, lines: Floats, at: int, sides: int, xs: Floats, ys: Floats, size: int) -> int:
+    """Return which of a triangle's sides cut piece p, one bit each; below zero if one separates the two."""
+    cutting = 0
+    for e in range(sides):
+        a, b, c = lines[at, e, 0], lines[at, e, 1], lines[at, e, 2]
+        margin = _ON_LINE * (abs(a) + abs(b))
+        within = without = 0
         for i in range(size):
-            most = max(most, a * xs[p, i] + b * ys[p, i] + c)
-        if most <= _ON_LINE * (abs(a) + abs(b)):
-            return True
-    return False
+            distance = a * xs[p, i] + b * ys[p, i] + c
+            within += distance > margin
+            without += distance < -margin
+        if within == 0:
+            return _APART
+        cutting |= (without > 0) << e
+    return cutting
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _bounds(
-    p: int, owner: int, k: int, planes: Floats, x: float, y: float, xs: Floats, ys: Floats, size: int, lines: Floats
-) -> int:
-    """Return how many lines bound triangle k's part of a piece: 0 if it is behind, 4 if the planes meet."""
-    if owner == _NOTHING:
-        return 3
-    depth = planes[owner, 0, 0] * x + planes[owner, 0, 1] * y + planes[owner, 0, 2]
-    a, b = planes[k, 0, 0] - planes[owner, 0, 0], planes[k, 0, 1] - planes[owner, 0, 1]
-    c = planes[k, 0, 0] * x + planes[k, 0, 1] * y + planes[k, 0, 2] - depth
+def _ahead(
+    p: int, owner: int, k: int, shapes: Floats, x: float, y: float, xs: Floats, ys: Floats, size: int,
+    lines: Floats, at: int, e: int,
+) -> int:  # fmt: skip
+    """Return the bit of the line in which the planes of triangle k and of a piece meet, 0 if k is nearer everywhere.
+
+    Below zero if the piece hides the triangle.
+    """
+    depth = shapes[owner, 6] * x + shapes[owner, 7] * y + shapes[owner, 8]
+    a, b = shapes[k, 6] - shapes[owner, 6], shapes[k, 7] - shapes[owner, 7]
+    c = shapes[k, 6] * x + shapes[k, 7] * y + shapes[k, 8] - depth
     least, most = np.inf, -np.inf
     for i in range(size):
         gap = a * xs[p, i] + b * ys[p, i] + c
         least, most = min(least, gap), max(most, gap)
     if most <= _SAME_DEPTH * depth:
-        return 0
+        return _APART
     if least >= 0.0:
-        return 3
-    lines[3, 0], lines[3, 1], lines[3, 2] = a, b, c
-    return 4
+        return 0
+    lines[at, e, 0], lines[at, e, 1], lines[at, e, 2] = a, b, c
+    return 1
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _take(
-    p: int, k: int, depth: float, lines: Floats, bounds: int, xs: Floats, ys: Floats, sizes: NDArray[np.int64],
-    owners: NDArray[np.int64], farthest: Floats, pieces: int, spare: Floats,
-) -> int:  # fmt: skip
-    """Assign triangle k's part of piece p; the cut-off parts become new pieces. Return the number of pieces."""
-    for e in range(bounds):
-        a, b, c = lines[e, 0], lines[e, 1], lines[e, 2]
-        margin = _ON_LINE * (abs(a) + abs(b))
-        size, least, most, total = sizes[p], np.inf, -np.inf, 0.0
-        for i in range(size):
-            distance = a * xs[p, i] + b * ys[p, i] + c
-            least, most, total = min(least, distance), max(most, distance), total + distance
-            spare[2, i] = distance
-        if pieces == _PIECES or size + 1 > _CORNERS:
-            least = most = total
-        if least >= -margin:
-            continue
-        if most <= margin:
-            return pieces
-        within = without = 0
-        for i in range(size):
-            j = i + 1 if i + 1 < size else 0
-            here, there = spare[2, i], spare[2, j]
-            x, y = xs[p, i], ys[p, i]
-            if here >= -margin:
-                spare[0, within], spare[1, within] = x, y
-                within += 1
-            if here <= margin:
-                xs[pieces, without], ys[pieces, without] = x, y
-                without += 1
-            if (here > margin and there < -margin) or (here < -margin and there > margin):
-                share = here / (here - there)
-                x, y = x + share * (xs[p, j] - x), y + share * (ys[p, j] - y)
-                spare[0, within], spare[1, within] = x, y
-                xs[pieces, without], ys[pieces, without] = x, y
-                within += 1
-                without += 1
-        sizes[pieces], owners[pieces], farthest[pieces] = without, owners[p], farthest[p]
-        pieces += 1
-        for i in range(within):
-            xs[p, i], ys[p, i] = spare[0, i], spare[1, i]
-        sizes[p] = within
-    owners[p], farthest[p] = k, depth
-    return pieces
+def _cut(
+    p: int, new: int, lines: Floats, at: int, e: int, xs: Floats, ys: Floats, size: int, spare: Floats
+) -> tuple[int, int]:
+    """Cut piece p along line e: what lies inside stays, what lies outside becomes piece `new`.
+
+    Return the number of corners of either; with none outside, or none inside, nothing has been cut.
+    """
+    a, b, c = lines[at, e, 0], lines[at, e, 1], lines[at, e, 2]
+    margin = _ON_LINE * (abs(a) + abs(b))
+    inner = outer = 0
+    total = 0.0
+    for i in range(size):
+        distance = a * xs[p, i] + b * ys[p, i] + c
+        spare[2, i] = distance
+        inner += distance > margin
+        outer += distance < -margin
+        total += distance
+    if new == _PIECES or size + 1 > _CORNERS:
+        inner, outer = size * (total > margin), size * (total < -margin)
+    if outer == 0:
+        return size, 0
+    if inner == 0:
+        return 0, size
+    within = without = 0
+    for i in range(size):
+        j = i + 1 if i + 1 < size else 0
+        here, there = spare[2, i], spare[2, j]
+        x, y = xs[p, i], ys[p, i]
+        if here >= -margin:
+            spare[0, within], spare[1, within] = x, y
+            within += 1
+        if here <= margin:
+            xs[new, without], ys[new, without] = x, y
+            without += 1
+        if (here > margin and there < -margin) or (here < -margin and there > margin):
+            share = here / (here - there)
+            x, y = x + share * (xs[p, j] - x), y + share * (ys[p, j] - y)
+            spare[0, within], spare[1, within] = x, y
+            xs[new, without], ys[new, without] = x, y
+            within += 1
+            without += 1
+    for i in range(within):
+        xs[p, i], ys[p, i] = spare[0, i], spare[1, i]
+    return within, without
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)

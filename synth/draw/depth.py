@@ -72,6 +72,7 @@ def project(
 @njit(cache=True, error_model="numpy")
 def face_camera(
     faces: Ints,
+    wanted: NDArray[np.bool_],
     pixels: Floats,
     inverse_depth: Floats,
     width: int,
@@ -86,8 +87,8 @@ def face_camera(
 
     Parameters
     ----------
-    faces, pixels, inverse_depth : ndarray
-        (m, 3), (n, 2) and (n,).
+    faces, wanted, pixels, inverse_depth : ndarray
+        (m, 3), (m,), whether a triangle may be listed, (n, 2) and (n,).
     width : int
         Width of the picture, px.
     top, bottom : float
@@ -107,6 +108,9 @@ def face_camera(
     touched[:] = False
     faces_seen = vertices_used = 0
     for t in range(len(faces)):
+        front[t] = False
+        if not wanted[t]:
+            continue
         a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         xa, ya, xb, yb, xc, yc = pixels[a, 0], pixels[a, 1], pixels[b, 0], pixels[b, 1], pixels[c, 0], pixels[c, 1]
         # y points down, so a triangle that appears counter-clockwise has a negative area
@@ -128,8 +132,12 @@ def face_camera(
 
 
 @njit(cache=True, error_model="numpy")
-def lay_planes(seen: Ints, faces: Ints, pixels: Floats, inverse_depth: Floats, light: Floats, planes: Floats) -> None:
-    """Fit 1/depth and the three lights times 1/depth of each triangle.
+def lay_planes(
+    seen: Ints, faces: Ints, pixels: Floats, inverse_depth: Floats, light: Floats, shapes: Floats, shades: Floats
+) -> None:
+    """Collect each triangle's corners and fit its 1/depth and the three lights times 1/depth.
+
+    What one triangle needs lies together: the time of drawing is that of fetching triangles from memory.
 
     Parameters
     ----------
@@ -137,11 +145,13 @@ def lay_planes(seen: Ints, faces: Ints, pixels: Floats, inverse_depth: Floats, l
         (k,), triangles.
     faces, pixels, inverse_depth, light : ndarray
         (m, 3), (n, 2), (n,) and (n, 3).
-    planes : ndarray
-        (k, 4, 3) or more, written: (gx, gy, q0) of 1/depth, then of red, green and blue.
+    shapes : ndarray
+        (m, 11), written for `seen`: x and y of each corner; gx, gy and q0 of 1/depth; its greatest and least value.
+    shades : ndarray
+        (m, 3, 3), written for `seen`: gx, gy and q0 of red, green and blue.
     """
-    for k in range(len(seen)):
-        a, b, c = faces[seen[k], 0], faces[seen[k], 1], faces[seen[k], 2]
+    for t in seen:
+        a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
         xa, ya = pixels[a, 0], pixels[a, 1]
         xb, yb, xc, yc = pixels[b, 0] - xa, pixels[b, 1] - ya, pixels[c, 0] - xa, pixels[c, 1] - ya
         scale = 1.0 / (xb * yc - xc * yb)
@@ -151,105 +161,108 @@ def lay_planes(seen: Ints, faces: Ints, pixels: Floats, inverse_depth: Floats, l
                 qa, qb, qc = qa * light[a, q - 1], qb * light[b, q - 1], qc * light[c, q - 1]
             gx = ((qb - qa) * yc - (qc - qa) * yb) * scale
             gy = ((qc - qa) * xb - (qb - qa) * xc) * scale
-            planes[k, q, 0], planes[k, q, 1], planes[k, q, 2] = gx, gy, qa - gx * xa - gy * ya
+            q0 = qa - gx * xa - gy * ya
+            if q > 0:
+                shades[t, q - 1, 0], shades[t, q - 1, 1], shades[t, q - 1, 2] = gx, gy, q0
+            else:
+                shapes[t, 6], shapes[t, 7], shapes[t, 8] = gx, gy, q0
+                shapes[t, 9], shapes[t, 10] = max(qa, qb, qc), min(qa, qb, qc)
+        for e in range(3):
+            shapes[t, 2 * e], shapes[t, 2 * e + 1] = pixels[faces[t, e], 0], pixels[faces[t, e], 1]
 
 
 @njit(cache=True, error_model="numpy")
-def find_nearest(
-    seen: Ints,
-    faces: Ints,
-    part: Ints,
-    pixels: Floats,
-    planes: Floats,
-    first: int,
-    nearest: Ints,
-    owner: Ints,
-    depths: Floats,
-) -> None:
+def find_nearest(seen: Ints, shapes: Floats, first: int, nearest: Ints, depths: Floats) -> None:
     """Find the nearest triangle at each pixel's centre; a centre on a common edge belongs to exactly one triangle.
+
+    Triangles drawn before stay where they are nearer. Of two at the same depth the one with the lower index is taken,
+    so that the result does not depend on the order.
 
     Parameters
     ----------
-    seen, faces, pixels, planes : ndarray
+    seen, shapes : ndarray
         As in `lay_planes`.
-    part : ndarray
-        (m,), part of each triangle.
     first : int
         Row of the picture that is the first one of `nearest`.
-    nearest, owner : ndarray
-        (rows, width), written: index into `seen`, and part, or `NOTHING`.
+    nearest : ndarray
+        (rows, width), updated: triangle, or `NOTHING`.
     depths : ndarray
-        (rows, width), written: 1/depth there, 0 for nothing, 1/m.
+        (rows, width), updated: 1/depth there, 0 for nothing, 1/m.
     """
     rows, width = nearest.shape
-    nearest[:], owner[:], depths[:] = NOTHING, NOTHING, 0.0
-    low, high, start, slope = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    for k in range(len(seen)):
-        t = seen[k]
-        xa, xb, xc = pixels[faces[t, 0], 0], pixels[faces[t, 1], 0], pixels[faces[t, 2], 0]
-        ya, yb, yc = pixels[faces[t, 0], 1], pixels[faces[t, 1], 1], pixels[faces[t, 2], 1]
+    for t in seen:
+        xa, ya, xb, yb, xc, yc = shapes[t, 0], shapes[t, 1], shapes[t, 2], shapes[t, 3], shapes[t, 4], shapes[t, 5]
         top, bottom = max(np.ceil(min(ya, yb, yc)), first), min(np.ceil(max(ya, yb, yc)), first + rows)
         if top >= bottom or np.ceil(min(xa, xb, xc)) >= np.ceil(max(xa, xb, xc)):
             continue  # contains no pixel's centre
-        for e in range(3):
-            # Both triangles at an edge compute from its upper end, so that rounding leaves no gap between them.
-            a, b = faces[t, e], faces[t, e + 1 if e < 2 else 0]
-            if pixels[a, 1] > pixels[b, 1] or (pixels[a, 1] == pixels[b, 1] and pixels[a, 0] > pixels[b, 0]):
-                a, b = b, a
-            low[e], high[e], start[e] = pixels[a, 1], pixels[b, 1], pixels[a, 0]
-            slope[e] = (pixels[b, 0] - pixels[a, 0]) / (high[e] - low[e]) if high[e] > low[e] else 0.0
-        gx, gy, q0 = planes[k, 0, 0], planes[k, 0, 1], planes[k, 0, 2]
-        belongs = part[t]
+        low_a, high_a, start_a, slope_a = _edge(xa, ya, xb, yb)
+        low_b, high_b, start_b, slope_b = _edge(xb, yb, xc, yc)
+        low_c, high_c, start_c, slope_c = _edge(xc, yc, xa, ya)
+        gx, gy, q0 = shapes[t, 6], shapes[t, 7], shapes[t, 8]
         for row in range(int(top), int(bottom)):
             left, right = np.inf, -np.inf
-            for e in range(3):
-                if low[e] <= row < high[e]:
-                    x = start[e] + (row - low[e]) * slope[e]
-                    left, right = min(left, x), max(right, x)
+            if low_a <= row < high_a:
+                x = start_a + (row - low_a) * slope_a
+                left, right = min(left, x), max(right, x)
+            if low_b <= row < high_b:
+                x = start_b + (row - low_b) * slope_b
+                left, right = min(left, x), max(right, x)
+            if low_c <= row < high_c:
+                x = start_c + (row - low_c) * slope_c
+                left, right = min(left, x), max(right, x)
             begin, end = max(int(np.ceil(left)), 0), min(int(np.ceil(right)), width)
             if begin >= end:
                 continue
             there = gy * row + q0
-            ids, parts = nearest[row - first, begin:end], owner[row - first, begin:end]
-            near = depths[row - first, begin:end]
-            for i in range(end - begin):
-                # all three are always written: without a branch the loop is vectorised
-                q = gx * (begin + i) + there
-                nearer = q > near[i]
-                near[i] = q if nearer else near[i]
-                ids[i] = k if nearer else ids[i]
-                parts[i] = belongs if nearer else parts[i]
+            for x in range(begin, end):
+                q, near = gx * x + there, depths[row - first, x]
+                if q > near or (q == near and t < nearest[row - first, x]):
+                    depths[row - first, x], nearest[row - first, x] = q, t
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _edge(xa: float, ya: float, xb: float, yb: float) -> tuple[float, float, float, float]:
+    """Return the upper and lower end of an edge, and where it begins and its slope in px per row.
+
+    Both triangles at an edge compute from its upper end, so that rounding leaves no gap between them.
+    """
+    if ya > yb or (ya == yb and xa > xb):
+        xa, ya, xb, yb = xb, yb, xa, ya
+    return ya, yb, xa, (xb - xa) / (yb - ya) if yb > ya else 0.0
 
 
 @njit(cache=True, error_model="numpy")
-def light_centres(nearest: Ints, planes: Floats, first: int, light: NDArray[np.float32]) -> None:
+def light_centres(
+    nearest: Ints, shapes: Floats, shades: Floats, first: int, spans: Ints, light: NDArray[np.float32]
+) -> None:
     """Write the light at each pixel's centre.
 
     Parameters
     ----------
     nearest : ndarray
-        (rows, width), index into `planes`, or `NOTHING`.
-    planes : ndarray
-        (k, 4, 3), `lay_planes`.
+        (rows, width), triangle, or `NOTHING`.
+    shapes, shades : ndarray
+        `lay_planes`.
     first : int
         Row of the picture that is the first one of `nearest`.
+    spans : ndarray
+        (rows, 2), the columns to write in each row: from the first to before the second.
     light : ndarray
-        (rows, width, 3), written.
+        (rows, width, 3), written there.
     """
-    rows, width = nearest.shape
-    for row in range(rows):
-        y, end = float(row + first), 0
-        while end < width:
+    for row in range(len(nearest)):
+        y, end, stop = float(row + first), spans[row, 0], spans[row, 1]
+        while end < stop:
             # one run of pixels with the same triangle at a time
             begin, k = end, nearest[row, end]
-            while end < width and nearest[row, end] == k:
+            while end < stop and nearest[row, end] == k:
                 end += 1
             if k == NOTHING:
                 light[row, begin:end] = 0.0
                 continue
-            q0, r0 = planes[k, 0, 1] * y + planes[k, 0, 2], planes[k, 1, 1] * y + planes[k, 1, 2]
-            g0, b0 = planes[k, 2, 1] * y + planes[k, 2, 2], planes[k, 3, 1] * y + planes[k, 3, 2]
-            qx, rx, gx, bx = planes[k, 0, 0], planes[k, 1, 0], planes[k, 2, 0], planes[k, 3, 0]
+            q0, r0 = shapes[k, 7] * y + shapes[k, 8], shades[k, 0, 1] * y + shades[k, 0, 2]
+            g0, b0 = shades[k, 1, 1] * y + shades[k, 1, 2], shades[k, 2, 1] * y + shades[k, 2, 2]
+            qx, rx, gx, bx = shapes[k, 6], shades[k, 0, 0], shades[k, 1, 0], shades[k, 2, 0]
             for x in range(begin, end):
                 depth = 1.0 / (qx * x + q0)
                 light[row, x, 0] = (rx * x + r0) * depth

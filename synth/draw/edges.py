@@ -33,10 +33,11 @@ def mark_edges(
     pixels: Floats,
     inverse_depth: Floats,
     every: bool,
-    owner: Ints,
+    nearest: Ints,
     depths: Floats,
     margin: int,
     first: int,
+    spans: Ints,
     marked: Bools,
 ) -> None:
     """Mark the pixels crossed by an edge that may be visible there.
@@ -56,12 +57,14 @@ def mark_edges(
         (n, 2) and (n,), of the vertices.
     every : bool
         Whether every edge counts, not only those with a discontinuity of the picture.
-    owner, depths : ndarray
+    nearest, depths : ndarray
         (rows, width), `synth.draw.depth.find_nearest`.
     margin : int
-        Rows of `owner` above those of `marked`.
+        Rows of `nearest` above those of `marked`.
     first : int
         Row of the picture that is the first one of `marked`.
+    spans : ndarray
+        (rows, 2), the columns in which to look for edges in each row: from the first to before the second.
     marked : ndarray
         (rows, width), set where crossed.
     """
@@ -87,59 +90,69 @@ def mark_edges(
             end = min(max((row + 0.5 - ya) * across, 0.0), 1.0) if yb > ya else 1.0
             x0, x1 = xa + begin * (xb - xa), xa + end * (xb - xa)
             closest = max(qa + begin * (qb - qa), qa + end * (qb - qa)) * (1.0 + _BEHIND)
-            left = max(int(np.floor(max(min(x0, x1), -1.0) + 0.5 - _CLOSE)), 0)
-            right = min(int(np.floor(min(max(x0, x1), width) + 0.5 + _CLOSE)), width - 1)
+            left = max(int(np.floor(max(min(x0, x1), -1.0) + 0.5 - _CLOSE)), spans[row - first, 0])
+            right = min(int(np.floor(min(max(x0, x1), width) + 0.5 + _CLOSE)), spans[row - first, 1] - 1)
             for x in range(left, right + 1):
                 if not marked[row - first, x]:
-                    marked[row - first, x] = _visible(owner, depths, row - first + margin, x, part[one], closest)
+                    marked[row - first, x] = _visible(
+                        nearest, depths, part, row - first + margin, x, part[one], closest
+                    )
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _visible(owner: Ints, depths: Floats, row: int, x: int, mine: int, closest: float) -> bool:
-    for v in range(max(row - 1, 0), min(row + 2, owner.shape[0])):
-        for u in range(max(x - 1, 0), min(x + 2, owner.shape[1])):
-            if depths[v, u] <= closest or owner[v, u] == mine:
+def _visible(nearest: Ints, depths: Floats, part: Ints, row: int, x: int, mine: int, closest: float) -> bool:
+    for v in range(max(row - 1, 0), min(row + 2, nearest.shape[0])):
+        for u in range(max(x - 1, 0), min(x + 2, nearest.shape[1])):
+            # where there is nothing, the depth is 0
+            if depths[v, u] <= closest or part[nearest[v, u]] == mine:
                 return True
     return False
 
 
 @njit(cache=True, error_model="numpy")
-def mark_passages(nearest: Ints, owner: Ints, planes: Floats, margin: int, first: int, marked: Bools) -> None:
+def mark_passages(
+    nearest: Ints, part: Ints, shapes: Floats, margin: int, first: int, spans: Ints, marked: Bools
+) -> None:
     """Mark neighbouring pixels between whose centres two parts pass through each other.
 
     Parameters
     ----------
-    nearest, owner, margin, first, marked
+    nearest, part, margin, first, marked
         As in `mark_edges`.
-    planes : ndarray
-        (k, 4, 3), `lay_planes`.
+    spans : ndarray
+        (rows, 2), as in `mark_edges`, for the rows of `nearest`. Between pixels outside a few may be marked, too.
+    shapes : ndarray
+        (m, 11), `synth.draw.depth.lay_planes`.
     """
     total, width = nearest.shape
+    upper, lower = np.empty(width, np.int32), np.empty(width, np.int32)
     for y in range(total):
         below = min(y + 1, total - 1)
-        for x in range(width):
-            mine, left, right = owner[y, x], max(x - 1, 0), min(x + 1, width - 1)
-            same = mine == owner[y, right]
-            same &= mine == owner[below, left]
-            same &= mine == owner[below, x]
-            same &= mine == owner[below, right]
+        begin = max(min(spans[y, 0], spans[below, 0]) - 1, 0)
+        end = min(max(spans[y, 1], spans[below, 1]) + 1, width)
+        for x in range(max(begin - 1, 0), min(end + 1, width)):
+            upper[x], lower[x] = part[nearest[y, x]], part[nearest[below, x]]
+        for x in range(begin, end):
+            mine, left, right = upper[x], max(x - 1, 0), min(x + 1, width - 1)
+            same = mine == upper[right]
+            same &= mine == lower[left]
+            same &= mine == lower[x]
+            same &= mine == lower[right]
             if same:
                 continue
             for v, u in ((y, right), (below, left), (below, x), (below, right)):
                 one, two = nearest[y, x], nearest[v, u]
-                if mine == owner[v, u] or one == NOTHING or two == NOTHING:
+                if one == NOTHING or two == NOTHING or part[one] == part[two]:
                     continue
-                if _pass(planes, one, two, x, y - margin + first, u, v - margin + first):
+                if _pass(shapes, one, two, x, y - margin + first, u, v - margin + first):
                     _mark(marked, y - margin, x)
                     _mark(marked, v - margin, u)
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
-def _pass(planes: Floats, one: int, two: int, x: int, y: int, u: int, v: int) -> bool:
+def _pass(shapes: Floats, one: int, two: int, x: int, y: int, u: int, v: int) -> bool:
     """Return whether triangle one is in front of triangle two at (x, y) and behind it at (u, v)."""
-    gx = planes[one, 0, 0] - planes[two, 0, 0]
-    gy = planes[one, 0, 1] - planes[two, 0, 1]
-    q0 = planes[one, 0, 2] - planes[two, 0, 2]
+    gx, gy, q0 = shapes[one, 6] - shapes[two, 6], shapes[one, 7] - shapes[two, 7], shapes[one, 8] - shapes[two, 8]
     return gx * x + gy * y + q0 > 0.0 and gx * u + gy * v + q0 < 0.0
 
 

@@ -3,6 +3,7 @@
 A depth buffer finds the nearest triangle at the centre of each pixel. Pixels with a discontinuity are cut up, and every
 visible triangle counts with its area. In all other pixels the light at the centre is the pixel's mean, as far as light
 is affine. A band of rows equals the same rows of the whole picture bit for bit, and every run gives the same result.
+While the camera rests, what does not move is drawn once.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.camera import Pinhole
-from synth.draw.area import cover, gather, number
-from synth.draw.depth import face_camera, find_nearest, lay_planes, light_centres, project
+from synth.draw.area import cover
+from synth.draw.depth import NOTHING, face_camera, find_nearest, lay_planes, light_centres, project
 from synth.draw.edges import mark_edges, mark_passages
 from synth.draw.light import light_vertices
+from synth.draw.lists import gather, number
+from synth.draw.still import BODY, Still, reach, restore
 from synth.draw.surface import join
 from synth.mechanism import Part
 
@@ -53,8 +56,14 @@ class Raster:
         self._pixels, self._inverse_depth, self._light = np.empty((n, 2)), np.empty(n), np.empty((n, 3))
         self._front, self._touched = np.empty(m, dtype=bool), np.empty(n, dtype=bool)
         self._seen, self._used = np.empty(m, dtype=np.int32), np.empty(n, dtype=np.int32)
-        self._planes = np.empty((m, 4, 3))
-        self._buffers = tuple(np.empty(self._size[::-1], dtype=kind) for kind in (np.int32, np.int32, np.float64))
+        self._shapes, self._shades = np.empty((m, 11)), np.empty((m, 3, 3))
+        bodies = np.array(self._surface.bodies)
+        self._unmoved = (bodies == BODY)[self._surface.body[self._surface.faces[:, 0]]]
+        self._all = np.ones(m, dtype=bool)
+        self._seen_from: tuple[object, ...] = ()
+        self._still: Still | None = None
+        self._nearest = np.empty(self._size[::-1], dtype=np.int32)
+        self._depths, self._spans = np.empty(self._size[::-1]), np.empty((self._size[1], 2), dtype=np.int32)
 
     def draw(self, camera: Pinhole, poses: Mapping[str, Floats], rows: slice) -> NDArray[np.float32]:
         """Draw the picture of one instant.
@@ -78,46 +87,65 @@ class Raster:
         KeyError
             If a body has no pose.
         """
-        surface = self._surface
         width, height = self._size
         first, last, _ = rows.indices(height)
-        light = np.empty((max(last - first, 0), width, 3), dtype=np.float32)
-        if light.size == 0:
-            return light
-        top, bottom = max(first - _MARGIN, 0), min(last + _MARGIN, height)
-        seen, planes = self._set_up(camera, poses, top, bottom)
-
-        nearest, owner, depths = (buffer[: bottom - top] for buffer in self._buffers)
-        find_nearest(seen, surface.faces, surface.part, self._pixels, planes, top, nearest, owner, depths)
-        marked = np.zeros(light.shape[:2], dtype=bool)
-        if self._exact:
-            margin = first - top
-            mark_edges(
-                surface.edges, surface.sides, surface.sharp, self._front, surface.part, self._pixels,
-                self._inverse_depth, self._every, owner, depths, margin, first, marked,
-            )  # fmt: skip
-            mark_passages(nearest, owner, planes, margin, first, marked)
-        light_centres(nearest[first - top : last - top], planes, first, light)
-        if marked.any():
-            self._cover(marked, seen, planes, first, light)
-        return light
+        if first >= last:
+            return np.empty((0, width, 3), dtype=np.float32)
+        placed = np.array([poses[body][:3] for body in self._surface.bodies], dtype=float)
+        seen_from = _key(camera, placed[np.array(self._surface.bodies) == BODY])
+        if seen_from != self._seen_from:
+            self._seen_from, self._still = seen_from, None
+        elif self._still is None:  # worth its time only where the camera rests
+            light = self._draw(camera, placed, 0, height, self._unmoved)
+            self._spans[:] = 0
+            self._still = Still(self._nearest.copy(), self._depths.copy(), light)
+        return self._draw(camera, placed, first, last, self._all)
 
     def close(self) -> None:
         """Do nothing: the engine holds no resources."""
 
+    def _draw(
+        self, camera: Pinhole, placed: Floats, first: int, last: int, wanted: NDArray[np.bool_]
+    ) -> NDArray[np.float32]:
+        """Draw the wanted triangles; if there is a layer of those that do not move, the others only."""
+        surface, still = self._surface, self._still
+        top, bottom = max(first - _MARGIN, 0), min(last + _MARGIN, self._size[1])
+        seen = self._set_up(camera, placed, top, bottom, wanted)
+        spans, nearest, depths = self._spans[top:bottom], self._nearest[top:bottom], self._depths[top:bottom]
+        if still is None:
+            spans[:], nearest[:], depths[:] = (0, self._size[0]), NOTHING, 0.0
+            fresh, light = seen, np.empty((last - first, self._size[0], 3), dtype=np.float32)
+        else:
+            restore(self._spans, still.nearest, still.depths, self._nearest, self._depths)
+            fresh, light = seen[~self._unmoved[seen]], still.light[first:last].copy()
+            self._spans[:] = self._size[0], 0
+            reach(fresh, self._shapes, top, spans)
+            np.clip(spans, 0, self._size[0], out=spans)
+        find_nearest(fresh, self._shapes, top, nearest, depths)
+        margin, inner = first - top, slice(first - top, last - top)
+        light_centres(nearest[inner], self._shapes, self._shades, first, spans[inner], light)
+        if self._exact:
+            marked = np.zeros((last - first, self._size[0]), dtype=bool)
+            mark_edges(
+                surface.edges, surface.sides, surface.sharp, self._front, surface.part, self._pixels,
+                self._inverse_depth, self._every, nearest, depths, margin, first, spans[inner], marked,
+            )  # fmt: skip
+            mark_passages(nearest, surface.part, self._shapes, margin, first, spans, marked)
+            self._cover(marked, seen, first, light)
+        return light
+
     def _set_up(
-        self, camera: Pinhole, poses: Mapping[str, Floats], top: int, bottom: int
-    ) -> tuple[NDArray[np.int32], Floats]:
-        """Project and light the triangles that reach into rows `top` to `bottom`; return them and their planes."""
+        self, camera: Pinhole, placed: Floats, top: int, bottom: int, wanted: NDArray[np.bool_]
+    ) -> NDArray[np.int32]:
+        """Project and light the wanted triangles that reach into rows `top` to `bottom`; return them."""
         surface = self._surface
-        placed = np.array([poses[body][:3] for body in surface.bodies], dtype=float)
         project(
             surface.vertices, surface.body, camera.rotation @ placed, camera.distance_m, camera.focal_px,
             np.asarray(camera.principal_px, dtype=float), np.asarray(camera.lens_px), camera.k1,
             self._pixels, self._inverse_depth,
         )  # fmt: skip
         faces_seen, vertices_used = face_camera(
-            surface.faces, self._pixels, self._inverse_depth, self._size[0], top - 0.5, bottom - 0.5,
+            surface.faces, wanted, self._pixels, self._inverse_depth, self._size[0], top - 0.5, bottom - 0.5,
             self._front, self._seen, self._used, self._touched,
         )  # fmt: skip
         seen = self._seen[:faces_seen]
@@ -125,15 +153,21 @@ class Raster:
             self._used[:vertices_used], surface.normals, surface.albedo, surface.body,
             np.ascontiguousarray(placed[:, :, :3]), self._gamma, self._light,
         )  # fmt: skip
-        lay_planes(seen, surface.faces, self._pixels, self._inverse_depth, self._light, self._planes)
-        return seen, self._planes[:faces_seen]
+        lay_planes(seen, surface.faces, self._pixels, self._inverse_depth, self._light, self._shapes, self._shades)
+        return seen
 
     def _cover(
-        self, marked: NDArray[np.bool_], seen: NDArray[np.int32], planes: Floats, first: int, light: NDArray[np.float32]
+        self, marked: NDArray[np.bool_], seen: NDArray[np.int32], first: int, light: NDArray[np.float32]
     ) -> None:
         """Replace the light of marked pixels by its exact mean."""
-        faces = self._surface.faces
         places, before = number(marked)
-        heads = np.empty(len(places), dtype=np.int32)
-        triangles, following = gather(seen, faces, self._pixels, places, before, first, heads)
-        cover(places, heads, triangles, following, seen, faces, self._pixels, self._inverse_depth, planes, first, light)
+        starts, listed, depths = gather(seen, self._shapes, places, before, first)
+        cover(places, starts, listed, depths, self._shapes, self._shades, first, light)
+
+
+def _key(camera: Pinhole, placed: Floats) -> tuple[object, ...]:
+    """Return all that the picture of bodies at these poses depends on."""
+    return (
+        placed.tobytes(), camera.rotation.tobytes(), tuple(camera.principal_px), camera.distance_m, camera.focal_px,
+        camera.k1,
+    )  # fmt: skip

@@ -157,6 +157,18 @@ def test_bands_of_rows_are_the_whole_picture_bit_for_bit(quality):
     assert raster.draw(camera, placed, slice(5, 5)).shape == (0, 160, 3)
 
 
+@pytest.mark.parametrize("quality", QUALITIES)
+def test_a_layer_of_what_does_not_move_leaves_every_bit_as_it_is(quality):
+    rest, rows = dataclasses.replace(pinhole(160, 120, 50.0, SLANTED), k1=0.2), slice(0, 120)
+    shaken, raster = rest.shaken(0.4, -0.7, 0.01), Raster(build(SPEC), rest, quality, 1.0)
+    # the layer is drawn with the second picture from one place, and again after the camera has moved
+    views = [(rest, 0.0, rows), (rest, 0.2, rows), (rest, -0.2, rows), (rest, 0.1, slice(20, 70)), (rest, 0.1, rows)]
+    for camera, angle, band in [*views, (shaken, 0.1, rows), (shaken, 0.12, rows), *views]:
+        placed = poses(SPEC.rig, angle)
+        alone = Raster(build(SPEC), rest, quality, 1.0).draw(camera, placed, band)
+        np.testing.assert_array_equal(raster.draw(camera, placed, band), alone)
+
+
 def test_the_same_scene_gives_the_same_bits_again():
     camera, placed = pinhole(160, 120, 50.0), poses(SPEC.rig, 0.1)
     first = Raster(build(SPEC), camera, "standard", 2.2)

@@ -1,0 +1,123 @@
+"""Lists, for every pixel that an edge crosses, the triangles that reach into it.
+
+The lists are found triangle by triangle and read pixel by pixel. They are therefore sorted by pixel, so that those who
+read them find each list in one place.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+_ON_LINE = 1e-9
+"""A triangle that reaches less than this into a pixel is not listed, px."""
+_BLOCK = 3
+"""Binary logarithm of the side of the blocks of pixels in which edges are looked for first."""
+
+
+@njit(cache=True, error_model="numpy")
+def number(marked: NDArray[np.bool_]) -> tuple[Ints, Ints]:
+    """Count the marked pixels row by row.
+
+    Parameters
+    ----------
+    marked : ndarray
+        (rows, width).
+
+    Returns
+    -------
+    tuple of ndarray
+        (s, 2), row and column of each; and (rows, width + 1), the count before each pixel and each row's end.
+    """
+    rows, width = marked.shape
+    before = np.empty((rows, width + 1), np.int32)
+    count = 0
+    for row in range(rows):
+        for x in range(width):
+            before[row, x] = count
+            count += marked[row, x]
+        before[row, width] = count
+    places = np.empty((count, 2), np.int32)
+    for row in range(rows):
+        if before[row, 0] == before[row, width]:
+            continue
+        for x in range(width):
+            if marked[row, x]:
+                places[before[row, x], 0], places[before[row, x], 1] = row, x
+    return places, before
+
+
+@njit(cache=True, error_model="numpy")
+def gather(seen: Ints, shapes: Floats, places: Ints, before: Ints, first: int) -> tuple[Ints, Ints, Floats]:
+    """List for each marked pixel the triangles that reach into it.
+
+    Parameters
+    ----------
+    seen, shapes : ndarray
+        As in `synth.draw.depth.lay_planes`.
+    places, before : ndarray
+        `number`.
+    first : int
+        Row of the picture that is the first one of `before`.
+
+    Returns
+    -------
+    tuple of ndarray
+        (s + 1,), where the list of each marked pixel begins, and the end of the last one; (n,), the triangles of one
+        list after another, ascending as in `seen`; and (n, 2), bounds of each triangle's 1/depth in the pixel, the
+        greater first.
+    """
+    rows, width = before.shape[0], before.shape[1] - 1
+    found, bounds = np.empty((8 * len(places) + 64, 2), np.int32), np.empty((8 * len(places) + 64, 2))
+    starts, count = np.zeros(len(places) + 1, np.int32), 0
+    lines = np.empty((3, 4))
+    # most triangles are far from every such pixel, as a coarser picture shows
+    blocks = np.zeros(((rows >> _BLOCK) + 1, (width >> _BLOCK) + 1), np.bool_)
+    for slot in range(len(places)):
+        blocks[places[slot, 0] >> _BLOCK, places[slot, 1] >> _BLOCK] = True
+    for t in seen:
+        xs, ys = (shapes[t, 0], shapes[t, 2], shapes[t, 4]), (shapes[t, 1], shapes[t, 3], shapes[t, 5])
+        left, right = max(int(np.floor(min(xs) + 0.5)), 0), min(int(np.floor(max(xs) + 0.5)), width - 1)
+        if left > right:
+            continue
+        top = max(int(np.floor(min(ys) + 0.5)), first) - first
+        bottom = min(int(np.floor(max(ys) + 0.5)), first + rows - 1) - first
+        crossed = False
+        for row in range(top >> _BLOCK, (bottom >> _BLOCK) + 1):
+            for x in range(left >> _BLOCK, (right >> _BLOCK) + 1):
+                crossed |= blocks[row, x]
+        if not crossed:
+            continue
+        for e in range(3):
+            # a·x + b·y + c, positive inside, and how far this changes from a pixel's centre to its corner
+            p, q = 2 * e, 2 * e + 2 if e < 2 else 0
+            a, b = shapes[t, q + 1] - shapes[t, p + 1], shapes[t, p] - shapes[t, q]
+            lines[e, 0], lines[e, 1], lines[e, 2] = a, b, a * (0.0 - shapes[t, p]) + b * (0.0 - shapes[t, p + 1])
+            lines[e, 3] = (0.5 - _ON_LINE) * (abs(a) + abs(b))
+        gx, gy, q0, nearest, farthest = shapes[t, 6], shapes[t, 7], shapes[t, 8], shapes[t, 9], shapes[t, 10]
+        for row in range(top, bottom + 1):
+            for slot in range(before[row, left], before[row, right + 1]):
+                inside, x = True, places[slot, 1]
+                for e in range(3):
+                    inside &= lines[e, 0] * x + lines[e, 1] * (row + first) + lines[e, 2] + lines[e, 3] > 0.0
+                if not inside:
+                    continue
+                if count == len(found):
+                    found, bounds = np.concatenate((found, found)), np.concatenate((bounds, bounds))
+                middle, reach = gx * x + gy * (row + first) + q0, 0.5 * (abs(gx) + abs(gy))
+                bounds[count, 0], bounds[count, 1] = min(middle + reach, nearest), max(middle - reach, farthest)
+                found[count, 0], found[count, 1] = slot, t
+                starts[slot + 1] += 1
+                count += 1
+    for slot in range(len(places)):
+        starts[slot + 1] += starts[slot]
+    listed, depths, ends = np.empty(count, np.int32), np.empty((count, 2)), starts[:-1].copy()
+    for n in range(count):
+        at = ends[found[n, 0]]
+        listed[at], depths[at, 0], depths[at, 1] = found[n, 1], bounds[n, 0], bounds[n, 1]
+        ends[found[n, 0]] += 1
+    return starts, listed, depths
