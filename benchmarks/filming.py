@@ -2,8 +2,9 @@
 
     .venv/bin/python benchmarks/filming.py
 
-Films the demo's motion at 640 × 480 and 1280 × 720, without and with motion blur, with one worker per core. Also prints
-the time of one drawing, of the sensor and of the codec on one core.
+Films the demo's stairs at 640 × 480 and 1280 × 720, without and with motion blur, and its chirp to 5 Hz at 640 × 480
+with motion blur, with one worker per core. Also prints the time of one drawing, of the sensor and of the codec on one
+core.
 """
 
 from __future__ import annotations
@@ -25,6 +26,16 @@ from synth.take import perform, plan, view
 DEMO = Path(__file__).parents[1] / "configs" / "demo.yaml"
 WARM_UP = 48
 """Frames that are not timed, while the workers start and load."""
+STAIRS, CHIRP = 0, 1
+"""Recordings of the demo."""
+FILMS = (
+    ((640, 480), 0.0, STAIRS),
+    ((640, 480), 0.01, STAIRS),
+    ((640, 480), 0.01, CHIRP),
+    ((1280, 720), 0.0, STAIRS),
+    ((1280, 720), 0.01, STAIRS),
+)
+"""Size in px, exposure in s, recording."""
 
 
 def variant(size: tuple[int, int], exposure_s: float) -> Spec:
@@ -34,9 +45,9 @@ def variant(size: tuple[int, int], exposure_s: float) -> Spec:
     return Spec.model_validate(demo)
 
 
-def measure(spec: Spec) -> list[str]:
+def measure(spec: Spec, recording: int) -> list[str]:
     seen = view(spec)
-    take = perform(spec, seen)[0]
+    take = perform(spec, seen)[recording]
     frames = list(range(len(take.table.stamps)))
     with tempfile.TemporaryDirectory() as folder, Studio(spec, seen, workers()) as studio:
         with clip_writer(Path(folder) / "film.avi", spec.camera, take.table) as write:
@@ -69,10 +80,9 @@ def main() -> None:
     print(f"{date.today():%d %B %Y}, {workers()} workers, MJPEG\n")
     print("| film | fps | instants a frame | one instant, ms | sensor, ms | codec, ms |")
     print("| --- | --- | --- | --- | --- | --- |")
-    for size in ((640, 480), (1280, 720)):
-        for exposure_s in (0.0, 0.01):
-            name = f"{size[0]} × {size[1]}, exposure {1000 * exposure_s:.0f} ms"
-            print(f"| {name} | {' | '.join(measure(variant(size, exposure_s)))} |", flush=True)
+    for size, exposure_s, recording in FILMS:
+        name = f"{size[0]} × {size[1]}, exposure {1000 * exposure_s:.0f} ms{', chirp' if recording == CHIRP else ''}"
+        print(f"| {name} | {' | '.join(measure(variant(size, exposure_s), recording))} |", flush=True)
 
 
 if __name__ == "__main__":
