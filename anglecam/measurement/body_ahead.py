@@ -32,6 +32,8 @@ from anglecam.vision.registration.turn import NO_TURN, BodyAppearance, TurnEstim
 
 _OFF_CIRCLE_PX = 6.0
 """Largest distance of the mark from its circle, px."""
+_LESS_THAN_A_TURN = 5.0
+"""Largest range of directions in such frames, rad. Between frames far apart, whole turns are not counted."""
 _BASIN_PX = 1.0
 """Distance at the body's middle, px, between two angles from which the search ends at the same one."""
 _LIKE = 2.0
@@ -50,6 +52,8 @@ class BodyAhead:
     area_px2: float
     """The mark's."""
     lens: Lens
+    middle: float
+    """Middle of the directions in these frames, rad: what is learnt of the light depends on the direction."""
     poses: int
     """Number of frames from which it was learnt."""
 
@@ -60,9 +64,10 @@ class BodyAhead:
         return off < _OFF_CIRCLE_PX and self.area_px2 / _LIKE < region.area_px2 < _LIKE * self.area_px2
 
     def turn_of(self, region: Region) -> float:
-        """Return the direction from the pivot to a region, counter-clockwise as seen, rad."""
+        """Return the direction from the pivot to a region, counter-clockwise as seen, rad, near those of its frames."""
         x, y = self.lens.rectify(region.centre_px) - self.pivot.centre_px
-        return float(np.arctan2(-y, x))
+        turn = float(np.arctan2(-y, x))
+        return turn + 2.0 * np.pi * round((self.middle - turn) / (2.0 * np.pi))
 
 
 def learn_body_ahead(film: Film, found: FoundMark, images: Sequence[Image], rig: Rig, lens: Lens) -> BodyAhead | None:
@@ -102,6 +107,8 @@ def learn_body_ahead(film: Film, found: FoundMark, images: Sequence[Image], rig:
     arm = np.array([mark.centre_px for mark in marks]) - pivot.centre_px
     turn = np.full(len(time), np.nan)
     turn[known] = np.unwrap(np.arctan2(-arm[:, 1], arm[:, 0]))
+    if np.ptp(turn[known]) > _LESS_THAN_A_TURN:
+        return None
     wanted = spread_out(turn, known, film)
     views = [
         FrameView(frame.image, float(turn[frame.index]), pivot.centre_px, 0.0, 0.0)
@@ -111,8 +118,15 @@ def learn_body_ahead(film: Film, found: FoundMark, images: Sequence[Image], rig:
     appearance = learn_from_frames(views, motion_plane(lens, film.size), pivot)
     if isinstance(appearance, str):
         return None
-    circle = track.circle.centre_px, track.circle.radius_px
-    return BodyAhead(appearance, pivot, circle, float(np.median([mark.area_px2 for mark in marks])), lens, len(views))
+    return BodyAhead(
+        appearance=appearance,
+        pivot=pivot,
+        circle=(track.circle.centre_px, track.circle.radius_px),
+        area_px2=float(np.median([mark.area_px2 for mark in marks])),
+        lens=lens,
+        middle=float(np.min(turn[known]) + np.max(turn[known])) / 2.0,
+        poses=len(views),
+    )
 
 
 class TurnsAhead:
@@ -127,7 +141,7 @@ class TurnsAhead:
     def __init__(self, body: BodyAhead) -> None:
         self.body = body
         self.begun: list[float] = []
-        """Angle at which the search in each frame began, rad, in (-π, π]; NaN where there was none."""
+        """Angle at which the search in each frame began, rad; NaN where there was none."""
         self.found: list[TurnEstimate] = []
 
     def add(self, film: Film, picture: Picture, before: Picture | None, regions: Sequence[Region]) -> None:

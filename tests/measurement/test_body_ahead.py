@@ -67,6 +67,18 @@ def test_a_long_film_is_measured_as_a_short_one(clip, short, look, long, monkeyp
     assert np.sqrt(np.mean((off / sigma) ** 2)) < 1.5
 
 
+def test_a_body_that_points_to_the_left_is_learnt_ahead(long, tmp_path, monkeypatch):
+    left = Look(facing="left", neutral_deg=2.0)  # its directions are on both sides of 180°
+    path = tmp_path / "clip.avi"
+    write_clip(path, draw_frames(left, SWING, TIME, seed=6))
+    monkeypatch.setattr(registration_pass, "learn_from_frames", lambda *args: "not again")
+    measured = measure_clip(open_film(path), Rig(facing="left", pivot=RigPivot(near=tuple(left.pivot + [4.0, -5.0]))))
+    assert measured.by == "whole body"
+    assert measured.series.ok.all()
+    off, sigma = _off(measured.series, SWING)
+    assert np.sqrt(np.mean((off / sigma) ** 2)) < 1.5
+
+
 def test_frames_in_which_the_mark_is_hidden_are_measured_afterwards(look, long, tmp_path):
     frames = list(draw_frames(look, SWING, TIME, seed=4))
     marks = look.mouth(SWING)
