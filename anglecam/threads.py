@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Generic, TypeVar
 
 T = TypeVar("T")
 R = TypeVar("R")
+_OPEN = 8
+"""Pieces of work that wait at most: what they work on stays in memory."""
 
 
 def native_threads() -> int:
@@ -32,3 +35,27 @@ def map_in_threads(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
         return [work(item) for item in items]
     with ThreadPoolExecutor(threads) as pool:
         return list(pool.map(work, items))
+
+
+class Backlog(Generic[R]):
+    """Work whose results are not needed yet: a second thread does it, in order, where one is allowed."""
+
+    def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(1) if native_threads() > 1 else None
+        self._open: deque[Future[R]] = deque()
+        self._done: list[R] = []
+
+    def add(self, work: Callable[[], R]) -> None:
+        """Do this after all that was added before; wait for the oldest where many are open."""
+        if self._pool is None:
+            self._done.append(work())
+            return
+        self._open.append(self._pool.submit(work))
+        if len(self._open) > _OPEN:
+            self._done.append(self._open.popleft().result())
+
+    def results(self) -> list[R]:
+        """Return the results of all work in its order; raise what it raised."""
+        while self._open:
+            self._done.append(self._open.popleft().result())
+        return self._done

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -21,17 +22,16 @@ from anglecam.data.typing import Flags, Floats, Image
 from anglecam.io.rig import Rig
 from anglecam.measurement.body_learning import FEWEST, learn_from_frames, spread_out
 from anglecam.measurement.pivot import find_pivot
+from anglecam.threads import Backlog
 from anglecam.video.film import Film
 from anglecam.video.picture import Picture
 from anglecam.vision.mark.found_mark import FoundMark, region_in_plane
 from anglecam.vision.mark.segment import LARGEST_SHARE, SMALLEST_SHARE, Region, find_regions
-from anglecam.vision.mark.track import follow_mark
+from anglecam.vision.mark.track import COARSE_PX, follow_mark
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.registration.tiles import FrameView, motion_plane
 from anglecam.vision.registration.turn import NO_TURN, BodyAppearance, TurnEstimate, find_turn
 
-_OFF_CIRCLE_PX = 6.0
-"""Largest distance of the mark from its circle, px."""
 _LESS_THAN_A_TURN = 5.0
 """Largest range of directions in such frames, rad. Between frames far apart, whole turns are not counted."""
 _BASIN_PX = 1.0
@@ -61,7 +61,7 @@ class BodyAhead:
         """Return whether a region may be the mark by its place and size."""
         centre, radius = self.circle
         off = abs(float(np.hypot(*(self.lens.rectify(region.centre_px) - centre))) - radius)
-        return off < _OFF_CIRCLE_PX and self.area_px2 / _LIKE < region.area_px2 < _LIKE * self.area_px2
+        return off < COARSE_PX and self.area_px2 / _LIKE < region.area_px2 < _LIKE * self.area_px2
 
     def turn_of(self, region: Region) -> float:
         """Return the direction from the pivot to a region, counter-clockwise as seen, rad, near those of its frames."""
@@ -92,12 +92,13 @@ def learn_body_ahead(film: Film, found: FoundMark, images: Sequence[Image], rig:
         ``None`` where these frames do not suffice, or the body cannot be registered.
     """
     areas = SMALLEST_SHARE * found.area_px2, LARGEST_SHARE * found.area_px2
-    time, regions = [], []
+    time: list[float] = []
+    regions: Backlog[list[Region]] = Backlog()
     for frame in film.frames():
         time.append(frame.time)
         image = frame.image
-        regions.append([] if image is None else find_regions(image, found.model, areas, found.opening_px))
-    in_plane = [[region_in_plane(region, lens) for region in of_frame] for of_frame in regions]
+        regions.add(list if image is None else partial(find_regions, image, found.model, areas, found.opening_px))
+    in_plane = [[region_in_plane(region, lens) for region in of_frame] for of_frame in regions.results()]
     track = follow_mark(in_plane, np.array(time), found)
     pivot = find_pivot(images, rig, track.circle, lens)[1]
     known = np.flatnonzero([status == OK for status in track.status])
@@ -142,7 +143,7 @@ class TurnsAhead:
         self.body = body
         self.begun: list[float] = []
         """Angle at which the search in each frame began, rad; NaN where there was none."""
-        self.found: list[TurnEstimate] = []
+        self._found: Backlog[TurnEstimate] = Backlog()
 
     def add(self, film: Film, picture: Picture, before: Picture | None, regions: Sequence[Region]) -> None:
         """Find the rotation in the next frame, from the only region that may be the mark."""
@@ -150,13 +151,13 @@ class TurnsAhead:
         image = _registered(film, picture)
         if image is None or len(marks) != 1:
             self.begun.append(np.nan)
-            self.found.append(NO_TURN)
+            self._found.add(lambda: NO_TURN)
             return
         begin = self.body.turn_of(marks[0])
         view = FrameView(image, begin, self.body.appearance.pivot_px, 0.0, 0.0)
         copied = None if before is None or not picture.predicted else _registered(film, before)
         self.begun.append(begin)
-        self.found.append(find_turn(self.body.appearance, view, copied))
+        self._found.add(partial(find_turn, self.body.appearance, view, copied))
 
     def in_turns_of(self, turn: Floats) -> tuple[list[TurnEstimate], Flags, float]:
         """Return the rotations counted in whole turns as another measurement of the same film counts them.
@@ -186,7 +187,7 @@ class TurnsAhead:
         whole = np.where(both, np.round((turn + reference - self.begun) / (2.0 * np.pi)), 0.0) * 2.0 * np.pi
         found = [
             replace(one, turn=one.turn + k) if ends_there else NO_TURN
-            for one, k, ends_there in zip(self.found, whole.tolist(), settled, strict=True)
+            for one, k, ends_there in zip(self._found.results(), whole.tolist(), settled, strict=True)
         ]
         return found, settled, reference
 

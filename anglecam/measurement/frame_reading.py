@@ -20,9 +20,6 @@ from anglecam.vision.mark.mark_search import MarkSearch
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
 
-_LIKE = 2.0
-"""Largest ratio of areas at which a region may be the mark."""
-
 
 @dataclass(frozen=True)
 class Reading:
@@ -78,7 +75,8 @@ def read_frames(
     repeated: list[bool] = []
     moves: list[CameraMove] = []
     turns = None if body is None else TurnsAhead(body)
-    search = MarkSearch(found, _is_mark(found) if body is None else body.is_mark)
+    # a body that was learnt shows where a thing that is alike was taken for the mark; else all such things are found
+    search = MarkSearch(found, None if body is None else body.is_mark)
     before: Picture | None = None
     for picture in film.pictures(_ready(film, body, steady)):
         time.append(picture.time)
@@ -99,11 +97,6 @@ def read_frames(
             progress(picture.index + 1, count)
     shakes = None if steady is None else tuple(moves)
     return Reading(np.array(time), tuple(regions), np.array(decoded), np.array(repeated), shakes, turns)
-
-
-def _is_mark(found: FoundMark) -> Callable[[Region], bool]:
-    """Return whether a region has the mark's size."""
-    return lambda region: found.area_px2 / _LIKE < region.area_px2 < _LIKE * found.area_px2
 
 
 def _ready(film: Film, body: BodyAhead | None, steady: BackgroundMotion | None) -> Callable[[Picture], object] | None:

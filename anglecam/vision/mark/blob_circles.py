@@ -58,26 +58,36 @@ def draw_circles(
     Returns
     -------
     circles : ndarray
-        (n, 3) centre and radius, px.
+        (n, 3) centre and radius, px, in the order in which they were drawn.
     typical : ndarray
         (n, 2) median area, px², and contrast of the drawn blobs.
     """
     poses = _distinct_poses(blobs)
     rng = np.random.default_rng(0)
-    circles, typical = [np.empty((0, 3))], [np.empty((0, 2))]
-    for size, trials in ((2, _TRIALS // _ONE_IN), (3, _TRIALS - _TRIALS // _ONE_IN)):
-        if len(poses) < size:
-            break
-        drawn = poses[rng.integers(0, len(poses), (trials, size))]
+    draws: dict[int, list[NDArray[np.int64]]] = {2: [], 3: []}
+    trials: dict[int, list[int]] = {2: [], 3: []}
+    for trial in range(_TRIALS if len(poses) >= 2 else 0):
+        # a clip that hardly moves has only two distinct poses
+        some = rng.choice(poses, size=min(2 + (trial % _ONE_IN > 0), len(poses)), replace=False)
         if through is not None and len(through):
-            drawn[:, 0] = rng.choice(through, trials)
-        drawn = np.unique(np.sort(drawn, axis=1), axis=0)
-        drawn = drawn[_alike(blobs, drawn)]
+            some[0] = rng.choice(through)
+        draws[len(some)].append(some)
+        trials[len(some)].append(trial)
+    circles, typical, order = [np.empty((0, 3))], [np.empty((0, 2))], [np.empty(0, int)]
+    for size, of_size in draws.items():
+        if not of_size:
+            continue
+        drawn, first = np.unique(np.sort(of_size, axis=1), axis=0, return_index=True)
+        trial_of = np.array(trials[size])[first]
+        alike = _alike(blobs, drawn)
+        drawn, trial_of = drawn[alike], trial_of[alike]
         found = _circles(blobs.plane_px[drawn], hint, longest_px)
         exist = np.isfinite(found).all(axis=1)
         circles.append(found[exist])
         typical.append(np.median([blobs.area[drawn[exist]], blobs.contrast[drawn[exist]]], axis=2).T)
-    return np.concatenate(circles), np.concatenate(typical)
+        order.append(trial_of[exist])
+    as_drawn = np.argsort(np.concatenate(order))
+    return np.concatenate(circles)[as_drawn], np.concatenate(typical)[as_drawn]
 
 
 def _distinct_poses(blobs: Blobs) -> NDArray[np.int64]:

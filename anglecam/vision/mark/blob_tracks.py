@@ -80,9 +80,9 @@ def moving_track(
     scores, members = collect_on_circles(blobs, len(images), circles, typical)
     best: BlobTrack | None = None
     co_motion: dict[tuple[int, int], float] = {}
-    for k in np.argsort(-scores, kind="stable"):
+    for k in range(len(scores)):
         if scores[k] <= (0.0 if best is None else best.score):  # the factor below is at most 1
-            break
+            continue
         taken = members[k][members[k] >= 0]
         if through is not None and not np.isin(taken, through).any():
             continue

@@ -35,11 +35,11 @@ class MarkSearch:
     ----------
     found : FoundMark
         Colour and size, from a sample of frames.
-    is_mark : callable
-        Whether a region may be the mark by its place, for things of its colour and size that are elsewhere.
+    is_mark : callable, optional
+        Whether a region may be the mark by its size and place. Without it, whole pictures are searched.
     """
 
-    def __init__(self, found: FoundMark, is_mark: Callable[[Region], bool]) -> None:
+    def __init__(self, found: FoundMark, is_mark: Callable[[Region], bool] | None = None) -> None:
         self._found, self._is_mark = found, is_mark
         self._areas = SMALLEST_SHARE * found.area_px2, LARGEST_SHARE * found.area_px2
         self._last: Region | None = None
@@ -67,6 +67,8 @@ class MarkSearch:
             mark = self._near(self._last, size, colours_in)  # type: ignore[arg-type]
         jumped = expected and mark is None
         regions = [mark] if mark is not None else self._in_part(_whole(size), colours_in)
+        if self._is_mark is None:
+            return regions
         if mark is None:
             likely = [region for region in regions if self._is_mark(region)]
             mark = likely[0] if len(likely) == 1 and likely[0].whole else None
@@ -92,7 +94,7 @@ class MarkSearch:
         if left >= right or top >= bottom:
             return None
         regions = self._in_part((slice(top, bottom), slice(left, right)), colours_in)
-        if len(regions) != 1 or not regions[0].whole or not self._is_mark(regions[0]):
+        if len(regions) != 1 or not regions[0].whole or self._is_mark is None or not self._is_mark(regions[0]):
             return None
         region = regions[0]
         ends = np.array([left, top]), np.array([right, bottom])

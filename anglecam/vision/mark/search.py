@@ -124,7 +124,7 @@ def _best_mark(
         return None
     best, of = max(found, key=lambda one: one[0].score)
     rivals = [mark.score for mark, _ in found if np.hypot(*(mark.place_px - best.place_px)) > np.sqrt(best.area_px2)]
-    return (replace(best, margin=best.score / max(rivals)) if rivals else best), of
+    return (replace(best, margin=best.score / max(rivals)) if max(rivals, default=0.0) > 0.0 else best), of
 
 
 def _mark_of_cue(

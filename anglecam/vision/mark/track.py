@@ -19,7 +19,7 @@ from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle, fit_circle
 from anglecam.vision.status import AMBIGUOUS, NO_MARK, OCCLUDED
 
-_COARSE_PX = 6.0
+COARSE_PX = 6.0
 """Largest distance of the mark from the coarse circle, px."""
 _MIN_TOLERANCE_PX = 1.5
 """Least tolerance around the fitted circle, px."""
@@ -72,7 +72,7 @@ def follow_mark(candidates: Sequence[Sequence[Region]], time: Floats, found: Fou
     MarkTrack
         A status for every frame, and the circle.
     """
-    tolerance, centre, radius = _COARSE_PX, *(found.circle or (found.place_px, 0.0))
+    tolerance, centre, radius = COARSE_PX, *(found.circle or (found.place_px, 0.0))
     likely = [_near(regions, centre, radius, tolerance, 0.5, 2.0, found.area_px2) for regions in candidates]
     single = [r[0] for r in likely if len(r) == 1 and r[0].whole] or [q for r in likely for q in r]
     if not single:
