@@ -8,22 +8,33 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from statistics import median  # of few values it is faster than NumPy's
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
-from anglecam.vision.mark.blob_circles import MOVED_PX, collect_on_circles, draw_circles
 from anglecam.vision.mark.blobs import Blobs
 from anglecam.vision.mark.co_motion import co_motion_share
+from anglecam.vision.pivot.circle import circle_through
 
+_TOLERANCE_PX = 2.0
+"""Distance from the circle within which a blob belongs to the track; coarse blobs are located this well."""
+_MOVED_PX = 4.0
+"""A path with a smaller extent counts as rest."""
+_HINT_PX = 30.0
+"""Largest error of a hint at the pivot."""
 _SKIN_A = (4.0, 24.0)
 """Range of a* of skin of every complexion; its b* is one to three times its a*."""
-_AT_REST = 0.1
-"""Score of a blob at rest relative to one that travels far."""
+_BENT_PX = 0.5
+"""RMS distance from the best straight line, px, that makes a path distinctly curved."""
+_STRAIGHT_WEIGHT = 0.1
+"""Score of a straight path relative to a curved one. It is not zero, because a mark that hardly moves has no curved
+path."""
 _CO_MOTION_POWER = 2
 """Exponent of the co-motion share in the score."""
+_TRIALS = 600
 
 
 @dataclass(frozen=True)
@@ -40,6 +51,16 @@ class BlobTrack:
     """All blobs."""
     circle: tuple[Floats, float] | None
     """Centre and radius of its path, px; ``None`` at rest."""
+
+
+@dataclass(frozen=True)
+class _PathScore:
+    """The part of a track's score that does not depend on its circle."""
+
+    score: float
+    """Score of a curved path on which all blobs lie exactly."""
+    bent: float
+    """How distinctly the path is curved, 0 to 1."""
 
 
 def moving_track(
@@ -73,20 +94,38 @@ def moving_track(
     BlobTrack or None
         The track with the highest score.
     """
-    if len(images) < 2 or not len(blobs.frame):
+    frames = len(images)
+    poses = _distinct_poses(blobs)
+    if len(poses) < 2 or frames < 2:
         return None
     longest = 1.5 * float(np.hypot(*images[0].shape[:2]))
-    circles, typical = draw_circles(blobs, hint, longest, through)
-    scores, members = collect_on_circles(blobs, len(images), circles, typical)
+    rng = np.random.default_rng(0)
     best: BlobTrack | None = None
+    tried: set[tuple[int, ...]] = set()
     co_motion: dict[tuple[int, int], float] = {}
-    for k in range(len(scores)):
-        if scores[k] <= (0.0 if best is None else best.score):  # the factor below is at most 1
+    path_scores: dict[bytes, _PathScore | None] = {}
+    for trial in range(_TRIALS):
+        # A clip that hardly moves has only two distinct poses.
+        some = rng.choice(poses, size=min(2 + (trial % 4 > 0), len(poses)), replace=False)
+        if through is not None and len(through):
+            some[0] = rng.choice(through)
+        key = tuple(sorted(some))
+        if key in tried or len(set(blobs.frame[some])) < len(some):
             continue
-        taken = members[k][members[k] >= 0]
-        if through is not None and not np.isin(taken, through).any():
+        tried.add(key)
+        size, contrast = blobs.area[some], blobs.contrast[some]
+        if size.max() > 1.6 * size.min() or contrast.max() > 1.5 * contrast.min():
             continue
-        track = BlobTrack(float(scores[k]), level, taken, blobs, (circles[k, :2], float(circles[k, 2])))
+        circle = _circle_of(blobs.plane_px[some], hint, longest)
+        if circle is None:
+            continue
+        least = 0.0 if best is None else best.score
+        typical = float(median(size)), float(median(contrast))
+        track = _collect(blobs, frames, level, circle, typical, least, path_scores)
+        if track is None or (best is not None and track.score <= best.score):
+            continue
+        if through is not None and not np.isin(track.members, through).any():
+            continue
         if on_body:
             ends = _ends(track)
             if ends not in co_motion:
@@ -115,6 +154,109 @@ def _co_motion(track: BlobTrack, ends: tuple[int, int], images: Sequence[Image])
     return co_motion_share(first, second, here, there, here + camera_shift, turn, area)
 
 
+def _distinct_poses(blobs: Blobs) -> NDArray[np.int64]:
+    """Pick one blob of each place and size, so that a long rest does not outweigh a short motion."""
+    key = np.column_stack([np.round(blobs.plane_px / _MOVED_PX), np.round(np.log(blobs.area) / 0.3)])
+    _, first = np.unique(key, axis=0, return_index=True)
+    return first
+
+
+def _circle_of(p: Floats, hint: Floats | None, longest: float) -> tuple[Floats, float] | None:
+    """Fit a circle to two or three places; where they do not determine the radius, take the hint as its centre."""
+    chord = p[:, None, :] - p[None, :, :]
+    if np.hypot(chord[..., 0], chord[..., 1])[~np.eye(len(p), dtype=bool)].min() < _MOVED_PX / 2.0:
+        return None
+    if len(p) == 3:
+        centre, radius = circle_through(p)
+        if hint is None or np.hypot(*(centre - hint)) <= _HINT_PX:
+            return (centre, radius) if 20.0 < radius < longest else None
+    if hint is not None:
+        distance = np.hypot(*(p - hint).T)
+        # An error e of the hint changes the distance by up to e times the angle between the places.
+        open_px = _TOLERANCE_PX + _HINT_PX * float(np.hypot(*np.ptp(p, axis=0))) / max(float(distance.min()), 1.0)
+        return (hint, float(np.median(distance))) if np.ptp(distance) < open_px else None
+    if len(p) == 3:
+        return None
+    # Two places and no hint: on so short a path, any circle through them will do to collect further blobs.
+    way = p[1] - p[0]
+    return p.mean(axis=0) + 5.0 * np.array([-way[1], way[0]]), 5.0 * float(np.hypot(*way))
+
+
+def _collect(
+    blobs: Blobs,
+    frames: int,
+    level: float,
+    circle: tuple[Floats, float],
+    typical: tuple[float, float],
+    least: float,
+    path_scores: dict[bytes, _PathScore | None],
+) -> BlobTrack | None:
+    """Take from each frame the blob that lies on the circle and is most like the typical one; score the track.
+
+    Parameters
+    ----------
+    typical : tuple of float
+        Area, px², and contrast of the sampled blobs.
+    least : float
+        Score that the track must exceed.
+    path_scores : dict
+        Cache of `_path_score` for each choice of blobs; many circles lead to the same choice.
+
+    Returns
+    -------
+    BlobTrack or None
+        ``None`` where too few blobs lie on the circle or the score cannot exceed the least one.
+    """
+    (centre, radius), (size, contrast) = circle, typical
+    off = np.abs(np.hypot(*(blobs.plane_px - centre).T) - radius)
+    unlike = np.abs(np.log(blobs.area / size)) + np.abs(np.log(np.maximum(blobs.contrast, 1e-3) / contrast))
+    close = np.flatnonzero((off < _TOLERANCE_PX) & (unlike < 0.6))
+    if len(close) < 3:
+        return None
+    # The most similar blob of each frame: sort by similarity, keep the first of each frame.
+    close = close[np.argsort(unlike[close] + off[close] / _TOLERANCE_PX)]
+    _, first = np.unique(blobs.frame[close], return_index=True)
+    members = close[first]
+    key = members.tobytes()
+    if key not in path_scores:
+        path_scores[key] = _path_score(blobs, members, frames)
+    path = path_scores[key]
+    if path is None or path.score < least:  # the factors below are at most 1
+        return None
+    off_px = off[members]
+    score = (
+        path.score
+        * np.exp(-np.mean((off_px / _TOLERANCE_PX) ** 2))
+        * (_STRAIGHT_WEIGHT + (1.0 - _STRAIGHT_WEIGHT) * path.bent)
+    )
+    return BlobTrack(score, level, members, blobs, (centre, radius))
+
+
+def _path_score(blobs: Blobs, members: NDArray[np.int64], frames: int) -> _PathScore | None:
+    """Score a choice of blobs, whatever circle they lie on; ``None`` where they are few or do not move."""
+    place = blobs.plane_px[members]
+    extent = float(np.hypot(*np.ptp(place, axis=0)))
+    if extent < _MOVED_PX or len(members) < 3:
+        return None
+    # Motion to and fro on a straight line shows no centre of rotation.
+    bent = 1.0 - np.exp(-((_rms_off_line(place) / _BENT_PX) ** 2))
+    return _PathScore(_score(blobs, members, frames, extent), float(bent))
+
+
+def _rms_off_line(place: Floats) -> float:
+    """Return the RMS distance of places from the straight line that fits them best, px."""
+    return float(np.sqrt(max(np.linalg.eigvalsh(np.cov(place.T))[0], 0.0)))
+
+
+def _score(blobs: Blobs, members: NDArray[np.int64], frames: int, extent: float) -> float:
+    """Score blobs by the share of frames that show them, contrast, constancy of size, size and travel."""
+    size = blobs.area[members]
+    constancy = np.exp(-4.0 * float(np.std(np.log(size))))
+    seen = len(set(blobs.frame[members])) / frames
+    travel = 1.0 - np.exp(-extent / 10.0)
+    return float(seen**2 * median(blobs.contrast[members]) * constancy * median(size) ** 0.25 * (0.1 + travel))
+
+
 def resting_track(
     blobs: Blobs, images: Sequence[Image], level: float, through: NDArray[np.intp] | None = None
 ) -> BlobTrack | None:
@@ -140,21 +282,13 @@ def resting_track(
         return None
     best: BlobTrack | None = None
     for seed in np.flatnonzero(blobs.frame == blobs.frame[0]) if through is None else through:
-        near = np.hypot(*(blobs.plane_px - blobs.plane_px[seed]).T) < MOVED_PX
+        near = np.hypot(*(blobs.plane_px - blobs.plane_px[seed]).T) < _MOVED_PX
         alike = np.abs(np.log(blobs.area / blobs.area[seed])) < 0.4
         members = np.flatnonzero(near & alike)
-        score = _score_at_rest(blobs, members, len(images)) * (0.2 + _skin_share(images[0], blobs, int(seed)))
+        score = _score(blobs, members, len(images), 0.0) * (0.2 + _skin_share(images[0], blobs, int(seed)))
         if best is None or score > best.score:
             best = BlobTrack(score, level, members, blobs, None)
     return best
-
-
-def _score_at_rest(blobs: Blobs, members: NDArray[np.int64], frames: int) -> float:
-    """Score blobs by the share of frames that show them, contrast, constancy of size and size."""
-    size = blobs.area[members]
-    constancy = np.exp(-4.0 * float(np.std(np.log(size))))
-    seen = len(set(blobs.frame[members])) / frames
-    return float(seen**2 * np.median(blobs.contrast[members]) * constancy * np.median(size) ** 0.25 * _AT_REST)
 
 
 def _skin_share(image: Image, blobs: Blobs, seed: int) -> float:

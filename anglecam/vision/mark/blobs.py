@@ -91,9 +91,7 @@ def find_blobs(
     """
     frame, picture_px, plane_px, area, contrast, box, pixel = [], [], [], [], [], [], []
     for t, hue in enumerate(maps):
-        above = (hue > level).astype(np.uint8)
-        # with this algorithm OpenCV takes less than half of its usual time for the statistics
-        _, labels, stats, centres = cv2.connectedComponentsWithStatsWithAlgorithm(above, 8, cv2.CV_32S, cv2.CCL_BBDT)
+        _, labels, stats, centres = cv2.connectedComponentsWithStats((hue > level).astype(np.uint8), connectivity=8)
         sizes = stats[:, cv2.CC_STAT_AREA]
         largest = _MAX_AREA_SHARE * hue.size
         chosen = [k for k in np.argsort(-sizes) if k and _MIN_AREA_PX2 <= sizes[k] <= largest][:_MAX_PER_PICTURE]
@@ -104,9 +102,10 @@ def find_blobs(
             picture_px.append(centres[k])
             plane_px.append(to_plane(t, centres[k]))
             area.append(sizes[k])
-            contrast.append(_upper_quartile(part[part > level]) - usual)
+            contrast.append(np.percentile(part[part > level], 75) - usual)
             box.append(stats[k, :4])
-            pixel.append((x + int((labels[y, x : x + w] == k).argmax()), y))
+            row, column = divmod(int((labels[y : y + h, x : x + w] == k).argmax()), w)
+            pixel.append((x + column, y + row))
     return Blobs(
         np.array(frame, np.int64),
         np.array(picture_px, float).reshape(-1, 2),
@@ -116,15 +115,6 @@ def find_blobs(
         np.array(box, np.int64).reshape(-1, 4),
         np.array(pixel, np.int64).reshape(-1, 2),
     )
-
-
-def _upper_quartile(values: NDArray[Any]) -> float:
-    """Return the upper quartile, which NumPy's `percentile` finds in twenty times the time where values are few."""
-    place = 0.75 * (len(values) - 1)
-    below = int(place)
-    above = min(below + 1, len(values) - 1)
-    low, high = np.partition(values, (below, above))[[below, above]].tolist()
-    return float(low + (place - below) * (high - low))
 
 
 def blobs_of_regions(regions: Sequence[Sequence[Region]]) -> Blobs:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 
 from anglecam.camera.lens import Lens
@@ -53,44 +52,6 @@ class Samples:
     pointed_px: Floats | None = None
     """(4,) box in the first of these pictures in which somebody pointed at the mark: left, top, right, bottom, px; a
     point is a box without extent."""
-
-    def reduced(self, scale: float) -> Samples:
-        """Return the frames at a smaller scale; their plane of motion has the same scale."""
-        small = [cv2.resize(i, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) for i in self.images]
-        stabilised = (
-            small
-            if self.stabilised is self.images
-            else [cv2.resize(i, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) for i in self.stabilised]
-        )
-
-        def in_plane(i: int, region: Region) -> Region:
-            placed = self.in_plane(i, _scaled(region, 1.0 / scale))
-            return _scaled(placed, scale)
-
-        return Samples(
-            images=small,
-            stabilised=stabilised,
-            time=self.time,
-            to_plane=lambda i, point: at_scale(self.to_plane(i, at_scale(point, 1.0 / scale)), scale),
-            in_plane=in_plane,
-            pointed_px=None if self.pointed_px is None else at_scale(self.pointed_px, scale),
-        )
-
-
-def at_scale(places_px: Floats, scale: float) -> Floats:
-    """Return where places lie in a picture that is scaled, px; a pixel's middle has whole coordinates."""
-    return np.asarray((places_px + 0.5) * scale - 0.5)
-
-
-def _scaled(region: Region, scale: float) -> Region:
-    """Return a region of a picture as that of the scaled picture; its contour stays."""
-    return replace(
-        region,
-        centre_px=at_scale(region.centre_px, scale),
-        area_px2=region.area_px2 * scale**2,
-        moments_px2=region.moments_px2 * scale**2,
-        noise_px2=region.noise_px2 * scale**2,
-    )
 
 
 def region_in_plane(region: Region, lens: Lens) -> Region:

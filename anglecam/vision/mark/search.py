@@ -23,18 +23,11 @@ from anglecam.threads import map_in_threads
 from anglecam.vision.mark.blob_tracks import BlobTrack, moving_track, resting_track
 from anglecam.vision.mark.blobs import Blobs, blobs_of_regions, find_blobs
 from anglecam.vision.mark.cues import RED, Cue, declared_cue, moving_cues, pointed_cues
-from anglecam.vision.mark.found_mark import FoundMark, Samples, at_scale
+from anglecam.vision.mark.found_mark import FoundMark, Samples
 from anglecam.vision.mark.learn_colour import MIN_CONTRAST, is_same_colour, learn_colour
 from anglecam.vision.mark.segment import SMALLEST_SHARE, disc, find_regions
 from anglecam.vision.mark.track import MarkTrack, follow_mark
 
-_LONG_SIDE_PX = 640
-"""Larger pictures are searched at this size first."""
-_SEEN_SMALL_PX2 = 100.0
-"""Area of a mark in a reduced picture from which on it is found there as well as in the whole one: eight times that of
-the smallest blob."""
-_CLEAR = 2.0
-"""Ratio of the best score to the next best from which on a mark found in reduced pictures is the one."""
 _LEVEL_SHARES = (0.3, 0.4, 0.5, 0.6, 0.7)
 """Thresholds for blobs, as shares of the way from the picture's usual contrast to its highest."""
 _TOP_PX = 40
@@ -46,8 +39,6 @@ _LEAST_SHARE = 0.3
 """Share of the samples in which the mark must be found again, whole and on its circle."""
 _LARGEST_SHARE = 0.06
 """Share of the picture's area above which a region is no mark: the whole face, where a part of it was found first."""
-_SURELY = 2.0
-"""Area, relative to that, above which a region is not looked at: the wall."""
 _STEADY = 20.0
 """Travel, in units of the scatter around the circle, at which a mark's score is halved. Filmed marks reach hundreds,
 and ten where an undeclared tilt makes the circle an ellipse."""
@@ -77,54 +68,22 @@ def find_mark(samples: Samples, rgb: tuple[int, int, int] | None, near_px: Float
     FoundMark or None
         ``None`` where no colour stands out, or where the only thing that stands out is at rest while other things move.
     """
-    small = _found_small(samples, rgb, near_px)
-    if small is not None:
-        return small
     at_rest = not something_moves(samples.stabilised)
-    found = _best_mark(_cues(samples, rgb, at_rest), samples, near_px, at_rest)
-    return None if found is None else found[0]
-
-
-def _found_small(samples: Samples, rgb: tuple[int, int, int] | None, near_px: Floats | None) -> FoundMark | None:
-    """Find the mark in reduced pictures, and then by its cue in the whole ones.
-
-    ``None`` where the pictures are small, or the mark is: then whatever is too small to be seen in reduced pictures may
-    be the mark. Nor is it decided there between things that are nearly as good.
-    """
-    scale = _LONG_SIDE_PX / max(samples.images[0].shape[:2])
-    if scale >= 1.0:
-        return None
-    small, hint = samples.reduced(scale), None if near_px is None else at_scale(near_px, scale)
-    at_rest = not something_moves(small.stabilised)
-    found = _best_mark(_cues(small, rgb, at_rest), small, hint, at_rest)
-    if found is None or found[0].area_px2 < _SEEN_SMALL_PX2 or found[0].margin < _CLEAR:
-        return None
-    mark, cue = found
-    again = _best_mark([cue], samples, near_px, at_rest)
-    apart = np.inf if again is None else float(np.hypot(*(at_scale(again[0].place_px, scale) - mark.place_px)))
-    return None if again is None or apart > np.sqrt(mark.area_px2) else replace(again[0], margin=mark.margin)
-
-
-def _cues(samples: Samples, rgb: tuple[int, int, int] | None, at_rest: bool) -> list[Cue]:
     if rgb is not None:
-        return [declared_cue(rgb)]
-    if samples.pointed_px is not None:
-        return pointed_cues(samples.images[0], samples.pointed_px)
-    return [RED, *([] if at_rest else moving_cues(samples.stabilised))]
-
-
-def _best_mark(
-    cues: Sequence[Cue], samples: Samples, near_px: Floats | None, at_rest: bool
-) -> tuple[FoundMark, Cue] | None:
-    """Return the mark with the highest score, with its margin, and its cue."""
+        cues = [declared_cue(rgb)]
+    elif samples.pointed_px is not None:
+        cues = pointed_cues(samples.images[0], samples.pointed_px)
+    else:
+        cues = [RED, *([] if at_rest else moving_cues(samples.stabilised))]
     labs = [cv2.cvtColor(image, cv2.COLOR_BGR2LAB) for image in samples.images]
     marks = map_in_threads(lambda cue: _mark_of_cue(cue, samples, labs, near_px, at_rest), cues)
-    found = [(mark, cue) for mark, cue in zip(marks, cues, strict=True) if mark is not None]
-    if not found:
+    found = [mark for mark in marks if mark is not None]
+    ranked = sorted(found, key=lambda mark: -mark.score)
+    if not ranked:
         return None
-    best, of = max(found, key=lambda one: one[0].score)
-    rivals = [mark.score for mark, _ in found if np.hypot(*(mark.place_px - best.place_px)) > np.sqrt(best.area_px2)]
-    return (replace(best, margin=best.score / max(rivals)) if max(rivals, default=0.0) > 0.0 else best), of
+    best = ranked[0]
+    rivals = [mark.score for mark in ranked if np.hypot(*(mark.place_px - best.place_px)) > np.sqrt(best.area_px2)]
+    return replace(best, margin=best.score / rivals[0]) if rivals else best
 
 
 def _mark_of_cue(
@@ -139,9 +98,11 @@ def _mark_of_cue(
     usual, top = _contrast_range(maps, at_rest)
     if top - usual < MIN_CONTRAST:
         return None
-    levels = [usual + share * (top - usual) for share in _LEVEL_SHARES if share * (top - usual) >= MIN_CONTRAST / 2.0]
-    blobs_at = map_in_threads(lambda level: find_blobs(maps, level, usual, samples.to_plane), levels)
-    thresholded = list(zip(levels, blobs_at, strict=True))
+    thresholded = []
+    for share in _LEVEL_SHARES:
+        level = usual + share * (top - usual)
+        if level - usual >= MIN_CONTRAST / 2.0:
+            thresholded.append((level, find_blobs(maps, level, usual, samples.to_plane)))
     # The hint misleads where a slanted view shows the marker on the shaft far from the centre of rotation.
     for hint in (near_px,) if near_px is None else (near_px, None):
         tracks: list[BlobTrack | None] = []
@@ -202,10 +163,11 @@ def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hi
     The threshold that found the blobs may have cut off a part of the mark, or joined it to something. A disc that
     another thing passes in front of seems to move, but its area changes.
     """
-    largest = _LARGEST_SHARE * samples.images[0].shape[0] * samples.images[0].shape[1]
-    areas = SMALLEST_SHARE * mark.area_px2, _SURELY * largest
     regions = [
-        [samples.in_plane(i, region) for region in find_regions(image, mark.model, areas, mark.opening_px)]
+        [
+            samples.in_plane(i, region)
+            for region in find_regions(image, mark.model, (SMALLEST_SHARE * mark.area_px2, np.inf), mark.opening_px)
+        ]
         for i, image in enumerate(samples.images)
     ]
     blobs = blobs_of_regions(regions)
@@ -219,7 +181,7 @@ def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hi
         if track is None or track.circle is None:
             continue
         area, place = _typical(track)
-        if area > largest:
+        if area > _LARGEST_SHARE * samples.images[0].shape[0] * samples.images[0].shape[1]:
             continue
         again = replace(mark, area_px2=area, place_px=place, circle=track.circle)
         followed = follow_mark(regions, samples.time, again)
