@@ -44,7 +44,7 @@ SINGLE = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL"
 PLAIN_LOOP = """
 import sys, cv2
 from pathlib import Path
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from anglecam.measurement.clip import measure_clip
 from anglecam.workflow.clip import write_measurement
 from anglecam.io.session import rig_beside

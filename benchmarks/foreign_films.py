@@ -22,7 +22,7 @@ from foreign.peers import with_ecc, with_lucas_kanade
 
 import anglecam
 from anglecam.errors import InputError
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 
 PEERS: dict[str, Callable[[Iterator[np.ndarray], tuple[int, int, int, int]], np.ndarray]] = {
     "ECC": with_ecc,

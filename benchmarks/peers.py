@@ -34,7 +34,7 @@ from throughput import film
 
 import anglecam
 from anglecam.io.rig import Rig
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from synth.spec.picture import Rig as TrueRig
 
 CAMERAS = {"FFV1": {"codec": "ffv1"}, "MJPEG": {"codec": "mjpeg"}, "H.264 crf 18": {"codec": "h264", "crf": 18}}

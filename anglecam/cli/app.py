@@ -17,6 +17,7 @@ from anglecam import __version__
 from anglecam.cli.batch import batch
 from anglecam.cli.clips import budget, calibrate, measure
 from anglecam.cli.estimator_option import EstimatorCommand
+from anglecam.cli.live import live
 from anglecam.cli.neck import app as neck
 from anglecam.cli.sessions import close, identify
 from anglecam.errors import InputError, RigError, blame
@@ -48,7 +49,7 @@ def _anglecam(
 
 
 app.add_typer(neck, name="neck")
-for _command in (measure, budget, calibrate, identify, close, batch):
+for _command in (measure, live, budget, calibrate, identify, close, batch):
     app.command(cls=EstimatorCommand if _command is identify else None)(_command)
 
 

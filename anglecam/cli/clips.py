@@ -108,7 +108,7 @@ def calibrate(
     from anglecam.camera.calibrate import calibrate_clip
     from anglecam.camera.calibration import write_calibration
     from anglecam.report.calibration_figure import plot_calibration
-    from anglecam.video.film import open_film
+    from anglecam.video.open_film import open_film
 
     try:
         columns, rows = (int(side) for side in board.lower().split("x"))

@@ -71,6 +71,53 @@ class _Filter(ExtendedKalmanFilter):
         self.x = self.predicted
 
 
+class RunningFilter:
+    """The filter between two frames and at a frame; `filter_record` passes it through a recording.
+
+    Parameters
+    ----------
+    mean, covariance, process_variance, measurement_variance
+        As for `filter_record`.
+    command : Command, optional
+        Without it the plant is not driven.
+    interval : float
+        Interval over which ``process_variance`` is added, s.
+    """
+
+    def __init__(
+        self,
+        mean: Floats,
+        covariance: Floats,
+        command: Command | None,
+        interval: float,
+        process_variance: float,
+        measurement_variance: float,
+    ) -> None:
+        states = len(mean)
+        self._command = command or Command(np.zeros(1), np.zeros(1))
+        self._interval = interval
+        self._H = observation_matrix(states)
+        self._drift = process_variance * np.eye(states)
+        self._drift[np.diag(covariance) == 0.0] = 0.0
+        self._drift[5:] = 0.0
+        self.ekf = _Filter(states)
+        """Its ``x``, ``P``, ``F``, ``Q``, ``K``, ``y`` and ``S`` are those of the last frame."""
+        self.ekf.x, self.ekf.P = mean.copy(), covariance.copy()
+        self.ekf.R = np.array([[measurement_variance]])
+
+    def predict(self, before: float, time: float, about: Floats | None = None) -> None:
+        """Predict the state at ``time`` from that at ``before``, s; ``about`` is the state to linearise about."""
+        origin = self.ekf.x if about is None else about
+        reached, self.ekf.F = _advance(origin, np.array([before, time]), self._command)
+        self.ekf.Q = (time - before) / self._interval * self._drift
+        self.ekf.predicted = reached + self.ekf.F @ (self.ekf.x - origin)
+        self.ekf.predict()
+
+    def update(self, angle: float) -> None:
+        """Correct the state by a measured angle, rad."""
+        self.ekf.update(np.array([angle]), HJacobian=lambda _: self._H, Hx=lambda x: self._H @ x)
+
+
 def filter_record(
     record: Record,
     mean: Floats,
@@ -104,15 +151,8 @@ def filter_record(
         For the whole recording; not finite from the frame at which the estimate diverges.
     """
     n, s = len(record.time), len(mean)
-    command = record.command or Command(np.zeros(1), np.zeros(1))
-    H = observation_matrix(s)
-    drift = process_variance * np.eye(s)
-    drift[np.diag(covariance) == 0.0] = 0.0
-    drift[5:] = 0.0
-    gaps = np.diff(record.time, prepend=record.time[0]) / record.interval
-    ekf = _Filter(s)
-    ekf.x, ekf.P = mean.copy(), covariance.copy()
-    ekf.R = np.array([[measurement_variance]])
+    running = RunningFilter(mean, covariance, record.command, record.interval, process_variance, measurement_variance)
+    ekf = running.ekf
     state, prior, gain = np.empty((n, s)), np.empty((n, s)), np.empty((n, s))
     posterior, prior_covariance = np.empty((n, s, s)), np.empty((n, s, s))
     transition, process = np.zeros((n, s, s)), np.zeros((n, s, s))
@@ -121,14 +161,10 @@ def filter_record(
     innovation, variance = np.empty(n), np.empty(n)
     for i in range(n):
         if i > 0:
-            origin = ekf.x if about is None else about[i - 1]
-            reached, F = _advance(origin, record.time[i - 1 : i + 1], command)
-            transition[i], process[i] = F, gaps[i] * drift
-            ekf.F, ekf.Q = transition[i], process[i]
-            ekf.predicted = reached + F @ (ekf.x - origin)
-            ekf.predict()
+            running.predict(record.time[i - 1], record.time[i], None if about is None else about[i - 1])
+            transition[i], process[i] = ekf.F, ekf.Q
         prior[i], prior_covariance[i] = ekf.x, ekf.P
-        ekf.update(record.angle[i : i + 1], HJacobian=lambda _: H, Hx=lambda x: H @ x)
+        running.update(record.angle[i])
         state[i], posterior[i], gain[i] = ekf.x, ekf.P, ekf.K[:, 0]
         innovation[i], variance[i] = ekf.y[0], ekf.S[0, 0]
     return Filtered(

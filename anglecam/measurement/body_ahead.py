@@ -10,7 +10,7 @@ rotation in a frame depends on what only the whole film shows.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -21,23 +21,22 @@ from anglecam.data.series import OK
 from anglecam.data.typing import Flags, Floats, Image
 from anglecam.io.rig import Rig
 from anglecam.measurement.body_learning import FEWEST, learn_from_frames, spread_out
+from anglecam.measurement.mark_path import MarkPath
 from anglecam.measurement.pivot import find_pivot
 from anglecam.threads import Backlog
 from anglecam.video.film import Film
 from anglecam.video.picture import Picture
 from anglecam.vision.mark.found_mark import FoundMark, region_in_plane
 from anglecam.vision.mark.segment import LARGEST_SHARE, SMALLEST_SHARE, Region, find_regions
-from anglecam.vision.mark.track import COARSE_PX, follow_mark
+from anglecam.vision.mark.track import follow_mark
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.registration.tiles import FrameView, motion_plane
 from anglecam.vision.registration.turn import NO_TURN, BodyAppearance, TurnEstimate, find_turn
 
-_LESS_THAN_A_TURN = 5.0
+LESS_THAN_A_TURN = 5.0
 """Largest range of directions in such frames, rad. Between frames far apart, whole turns are not counted."""
 _BASIN_PX = 1.0
 """Distance at the body's middle, px, between two angles from which the search ends at the same one."""
-_LIKE = 2.0
-"""Largest ratio of the mark's area to that in other frames."""
 
 
 @dataclass(frozen=True)
@@ -47,26 +46,25 @@ class BodyAhead:
     appearance: BodyAppearance
     pivot: PivotEstimate
     """By these frames."""
-    circle: tuple[Floats, float]
-    """Centre and radius of the mark's path in the plane of motion, px."""
-    area_px2: float
-    """The mark's."""
-    lens: Lens
+    path: MarkPath
+    """Of the mark, by these frames."""
     middle: float
     """Middle of the directions in these frames, rad: what is learnt of the light depends on the direction."""
     poses: int
     """Number of frames from which it was learnt."""
+    zero: float = 0.0
+    """Direction of the mark at which the rotation is zero, rad."""
 
-    def is_mark(self, region: Region) -> bool:
-        """Return whether a region may be the mark by its place and size."""
-        centre, radius = self.circle
-        off = abs(float(np.hypot(*(self.lens.rectify(region.centre_px) - centre))) - radius)
-        return off < COARSE_PX and self.area_px2 / _LIKE < region.area_px2 < _LIKE * self.area_px2
+    def begin(self, regions: Sequence[Region]) -> float:
+        """Return the direction from the pivot to the only region that may be the mark.
 
-    def turn_of(self, region: Region) -> float:
-        """Return the direction from the pivot to a region, counter-clockwise as seen, rad, near those of its frames."""
-        x, y = self.lens.rectify(region.centre_px) - self.pivot.centre_px
-        turn = float(np.arctan2(-y, x))
+        It is counter-clockwise as seen, rad, near the directions in the frames from which the body was learnt; it is
+        NaN where no region or more than one may be the mark.
+        """
+        marks = self.path.marks(regions)
+        if len(marks) != 1:
+            return np.nan
+        turn = self.path.direction(marks[0], self.pivot.centre_px) - self.zero
         return turn + 2.0 * np.pi * round((self.middle - turn) / (2.0 * np.pi))
 
 
@@ -108,7 +106,7 @@ def learn_body_ahead(film: Film, found: FoundMark, images: Sequence[Image], rig:
     arm = np.array([mark.centre_px for mark in marks]) - pivot.centre_px
     turn = np.full(len(time), np.nan)
     turn[known] = np.unwrap(np.arctan2(-arm[:, 1], arm[:, 0]))
-    if np.ptp(turn[known]) > _LESS_THAN_A_TURN:
+    if np.ptp(turn[known]) > LESS_THAN_A_TURN:
         return None
     wanted = spread_out(turn, known, film)
     views = [
@@ -122,42 +120,23 @@ def learn_body_ahead(film: Film, found: FoundMark, images: Sequence[Image], rig:
     return BodyAhead(
         appearance=appearance,
         pivot=pivot,
-        circle=(track.circle.centre_px, track.circle.radius_px),
-        area_px2=float(np.median([mark.area_px2 for mark in marks])),
-        lens=lens,
+        path=MarkPath(
+            track.circle.centre_px, track.circle.radius_px, float(np.median([mark.area_px2 for mark in marks])), lens
+        ),
         middle=float(np.min(turn[known]) + np.max(turn[known])) / 2.0,
         poses=len(views),
     )
 
 
+@dataclass(frozen=True)
 class TurnsAhead:
-    """The rotation of such a body, frame by frame.
+    """The rotation of such a body in the frames of a film."""
 
-    Parameters
-    ----------
-    body : BodyAhead
-        As it was learnt.
-    """
-
-    def __init__(self, body: BodyAhead) -> None:
-        self.body = body
-        self.begun: list[float] = []
-        """Angle at which the search in each frame began, rad; NaN where there was none."""
-        self._found: Backlog[TurnEstimate] = Backlog()
-
-    def add(self, film: Film, picture: Picture, before: Picture | None, regions: Sequence[Region]) -> None:
-        """Find the rotation in the next frame, from the only region that may be the mark."""
-        marks = [region for region in regions if self.body.is_mark(region)]
-        image = _registered(film, picture)
-        if image is None or len(marks) != 1:
-            self.begun.append(np.nan)
-            self._found.add(lambda: NO_TURN)
-            return
-        begin = self.body.turn_of(marks[0])
-        view = FrameView(image, begin, self.body.appearance.pivot_px, 0.0, 0.0)
-        copied = None if before is None or not picture.predicted else _registered(film, before)
-        self.begun.append(begin)
-        self._found.add(partial(find_turn, self.body.appearance, view, copied))
+    body: BodyAhead
+    begun: Sequence[float]
+    """Angle at which the search in each frame began, rad; NaN where there was none."""
+    found: Sequence[TurnEstimate]
+    """Of each frame."""
 
     def in_turns_of(self, turn: Floats) -> tuple[list[TurnEstimate], Flags, float]:
         """Return the rotations counted in whole turns as another measurement of the same film counts them.
@@ -187,9 +166,40 @@ class TurnsAhead:
         whole = np.where(both, np.round((turn + reference - self.begun) / (2.0 * np.pi)), 0.0) * 2.0 * np.pi
         found = [
             replace(one, turn=one.turn + k) if ends_there else NO_TURN
-            for one, k, ends_there in zip(self._found.results(), whole.tolist(), settled, strict=True)
+            for one, k, ends_there in zip(self.found, whole.tolist(), settled, strict=True)
         ]
         return found, settled, reference
+
+
+def turn_ahead(
+    body: BodyAhead, film: Film, picture: Picture, before: Picture | None, begin: float
+) -> Callable[[], TurnEstimate]:
+    """Return the work of finding the rotation in a frame.
+
+    Parameters
+    ----------
+    body : BodyAhead
+        As it was learnt.
+    film : Film
+        The clip.
+    picture : Picture
+        The frame.
+    before : Picture, optional
+        The previous frame, from which a codec may have copied.
+    begin : float
+        Angle at which the search begins, rad, from `BodyAhead.begin`; NaN where there is none.
+
+    Returns
+    -------
+    callable
+        Its result has a rotation of NaN where the body is not seen.
+    """
+    image = None if np.isnan(begin) else _registered(film, picture)
+    if image is None:
+        return lambda: NO_TURN
+    view = FrameView(image, begin, body.appearance.pivot_px, 0.0, 0.0)
+    copied = None if before is None or not picture.predicted else _registered(film, before)
+    return partial(find_turn, body.appearance, view, copied)
 
 
 def _wrapped(angle: Floats) -> Floats:

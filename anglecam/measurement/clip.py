@@ -13,7 +13,7 @@ from anglecam.camera.shutter import rig_as_shown
 from anglecam.data.camera_evidence import CameraEvidence
 from anglecam.data.command import Command
 from anglecam.data.series import OK, AngleSeries
-from anglecam.data.typing import Floats
+from anglecam.data.typing import Flags, Floats
 from anglecam.io.rig import Rig
 from anglecam.io.session import recording_name
 from anglecam.measurement.angles import Angles
@@ -22,6 +22,7 @@ from anglecam.measurement.clock_sync import DARK, note_on, offset_of, on_clip_cl
 from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.duplicates import duplicate_frames
 from anglecam.measurement.followed import Followed, follow_mark_or_body
+from anglecam.measurement.live_reading import LiveReading
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.measurement.trust import why_elsewhere, why_few, why_not_rigid
 from anglecam.video.film import Film
@@ -39,6 +40,8 @@ class Measurement:
     """Result of the coarse pass."""
     angles: Angles
     """The measured frames, and the contributions to their uncertainty."""
+    ok: Flags
+    """(frames,) the measured frames; repeated ones count."""
     why_coarse: str | None
     """Cause why the angles are those of the mark alone; ``None`` where they are those of the whole body."""
     zero: str | None
@@ -91,7 +94,12 @@ class Measurement:
 
 
 def measure_clip(
-    film: Film, rig: Rig, command: Command | None = None, *, progress: Callable[[int, int], None] | None = None
+    film: Film,
+    rig: Rig,
+    command: Command | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+    live: LiveReading | None = None,
 ) -> Measurement:
     """Measure the angle in every frame of a clip.
 
@@ -105,6 +113,8 @@ def measure_clip(
         Its first change ends the rest that defines neutral. Where the rig declares a lamp, the lamp dates that change.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
+    live : LiveReading, optional
+        What was found while the film was recorded; that is not searched again.
 
     Returns
     -------
@@ -124,7 +134,7 @@ def measure_clip(
     camera = hold_camera(film)
     held = camera.film
     rig = as_seen_at_rest(rig, held)
-    followed = follow_mark_or_body(camera, rig, command, progress)
+    followed = follow_mark_or_body(camera, rig, command, progress, live)
     detections = _as_filmed(followed.detections, held)
     series = _series(held, rig, followed, detections.status, lamp)
     zero = why_zero_is_elsewhere(rig, command, followed.time[followed.ok])
@@ -135,7 +145,18 @@ def measure_clip(
     if followed.angles.registered is None:
         other = why_elsewhere(followed.detections, rig) or why_not_rigid(followed.detections, followed.ok)
     interlaced = _interlaced(film)
-    return Measurement(series, detections, followed.angles, followed.why_coarse, zero, clock, interlaced, few, other)
+    return Measurement(
+        series,
+        detections,
+        followed.angles,
+        followed.ok,
+        followed.why_coarse,
+        zero,
+        clock,
+        interlaced,
+        few,
+        other,
+    )
 
 
 def _interlaced(film: Film) -> str | None:

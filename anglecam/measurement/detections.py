@@ -17,6 +17,7 @@ from anglecam.errors import InputError
 from anglecam.io.rig import RigMark
 from anglecam.measurement.body_ahead import TurnsAhead
 from anglecam.video.film import Film, Frame
+from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle
 from anglecam.vision.pivot.estimate import PivotEstimate
@@ -73,6 +74,8 @@ class Detections:
     """Messages to the user, a line each."""
     turns: TurnsAhead | None = None
     """Rotation of the body, where it was learnt before all frames were read."""
+    found: FoundMark | None = None
+    """The mark by a sample of frames; ``None`` where a body is followed without one."""
 
     @property
     def places_px(self) -> Floats:

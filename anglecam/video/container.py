@@ -37,6 +37,13 @@ _ONE_AT_A_TIME = threading.Lock()
 _CONTAINERS = "avi,matroska,webm,mov,mp4,asf,flv,mpegts,mpeg,ogg,nut,mxf,gif"
 """FFmpeg's names of the containers that store time stamps and refer to no other file."""
 
+_STREAMS = f"{_CONTAINERS},mjpeg,mpjpeg,h264,hevc,m4v,ivf,yuv4mpegpipe,rtsp,rtp,sdp"
+"""The same for pipes and network streams."""
+_PROTOCOLS = "pipe,file,rtsp,rtp,udp,tcp,http,https,tls,crypto"
+"""FFmpeg's names of the protocols of pipes and network streams."""
+_PATIENCE_S = (20.0, 20.0)
+"""Longest waits for a stream to open, and for its next packet, s."""
+
 
 def open_container(path: Path) -> av.container.InputContainer:
     """Open a film whose first picture stream can be decoded within the limits.
@@ -79,6 +86,50 @@ def open_container(path: Path) -> av.container.InputContainer:
     if fault is not None:
         container.close()
         raise InputError(f"{path}: {fault}")
+    container.streams.video[0].codec_context.options = limits
+    return container
+
+
+def open_stream(address: str, name: str, form: str | None = None) -> av.container.InputContainer:
+    """Open a camera, a pipe or a network stream whose pictures can be decoded within the limits.
+
+    Parameters
+    ----------
+    address : str
+        Of the device, the pipe or the stream, as FFmpeg writes it.
+    name : str
+        For messages.
+    form : str, optional
+        FFmpeg's name of the device's kind.
+
+    Returns
+    -------
+    InputContainer
+        As from `open_container`.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be opened, does not answer, or is beyond the limits: one line with the name and the cause.
+    """
+    limits = {"max_pixels": str(MOST_PIXELS)}
+    tries = [{"input_format": "mjpeg"}, {}]  # a camera compresses its pictures if it can
+    if form is None:
+        tries = [{"format_whitelist": _STREAMS, "protocol_whitelist": _PROTOCOLS}]
+    for own in tries:
+        try:
+            container = av.open(
+                address, format=form, options=limits | own, metadata_errors="replace", timeout=_PATIENCE_S
+            )
+            break
+        except (av.error.FFmpegError, OSError, ValueError) as error:
+            cause = getattr(error, "strerror", None) or "unknown format"
+    else:
+        raise InputError(f"{name}: cannot be opened ({cause})")
+    fault = _fault(container)
+    if fault is not None:
+        container.close()
+        raise InputError(f"{name}: {fault}")
     container.streams.video[0].codec_context.options = limits
     return container
 

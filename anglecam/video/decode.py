@@ -55,9 +55,18 @@ def decode(path: Path, wants: Wants | None = None) -> Iterator[Row]:
         yield from decode_container(path, container, wants)
 
 
-def decode_container(path: Path, container: av.container.InputContainer, wants: Wants | None = None) -> Iterator[Row]:
-    """Yield the rows of a film that is open, and of which nothing was decoded; see `decode`."""
+def decode_container(
+    path: Path,
+    container: av.container.InputContainer,
+    wants: Wants | None = None,
+    packets: Iterator[av.Packet] | None = None,
+) -> Iterator[Row]:
+    """Yield the rows of a film that is open, and of which nothing was decoded; see `decode`.
+
+    ``packets`` are those of its first video stream, where something else takes them from the container.
+    """
     stream = container.streams.video[0]
+    packets = container.demux(stream) if packets is None else packets
     decoder = stream.codec_context
     decoder.thread_type = "SLICE"
     decoder.thread_count = native_threads()
@@ -78,7 +87,7 @@ def decode_container(path: Path, container: av.container.InputContainer, wants: 
         last = stamp
         return stamp * base, picture
 
-    for number, (packet, pictures) in enumerate(_packets(path, container, stream, is_avi, wants)):
+    for number, (packet, pictures) in enumerate(_decoded_packets(path, packets, is_avi, wants)):
         if number > MOST_FRAMES:
             raise InputError(f"{path}: more than {MOST_FRAMES:,} frames are not read")
         if not packet.is_discard:
@@ -131,15 +140,10 @@ class OneSize:
         return size == self._size
 
 
-def _packets(
-    path: Path,
-    container: av.container.InputContainer,
-    stream: av.VideoStream,
-    number_them: bool,
-    wants: Wants | None,
+def _decoded_packets(
+    path: Path, packets: Iterator[av.Packet], number_them: bool, wants: Wants | None
 ) -> Iterator[tuple[av.Packet, list[av.VideoFrame] | None]]:
     """Yield each packet with the pictures decoded from it, ``None`` where it is not wanted or cannot be decoded."""
-    packets = container.demux(stream)
     row = -1
     while True:
         try:

@@ -10,26 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Set
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 
-import av
 import numpy as np
 
 from anglecam.data.typing import Floats, Image
-from anglecam.errors import RigError
-from anglecam.io.numbered_images import find_numbered_images
-from anglecam.io.rig import RigFrames
 from anglecam.threads import native_threads
-from anglecam.video.container import open_container
-from anglecam.video.decode import INTRA_CODECS, Row, decode, decode_container
-from anglecam.video.display import Display, read_display
-from anglecam.video.fields import STILL_CODECS, is_bottom_first
-from anglecam.video.film_rows import FilmRows, picture_bytes
-from anglecam.video.images import decode_images
+from anglecam.video.decode import Row
+from anglecam.video.display import Display
+from anglecam.video.film_rows import FilmRows
 from anglecam.video.picture import Picture
 from anglecam.video.read_ahead import read_ahead
-from anglecam.video.truncation import is_cut_short
 
 
 @dataclass(frozen=True)
@@ -60,7 +51,7 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """A film and what its container declares; made by `open_film`."""
+    """A film and what its container declares; made by `anglecam.video.open_film`."""
 
     path: Path
     """The file, or the folder of numbered pictures."""
@@ -216,87 +207,3 @@ class Film:
             return None
         of = f" of {self.declared_frames}" if self.declared_frames else ""
         return f"truncated: {sample.decoded}{of} frames could be read"
-
-
-def open_film(path: Path, frames: RigFrames | None = None) -> Film:
-    """Open a film, read what its container declares and decode its first picture, which says how it is shown.
-
-    Parameters
-    ----------
-    path : Path
-        The file, or a folder of numbered pictures.
-    frames : RigFrames, optional
-        Which frames are measured, and how fast numbered pictures follow each other.
-
-    Returns
-    -------
-    Film
-        Of the wanted frames.
-
-    Raises
-    ------
-    InputError
-        As `anglecam.video.decode.decode`, and where the picture is shown turned by another angle than a multiple of
-        90°, or stretched beyond the limits.
-    RigError
-        Where numbered pictures have no declared rate, or a film has one besides its time stamps.
-    """
-    wanted = RigFrames() if frames is None else frames
-    if path.is_dir():
-        return _open_images(path, wanted)
-    if wanted.rate_hz is not None:
-        raise RigError(f"{path}: frames: {{rate_hz}} is for numbered pictures; a film has time stamps of its own")
-    with open_container(path) as container:
-        stream = container.streams.video[0]
-        codec = stream.codec_context.name
-        size = stream.width, stream.height
-        coarse_colour = _has_coarse_colour(stream.codec_context.format)
-        declared = _declared_frames(container, stream)
-        picture = _first_picture(decode_container(path, container))
-        return Film(
-            path=path,
-            display=Display(size) if picture is None else read_display(path, picture, stream.sample_aspect_ratio),
-            declared_frames=declared,
-            codec=codec,
-            coarse_colour=coarse_colour,
-            cut_short=is_cut_short(path),
-            rows=FilmRows(
-                path, partial(decode, path), wanted, codec in INTRA_CODECS, declared * picture_bytes(picture)
-            ),
-            bottom_first=None if codec in STILL_CODECS else is_bottom_first(stream.codec_context.field_order),
-        )
-
-
-def _open_images(folder: Path, wanted: RigFrames) -> Film:
-    images = find_numbered_images(folder)
-    if wanted.rate_hz is None:
-        raise RigError(f"{folder}: numbered pictures have no times: declare frames: {{rate_hz: …}} in rig.yaml")
-    decode_all = partial(decode_images, folder, images, wanted.rate_hz)
-    picture = _first_picture(decode_all(None))
-    assert picture is not None  # else its decoder has raised
-    return Film(
-        path=folder,
-        display=read_display(folder, picture, None),
-        declared_frames=0,
-        codec=images[min(images)].suffix[1:].lower(),
-        coarse_colour=_has_coarse_colour(picture.format),
-        cut_short=False,
-        rows=FilmRows(folder, decode_all, wanted, True),
-    )
-
-
-def _first_picture(rows: Iterator[Row]) -> av.VideoFrame | None:
-    return next((picture for _, picture in rows if picture is not None), None)
-
-
-def _declared_frames(container: av.container.InputContainer, stream: av.VideoStream) -> int:
-    """Return the container's count of frames; where an MP4 has an edit list, without those that it leaves out."""
-    index = stream.index_entries
-    if not container.format.name.startswith("mov") or not len(index):
-        return stream.frames
-    return sum(not entry.is_discard for entry in index)
-
-
-def _has_coarse_colour(form: av.VideoFormat | None) -> bool:
-    planes = form.components if form else ()
-    return any(plane.width < planes[0].width for plane in planes)

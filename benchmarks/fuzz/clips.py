@@ -206,7 +206,7 @@ def readers() -> dict[str, Reader]:
     """Return the reader of clips."""
     from anglecam.io.rig import Rig
     from anglecam.measurement.clip import measure_clip
-    from anglecam.video.film import open_film
+    from anglecam.video.open_film import open_film
 
     cv2.setNumThreads(1)
     av.logging.set_level(av.logging.PANIC)

@@ -19,7 +19,7 @@ from anglecam.batch.run import Options, run_batch
 from anglecam.errors import RigError
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import measure_clip
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from anglecam.workflow.clip import write_measurement
 from support.tiny import FRAMES, SIZE, results, tiny_clip, tiny_lab
 from support.tiny import run_batch as run

@@ -15,7 +15,7 @@ from anglecam.io.rig import read_rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.registration_pass import Registered, register_clip
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from support.drawn import Look, Recording, draw_session
 
 LOST = slice(5, None, 9)

@@ -12,7 +12,7 @@ from anglecam.camera.chessboard import find_corners
 from anglecam.camera.lens import Lens
 from anglecam.errors import InputError
 from anglecam.report.calibration_figure import plot_calibration
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from support.board import BoardCamera, board_picture, film_board, poses, write_pictures
 
 CAMERA = BoardCamera(k1=-0.15)

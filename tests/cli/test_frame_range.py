@@ -14,7 +14,7 @@ from anglecam.errors import RigError
 from anglecam.io.netcdf_parquet import read_netcdf
 from anglecam.io.rig import read_rig
 from anglecam.io.series_csv import read_series
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from support import things
 
 SWING_DEG = 20.0 * np.sin(np.arange(60) / 5.0)

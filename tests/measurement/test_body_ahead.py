@@ -10,7 +10,7 @@ from anglecam.io.rig import Rig, RigPivot
 from anglecam.measurement import registration_pass
 from anglecam.measurement.clip import measure_clip
 from anglecam.video import film_rows
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from support.drawn import Look, draw_frames, write_clip
 
 N = 150

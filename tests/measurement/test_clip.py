@@ -15,7 +15,7 @@ from anglecam.io.rig import Rig, RigMark, RigPivot, read_rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.sigma import angle_sigma, place_errors, worst_case, worst_case_both_ends
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from support import broken
 from support.drawn import Look, Recording, draw_frames, draw_session, write_clip
 

@@ -20,7 +20,7 @@ from anglecam.io.session import read_session, rig_beside
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.clock_sync import AGREED, offsets
 from anglecam.models.plant import Plant
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from anglecam.vision.image.lamp import lit_between
 from anglecam.workflow.session import measure_session
 from synth.session import render

@@ -8,7 +8,7 @@ import pytest
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import measure_clip
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from support import things
 
 SIZE = (480, 360)

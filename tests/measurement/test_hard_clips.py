@@ -15,7 +15,7 @@ from anglecam.camera.calibration import Calibration, write_calibration
 from anglecam.io.command_csv import read_command
 from anglecam.io.rig import read_rig
 from anglecam.measurement.clip import Measurement, measure_clip
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from synth.motion import move
 from synth.session import render
 from synth.spec import read_spec

@@ -13,7 +13,7 @@ from anglecam.io.rig import Rig, RigPivot
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.rigid_body_pass import detect_rigid_body
 from anglecam.measurement.trust import why_few, why_not_rigid
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 
 SIZE = (240, 180)
 TIME = np.arange(45) / 30.0

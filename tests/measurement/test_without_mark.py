@@ -7,7 +7,7 @@ import pytest
 from anglecam.io.rig import Rig
 from anglecam.measurement import mark_pass
 from anglecam.measurement.clip import measure_clip
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from support import things
 
 SWING = 20.0 * np.sin(2 * np.pi * np.arange(60) / 40.0)

@@ -15,7 +15,7 @@ from anglecam.io.rig import read_rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.report.budget_page import budget_table, write_budget
 from anglecam.report.figure8 import touching_point
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from support.drawn import Look, Recording, draw_session
 
 

@@ -9,7 +9,7 @@ import pytest
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig, RigMark, RigPivot
 from anglecam.measurement.clip import measure_clip
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from support import things
 from support.encoded import encode, trim
 

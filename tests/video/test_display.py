@@ -13,7 +13,7 @@ from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Rig, RigCamera, RigMark, RigPivot
 from anglecam.measurement.clip import measure_clip
 from anglecam.video.display import Display
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from support import things
 from support.encoded import LOSSLESS, encode
 

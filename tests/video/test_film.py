@@ -17,8 +17,9 @@ from anglecam.video import decode as decode_module
 from anglecam.video import film_rows
 from anglecam.video import picture as picture_module
 from anglecam.video.display import Display
-from anglecam.video.film import Film, open_film
+from anglecam.video.film import Film
 from anglecam.video.film_rows import FilmRows
+from anglecam.video.open_film import open_film
 from support.drawn import Look, draw_frames, write_clip
 
 BYTES = 1000

@@ -10,7 +10,7 @@ import pytest
 
 from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from anglecam.video.overlay import write_overlay
 from support import broken
 

@@ -11,7 +11,7 @@ import pytest
 
 from anglecam.errors import InputError, RigError
 from anglecam.io.rig import RigFrames
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from anglecam.workflow.clip import measure_source, open_source
 from support import things
 from support.encoded import INTERLACED_DCT

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from anglecam.errors import InputError
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 
 
 def _film(path, sizes=((64, 48),) * 12, stamps=None, codec="mjpeg", container_format=None, **tags) -> Path:

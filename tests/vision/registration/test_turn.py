@@ -6,7 +6,7 @@ import yaml
 
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import measure_clip
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from synth.session import render
 
 SPEC = {

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import yaml
 
-from anglecam.video.film import Frame, open_film
+from anglecam.video.film import Frame
+from anglecam.video.open_film import open_film
 from anglecam.vision.rigid_body.follow import follow_rigid_body
 from support.drawn import Look, draw_frames
 from support.real import REAL

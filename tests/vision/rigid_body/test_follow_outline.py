@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from anglecam.vision.image.transforms import rotate_each, turn_of
 from anglecam.vision.rigid_body.follow_outline import follow_outline, learn_outline
 from anglecam.vision.rigid_body.outline import find_outline, match_outline, slopes

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import yaml
 
-from anglecam.video.film import open_film
+from anglecam.video.open_film import open_film
 from anglecam.vision.stabilise.background_motion import CameraMove
 from anglecam.vision.stabilise.learn import learn_background
 from anglecam.vision.stabilise.scenery import find_scenery

@@ -1,0 +1,166 @@
+"""The command `live`: measure while filming."""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from anglecam.cli.options import Out, RigFile
+from anglecam.cli.progress import end, progress_bars
+from anglecam.data.series import OK
+from anglecam.errors import AnglecamError, InputError, printable
+from anglecam.io.live_csv import LiveRow
+from anglecam.io.rig import Rig, read_rig
+from anglecam.terminal import errors, make_folder, screen
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from anglecam.video.live_source import LiveSource
+    from anglecam.workflow.live import LiveResult
+
+_TERMINAL_S, _LINES_S = 0.1, 1.0
+"""Time between two figures on a terminal, and between two lines elsewhere."""
+_RECENT = 300
+"""Frames of which the latency is shown."""
+
+
+def live(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="SOURCE",
+            help="Number of a camera, a film to be played at its rate, - or a named pipe, or the address of a stream.",
+        ),
+    ],
+    out: Out,
+    rig: RigFile = None,
+    command: Annotated[
+        Path | None,
+        typer.Option("--command", help="Command file on the source's clock; default: the one beside a film."),
+    ] = None,
+) -> None:
+    """Measure while filming: each angle as it comes, the recording, and the files that `measure` makes of it."""
+    from anglecam.io.command_csv import read_command
+    from anglecam.io.session import command_beside, rig_beside
+    from anglecam.video.live_source import open_live
+    from anglecam.workflow.live import measure_live
+
+    try:
+        film = Path(source) if Path(source).is_file() else None
+        declared = read_rig(rig) if rig else Rig() if film is None else rig_beside(film)
+        beside = None if film is None else command_beside(film)
+        commanded = beside if command is None else read_command(command)
+        make_folder(out)
+        opened = open_live(source)
+        with progress_bars() as bars, _stopped_by_signals(opened):
+            display = _Display(bars)
+            result = measure_live(opened, out, declared, commanded, display.show, display.progress)
+    except AnglecamError as problem:
+        end([problem])
+        return
+    _report(result)
+    doubt = result.measurement.doubt
+    end([InputError(f"{result.film}: {doubt}")] if doubt else [])
+
+
+class _Display:
+    """Shows the last angle: on a terminal in one line that changes, elsewhere a line every second."""
+
+    def __init__(self, bars: Progress) -> None:
+        self._bars, self._on_terminal = bars, errors.is_terminal
+        self._bar = bars.add_task("learning", total=None)
+        self._next = 0.0
+        self._latencies: deque[float] = deque(maxlen=_RECENT)
+        self._last: LiveRow | None = None
+        self._late = 0
+        self._cause: str | None = None
+
+    def show(self, row: LiveRow, cause: str | None) -> None:
+        """Take a frame; show it if it is time."""
+        self._late += row.status == "late"
+        if not np.isnan(row.latency):
+            self._latencies.append(row.latency)
+        if cause is not None and cause != self._cause:
+            self._cause = cause
+            errors.print(f"not learnt yet: {printable(cause)}")
+        now = time.monotonic()
+        if now < self._next:
+            return
+        self._next = now + (_TERMINAL_S if self._on_terminal else _LINES_S)
+        line = _line(row, self._latencies, self._late)
+        if self._on_terminal:
+            self._bars.update(self._bar, description=line)
+        else:
+            screen.print(line, soft_wrap=True, highlight=False)
+
+    def progress(self, done: int, total: int) -> None:
+        """Show how far the recording is measured."""
+        self._bars.update(self._bar, description="recording", completed=done, total=total or None)
+
+
+def _line(row: LiveRow, latencies: deque[float], late: int) -> str:
+    """Return what is shown of a frame."""
+    parts = [f"{row.time:8.2f} s"]
+    if row.status == OK:
+        parts.append(f"angle {np.degrees(row.angle):8.3f} ± {np.degrees(row.sigma):.3f}°")
+    else:
+        parts.append(row.status)
+    if latencies:
+        parts.append(f"latency {1e3 * latencies[-1]:.0f} ms, 95 %: {1e3 * np.quantile(latencies, 0.95):.0f} ms")
+        parts.append(f"late {late}")
+    for name, value, sigma in zip("abc", row.parameters, row.parameter_sigmas, strict=True):
+        if np.isfinite(value) and value != 0.0:
+            parts.append(f"{name} {value:.4g} ± {sigma:.2g}")
+    return "  ".join(parts)
+
+
+@contextmanager
+def _stopped_by_signals(source: LiveSource) -> Iterator[None]:
+    """Let the first interruption end the recording, and the second one the program."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def stop(number: int, frame: Any) -> None:
+        source.stop()
+        for each, handler in before.items():
+            signal.signal(each, handler)
+
+    for number in before:
+        signal.signal(number, stop)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _report(result: LiveResult) -> None:
+    """Print what was recorded and measured."""
+    from anglecam.report.clip_tables import series_table
+
+    for note in result.measurement.notes:
+        screen.print(printable(f"{result.film}: {note}"), soft_wrap=True, highlight=False, markup=False)
+    latencies = 1e3 * result.latencies
+    lines = [
+        f"{result.film}: {len(result.rows)} frames recorded, {len(latencies)} measured at once,"
+        f" {result.count('learning')} while the mark was learnt, {result.count('late')} not in time"
+    ]
+    if len(latencies):
+        lines.append(
+            f"latency {np.median(latencies):.1f} ms (median), {np.quantile(latencies, 0.95):.1f} ms (95 %),"
+            f" {latencies.max():.1f} ms (longest); at once and afterwards differ by"
+            f" {result.disagreement:.2g} standard uncertainties RMS"
+        )
+    elif result.cause is not None:
+        lines.append(f"nothing was measured at once: {result.cause}")
+    for line in lines:
+        screen.print(printable(line), soft_wrap=True, highlight=False, markup=False)
+    screen.print(series_table([result.measurement]))

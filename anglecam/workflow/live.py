@@ -1,0 +1,198 @@
+"""Measure while filming: the angle in each frame as it comes, and the recorded film's files at the end.
+
+Frames that come before the mark and the body are learnt, and frames that cannot be measured in time, are recorded all
+the same. They are measured when the source has ended.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from anglecam.data.command import Command
+from anglecam.data.series import OK
+from anglecam.data.typing import Floats
+from anglecam.errors import InputError, RigError, blame
+from anglecam.identification.running_ekf import RunningEkf
+from anglecam.io.live_csv import LIVE_ENDING, LiveRow, write_live
+from anglecam.io.rig import Rig, RigFrames
+from anglecam.io.session import recording_name
+from anglecam.measurement.clip import Measurement
+from anglecam.measurement.live_meter import LiveMeter
+from anglecam.measurement.live_reading import LiveReading
+from anglecam.video.decode import Row
+from anglecam.video.live_source import LiveSource
+from anglecam.workflow.clip import Progress, measure_source, open_recording, write_measurement
+from anglecam.workflow.live_lesson import Learning, Lesson
+
+LATE_S = 0.1
+"""A frame whose turn comes later than this is not measured at once."""
+LEARNING, LATE = "learning", "late"
+
+
+@dataclass(frozen=True)
+class LiveResult:
+    """What was measured while filming, and of the recorded film."""
+
+    film: Path
+    """The recording."""
+    rows: tuple[LiveRow, ...]
+    """A row a frame, as it was shown."""
+    measurement: Measurement
+    """Of the recorded film."""
+    cause: str | None
+    """Why nothing was learnt while filming; ``None`` where something was."""
+
+    @property
+    def latencies(self) -> Floats:
+        """Of the frames that were measured at once, s."""
+        return np.array([row.latency for row in self.rows if not np.isnan(row.latency)])
+
+    def count(self, status: str) -> int:
+        """Return the number of frames with a status."""
+        return sum(row.status == status for row in self.rows)
+
+    @property
+    def disagreement(self) -> float:
+        """RMS difference between the angles at once and those of the recording, in standard uncertainties; NaN if none.
+
+        A difference that all frames share is left out: it depends on what counts as neutral.
+        """
+        series = self.measurement.series
+        if series.line is None:
+            return float("nan")
+        live = np.array([row.line for row in self.rows])
+        sigma = np.array([row.sigma for row in self.rows])
+        n = min(len(live), len(series.line))
+        off = live[:n] - series.line[:n]
+        seen = np.isfinite(off)
+        if not seen.any():
+            return float("nan")
+        off = (off - np.median(off[seen]) + np.pi) % (2.0 * np.pi) - np.pi
+        return float(np.sqrt(np.mean((off[seen] / np.hypot(sigma[:n], series.sigma[:n])[seen]) ** 2)))
+
+
+def measure_live(
+    source: LiveSource,
+    out: Path,
+    rig: Rig,
+    command: Command | None,
+    show: Callable[[LiveRow, str | None], None],
+    progress: Progress | None = None,
+) -> LiveResult:
+    """Measure until the source ends or is stopped, then measure what is left of the recording, and write its files.
+
+    Parameters
+    ----------
+    source : LiveSource
+        Opened, and not yet recorded.
+    out : Path
+        Folder for the recording, and for the files of `anglecam.workflow.clip.write_measurement`, ``NAME.live.csv`` and
+        ``NAME.live.png``; it exists.
+    rig : Rig
+        What is declared.
+    command : Command, optional
+        What is commanded, on the clock of the source.
+    show : callable
+        Called with each frame, and with the cause why nothing could be learnt yet.
+    progress : callable, optional
+        Called with (frames done, frames in all) while the recording is measured.
+
+    Returns
+    -------
+    LiveResult
+        Of all frames.
+
+    Raises
+    ------
+    InputError
+        Where the source cannot be read or recorded, or no frame of the recording can be measured.
+    RigError
+        Where the rig is wrong, or restricts the frames.
+    """
+    if rig.frames != RigFrames():
+        raise RigError("frames: {…} in rig.yaml is for films; what is measured while filming has no end yet")
+    path = source.record(out)
+    session = _Session(source, rig, command)
+    try:
+        with blame(path):
+            for row, ready in source.rows():
+                session.add(row, ready)
+                show(session.rows[-1], session.learning.cause)
+    finally:
+        source.close()
+        session.learning.end()
+    from anglecam.report.live_figure import plot_live  # matplotlib takes a second to load
+
+    name = recording_name(path)
+    write_live(session.rows, out / f"{name}{LIVE_ENDING}")
+    measurement = _measured_recording(path, rig, command, session.reading(), progress)
+    write_measurement(measurement, command, out)
+    result = LiveResult(path, tuple(session.rows), measurement, session.learning.cause)
+    plot_live(result.rows, out / f"{name}.live.png", name)
+    return result
+
+
+class _Session:
+    """The frames of a source, as far as they were measured."""
+
+    def __init__(self, source: LiveSource, rig: Rig, command: Command | None) -> None:
+        self.learning = Learning(source, rig, command)
+        self.rows: list[LiveRow] = []
+        self._meter: LiveMeter | None = None
+        self._filter: RunningEkf | None = None
+
+    def add(self, row: Row, ready: float) -> None:
+        """Measure the next frame, which was ready at an instant of `time.monotonic`, unless it is too late."""
+        if self._meter is None:
+            lesson = self.learning.add(row)
+            if lesson is not None:
+                self._begin(lesson)
+        frame = LiveRow(len(self.rows), row[0], LEARNING)
+        if self._meter is not None and time.monotonic() - ready > LATE_S:
+            self._meter.skip(row)
+            frame = replace(frame, status=LATE)
+        elif self._meter is not None:
+            frame = self._measured(frame, self._meter, row)
+            frame = replace(frame, latency=time.monotonic() - ready)
+        self.rows.append(frame)
+
+    def reading(self) -> LiveReading | None:
+        """Return what was found; ``None`` where nothing was learnt."""
+        return None if self._meter is None else self._meter.reading()
+
+    def _begin(self, lesson: Lesson) -> None:
+        self._meter, self._filter = LiveMeter(lesson.model, lesson.film), lesson.filter
+        for before in self.rows:
+            self._meter.skip((before.time, None))
+
+    def _measured(self, frame: LiveRow, meter: LiveMeter, row: Row) -> LiveRow:
+        found = meter.measure(row)
+        if found.status != OK:
+            return replace(frame, status=found.status)
+        angle = found.line - meter.model.neutral
+        frame = replace(frame, status=OK, line=found.line, angle=angle, sigma=found.sigma)
+        if self._filter is None:
+            return frame
+        estimate = self._filter.add(frame.time, angle)
+        return replace(frame, parameters=estimate.values, parameter_sigmas=estimate.sigmas)
+
+
+def _measured_recording(
+    path: Path, rig: Rig, command: Command | None, reading: LiveReading | None, progress: Progress | None
+) -> Measurement:
+    """Measure the recording by what was found while it was filmed; anew where that does not serve for all of it."""
+    if reading is not None:
+        try:
+            measurement = measure_source(open_recording(path, rig, command), progress=progress, live=reading)
+            if isinstance(measurement, Measurement) and measurement.doubt is None:
+                return measurement
+        except InputError:
+            pass  # what the first frames showed does not hold for the others
+    measurement = measure_source(open_recording(path, rig, command), progress=progress)
+    assert isinstance(measurement, Measurement)
+    return measurement

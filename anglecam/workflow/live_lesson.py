@@ -1,0 +1,117 @@
+"""Learn from the first frames of a source, in a thread, while more frames come."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from threading import Thread
+
+from anglecam.data.command import Command
+from anglecam.data.record import Record, record_from_series
+from anglecam.errors import AnglecamError, InputError, blame
+from anglecam.identification.running_ekf import RunningEkf
+from anglecam.io.rig import Rig
+from anglecam.measurement.clip import measure_clip
+from anglecam.measurement.live_model import LiveModel, live_model
+from anglecam.video.decode import Row
+from anglecam.video.film import Film
+from anglecam.video.film_rows import KeptRows
+from anglecam.video.live_source import LiveSource
+
+_FIRST_S, _FEWEST = 2.0, 24
+"""Duration and number of the frames of the first attempt: less seldom shows a motion."""
+_LONGER = 2.0
+"""Ratio of the durations of an attempt and the one before it."""
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """What was learnt."""
+
+    model: LiveModel
+    film: Film
+    """The first frames."""
+    filter: RunningEkf | None
+    """After these frames; ``None`` where they are too few."""
+
+
+class Learning:
+    """Attempts to learn from more and more frames, until one succeeds.
+
+    Parameters
+    ----------
+    source : LiveSource
+        Of the frames.
+    rig : Rig
+        What is declared.
+    command : Command, optional
+        What was commanded.
+    """
+
+    def __init__(self, source: LiveSource, rig: Rig, command: Command | None) -> None:
+        self._source, self._rig, self._command = source, rig, command
+        self._kept = KeptRows()
+        self._count = 0
+        self._first_s: float | None = None
+        self._due_s = _FIRST_S
+        self._thread: Thread | None = None
+        self._lesson: Lesson | None = None
+        self.cause: str | None = None
+        """Why the last attempt failed."""
+
+    def add(self, row: Row) -> Lesson | None:
+        """Keep the next frame; return what was learnt once that is known.
+
+        Raises
+        ------
+        RigError
+            Where the rig file is wrong.
+        """
+        self._kept.add(self._count, row)
+        self._count += 1
+        self._first_s = row[0] if self._first_s is None else self._first_s
+        lasted = row[0] - self._first_s
+        if self._thread is None and lasted >= self._due_s and len(self._kept.rows) >= _FEWEST:
+            self._due_s = _LONGER * lasted
+            self._thread = Thread(target=self._learn, args=(list(self._kept.rows),), name="learning", daemon=True)
+            self._thread.start()
+        if self._thread is not None and not self._thread.is_alive():
+            self.end()
+        return self._lesson
+
+    def end(self) -> None:
+        """Wait for the attempt that is under way."""
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    def _learn(self, numbered: list[tuple[int, Row]]) -> None:
+        try:
+            with blame(self._source.path):
+                self._lesson = self._lesson_from(numbered)
+        except AnglecamError as problem:
+            self.cause = str(problem)
+
+    def _lesson_from(self, numbered: list[tuple[int, Row]]) -> Lesson:
+        film = self._source.film_of([row for _, row in numbered])
+        rig = _rig_of_kept(self._rig, [number for number, _ in numbered])
+        first = measure_clip(film, rig, self._command)
+        model = live_model(first, rig)
+        if isinstance(model, str):
+            raise InputError(f"{film.path}: {model}")
+        try:
+            record: Record | None = record_from_series(
+                first.series, self._command, zero_known=self._rig.neutral != "auto"
+            )
+        except InputError:  # too few frames for the filter
+            record = None
+        return Lesson(model, film, None if record is None else RunningEkf(record))
+
+
+def _rig_of_kept(rig: Rig, numbers: list[int]) -> Rig:
+    """Return the rig for some frames of the film: a mark that is declared in a frame is in another one of them."""
+    mark = rig.pointed_mark
+    if mark is None:
+        return rig
+    if mark.frame not in numbers:
+        raise InputError(f"the mark is declared in frame {mark.frame}, which was not kept; declare it in frame 0")
+    return rig.model_copy(update={"mouth": mark.model_copy(update={"frame": numbers.index(mark.frame)})})
