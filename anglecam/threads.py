@@ -54,10 +54,6 @@ class Backlog(Generic[R]):
         if len(self._open) > _OPEN:
             self._done.append(self._open.popleft().result())
 
-    def newest(self) -> R:
-        """Return the result of the work that was added last; raise what it raised."""
-        return self._open[-1].result() if self._open else self._done[-1]
-
     def results(self) -> list[R]:
         """Return the results of all work in its order; raise what it raised."""
         while self._open:

@@ -14,20 +14,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from anglecam.data.record import Record
-from anglecam.data.typing import Floats
 from anglecam.identification.ekf import PAPER, settings_for
 from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.kalman import SHARED, RunningFilter
+
+_UNKNOWN = (np.nan, np.nan, np.nan)
 
 
 @dataclass(frozen=True)
 class RunningEstimate:
     """The parameters after a frame."""
 
-    values: Floats
-    """(3,) a (1/s), b (1/s²), c (1/s²); c is 0 where nothing is commanded, and all are NaN once the filter diverged."""
-    sigmas: Floats
-    """(3,) standard uncertainties that the filter states, in the same units."""
+    values: tuple[float, float, float]
+    """a (1/s), b (1/s²), c (1/s²); c is 0 where nothing is commanded, and all are NaN once the filter diverged."""
+    sigmas: tuple[float, float, float]
+    """Standard uncertainties that the filter states, in the same units."""
 
 
 class RunningEkf:
@@ -64,5 +65,5 @@ class RunningEkf:
         ekf = self._filter.ekf
         variance = np.diag(ekf.P)[SHARED]
         if not (np.isfinite(ekf.x).all() and (variance >= 0.0).all()):
-            return RunningEstimate(np.full(3, np.nan), np.full(3, np.nan))
-        return RunningEstimate(ekf.x[SHARED].copy(), np.sqrt(variance))
+            return RunningEstimate(_UNKNOWN, _UNKNOWN)
+        return RunningEstimate(tuple(ekf.x[SHARED].tolist()), tuple(np.sqrt(variance).tolist()))

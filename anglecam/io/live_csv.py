@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
-from anglecam.data.typing import Floats
 from anglecam.io.files import write_atomically
 
 LIVE_ENDING = ".live.csv"
 _COLUMNS = ("frame", "time_s", "status", "line_deg", "angle_deg", "sigma_deg", "latency_ms")
 _PARAMETERS = ("a_per_s", "b_per_s2", "c_per_s2")
-_NO_PARAMETERS = np.full(3, np.nan)
+_Three = tuple[float, float, float]
+_UNKNOWN: _Three = (np.nan, np.nan, np.nan)
 
 
 @dataclass(frozen=True)
@@ -35,10 +35,10 @@ class LiveRow:
     """Standard uncertainty of ``angle``, rad."""
     latency: float = np.nan
     """From the instant at which the frame could have been measured to that at which its angle was known, s."""
-    parameters: Floats = _NO_PARAMETERS
-    """(3,) a (1/s), b (1/s²), c (1/s²) by the running filter."""
-    parameter_sigmas: Floats = _NO_PARAMETERS
-    """(3,) standard uncertainties that the filter states."""
+    parameters: _Three = _UNKNOWN
+    """a (1/s), b (1/s²), c (1/s²) by the running filter."""
+    parameter_sigmas: _Three = _UNKNOWN
+    """Standard uncertainties that the filter states."""
 
 
 def write_live(rows: Iterable[LiveRow], path: Path) -> None:

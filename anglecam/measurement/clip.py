@@ -22,7 +22,6 @@ from anglecam.measurement.clock_sync import DARK, note_on, offset_of, on_clip_cl
 from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.duplicates import duplicate_frames
 from anglecam.measurement.followed import Followed, follow_mark_or_body
-from anglecam.measurement.live_reading import LiveReading
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.measurement.trust import why_elsewhere, why_few, why_not_rigid
 from anglecam.video.film import Film
@@ -94,12 +93,7 @@ class Measurement:
 
 
 def measure_clip(
-    film: Film,
-    rig: Rig,
-    command: Command | None = None,
-    *,
-    progress: Callable[[int, int], None] | None = None,
-    live: LiveReading | None = None,
+    film: Film, rig: Rig, command: Command | None = None, *, progress: Callable[[int, int], None] | None = None
 ) -> Measurement:
     """Measure the angle in every frame of a clip.
 
@@ -113,8 +107,6 @@ def measure_clip(
         Its first change ends the rest that defines neutral. Where the rig declares a lamp, the lamp dates that change.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
-    live : LiveReading, optional
-        What was found while the film was recorded; that is not searched again.
 
     Returns
     -------
@@ -134,7 +126,7 @@ def measure_clip(
     camera = hold_camera(film)
     held = camera.film
     rig = as_seen_at_rest(rig, held)
-    followed = follow_mark_or_body(camera, rig, command, progress, live)
+    followed = follow_mark_or_body(camera, rig, command, progress)
     detections = _as_filmed(followed.detections, held)
     series = _series(held, rig, followed, detections.status, lamp)
     zero = why_zero_is_elsewhere(rig, command, followed.time[followed.ok])

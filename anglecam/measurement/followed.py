@@ -24,7 +24,6 @@ from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.carried_marks import carried_marks, smeared_marks, with_marks
 from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.fine_angles import fine_angles
-from anglecam.measurement.live_reading import LiveReading
 from anglecam.measurement.mark_pass import MarkNotFoundError, detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
 from anglecam.measurement.rigid_body_pass import detect_layer, detect_outline, detect_rigid_body
@@ -56,11 +55,7 @@ class Followed:
 
 
 def follow_mark_or_body(
-    camera: HeldCamera,
-    rig: Rig,
-    command: Command | None,
-    progress: Callable[[int, int], None] | None = None,
-    live: LiveReading | None = None,
+    camera: HeldCamera, rig: Rig, command: Command | None, progress: Callable[[int, int], None] | None = None
 ) -> Followed:
     """Measure the angle of the mark or, where none is declared and none is found, of a rigid body or its outline.
 
@@ -74,8 +69,6 @@ def follow_mark_or_body(
         Its first change ends the rest that defines neutral.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
-    live : LiveReading, optional
-        What was found while the film was recorded.
 
     Returns
     -------
@@ -89,7 +82,7 @@ def follow_mark_or_body(
     """
     film = camera.film
     try:
-        mark = detect_mark(film, rig, camera, progress, live)
+        mark = detect_mark(film, rig, camera, progress)
         followed = _measured(film, rig, command, mark, progress)
         return _hinted(followed, film, rig, command) if _is_hinted(camera, rig) else followed
     except MarkNotFoundError as problem:

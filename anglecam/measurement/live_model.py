@@ -1,8 +1,9 @@
 """What the first frames of a film show, by which the angle in each further frame is measured at once.
 
 The first frames are measured as a clip (`anglecam.measurement.clip`). This finds the mark, the pivot and the body, and
-refuses what is not a rotation. The angle in another frame is that of the whole body where it could be learnt, otherwise
-that of the line from the pivot to the mark. Its uncertainty has the terms of `anglecam.measurement.fine_angles` and
+refuses what is not a rotation. The angle in another frame is that of the whole body where it could be learnt, and within
+the angles at which it was learnt: light and perspective change with the angle. Otherwise it is that of the line from the
+pivot to the mark. Its uncertainty has the terms of `anglecam.measurement.fine_angles` and
 `anglecam.measurement.angles`. Their part that all frames share is that of the first frames.
 """
 
@@ -46,6 +47,8 @@ class BodyTerms:
 
     zero: float
     """Direction of the line at which the rotation is zero, rad."""
+    turns: tuple[float, float]
+    """Least and largest rotation at which the body was learnt, rad."""
     sensitivity: Floats
     """(2,) derivative of neutral with respect to the pivot's position, rad/px."""
     pivot_covariance_px2: Floats
@@ -72,8 +75,6 @@ class LiveModel:
     """The body; ``None`` where the mark alone is measured."""
     terms: BodyTerms | None
     """Of the body."""
-    sigma: float
-    """Median standard uncertainty in the first frames, rad."""
 
     def angle(self, regions: Sequence[Region], turn: TurnEstimate) -> LiveAngle:
         """Return the angle in a frame.
@@ -93,18 +94,21 @@ class LiveModel:
         marks = self.path.marks(regions)
         if len(marks) != 1:
             return LiveAngle("ambiguous" if marks else "no_mouth")
-        if self.terms is None:
-            least, most = _WHOLE_AREA
-            if not (marks[0].whole and least < marks[0].area_px2 / self.path.area_px2 < most):
-                return LiveAngle("occluded")
-            ahead = 0.0 if self.sign > 0.0 else np.pi
-            return LiveAngle(OK, ahead + self.sign * self.path.direction(marks[0], self.pivot_px), self.mark_sigma)
-        if np.isnan(turn.turn):
+        terms = self.terms
+        if terms is None or not terms.turns[0] <= turn.turn <= terms.turns[1]:
+            return self._by_mark(marks[0])
+        moved = turn.pivot_sensitivity - terms.sensitivity
+        by_pivot = float(moved @ terms.pivot_covariance_px2 @ moved)
+        sigma = float(np.sqrt(turn.noise**2 + turn.pose**2 + terms.shared**2 + by_pivot))
+        return LiveAngle(OK, terms.zero + self.sign * turn.turn, sigma)
+
+    def _by_mark(self, mark: Region) -> LiveAngle:
+        """Return the angle of the line from the pivot to the mark."""
+        least, most = _WHOLE_AREA
+        if not (mark.whole and least < mark.area_px2 / self.path.area_px2 < most):
             return LiveAngle("occluded")
-        moved = turn.pivot_sensitivity - self.terms.sensitivity
-        by_pivot = float(moved @ self.terms.pivot_covariance_px2 @ moved)
-        sigma = float(np.sqrt(turn.noise**2 + turn.pose**2 + self.terms.shared**2 + by_pivot))
-        return LiveAngle(OK, self.terms.zero + self.sign * turn.turn, sigma)
+        ahead = 0.0 if self.sign > 0.0 else np.pi
+        return LiveAngle(OK, ahead + self.sign * self.path.direction(mark, self.pivot_px), self.mark_sigma)
 
 
 def live_model(first: Measurement, rig: Rig) -> LiveModel | str:
@@ -146,7 +150,6 @@ def live_model(first: Measurement, rig: Rig) -> LiveModel | str:
         mark_sigma=float(np.sqrt(np.mean(coarse**2 + angles.view.sigma**2 + angles.within_exposure**2))),
         body=body,
         terms=None if body is None else _terms(angles, first, rig),
-        sigma=float(np.median(angles.sigma)),
     )
 
 
@@ -182,6 +185,7 @@ def _terms(angles: Angles, first: Measurement, rig: Rig) -> BodyTerms:
     others = angles.view.sigma**2 + angles.within_exposure**2
     shared = angles.shared**2 + float(others[seen].mean())
     return BodyTerms(
+        turns=(float(turn[seen].min()), float(turn[seen].max())),
         zero=float(np.median(angles.line[seen] - sign * turn[seen])),
         sensitivity=sensitivity[used].mean(axis=0),
         pivot_covariance_px2=registered.pivot_covariance_px2,

@@ -23,7 +23,6 @@ from anglecam.measurement.body_ahead import BodyAhead, learn_body_ahead
 from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.detections import Detections, frame_of_mark, frames_to_keep
 from anglecam.measurement.frame_reading import read_frames
-from anglecam.measurement.live_reading import LiveReading, completed
 from anglecam.measurement.pivot import HEIGHT_SHARE, find_pivot
 from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.image.noise import pixel_noise
@@ -48,7 +47,6 @@ def detect_mark(
     rig: Rig,
     camera: HeldCamera | None = None,
     progress: Callable[[int, int], None] | None = None,
-    live: LiveReading | None = None,
 ) -> Detections:
     """Find the mark in every frame of a clip, and the pivot.
 
@@ -62,8 +60,6 @@ def detect_mark(
         How the camera moves; without it the camera is at rest.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
-    live : LiveReading, optional
-        What was found while the film was recorded, by a camera at rest.
 
     Returns
     -------
@@ -85,17 +81,13 @@ def detect_mark(
     frames = [*([] if pointed is None else [frame_of_mark(film, pointed)]), *sample.frames]
     samples = _samples(film, frames, pointed, steady, lens)
     near = None if rig.pivot.expected is None else lens.rectify(rig.pivot.expected)
-    found = None if live is None else live.found
-    if found is None and samples.images:
-        found = find_mark(samples, rig.mark_rgb, near)
+    found = find_mark(samples, rig.mark_rgb, near) if samples.images else None
     if found is None:
         raise MarkNotFoundError(_no_mark(path, sample, rig))
     if camera is not None and camera.unknown is not None:
         raise InputError(camera.unknown)
-    reading = None if live is None or steady is not None else completed(live, film, progress)
-    if reading is None:
-        body = _body_ahead(film, found, samples, rig, lens) if steady is None else None
-        reading = read_frames(film, found, sample.count, steady, body, progress)
+    body = _body_ahead(film, found, samples, rig, lens) if steady is None else None
+    reading = read_frames(film, found, sample.count, steady, body, progress)
     time, filmed, shakes = reading.time, reading.regions, reading.moves
     candidates = filmed if shakes is None else [_unshaken(r, move) for r, move in zip(filmed, shakes, strict=True)]
     lens, track, marker, pivot, disagreement = _follow(candidates, time, found, samples.stabilised, rig, lens)

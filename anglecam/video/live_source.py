@@ -27,7 +27,7 @@ from anglecam.video.recording import Recording
 
 _MANY = 512
 """Packets that wait at most: several seconds of a camera, which does not wait."""
-_FEW = 8
+_FEW = 2
 """The same of a pipe: whoever writes it waits."""
 _CAMERAS = {"linux": ("v4l2", "/dev/video{}"), "darwin": ("avfoundation", "{}"), "win32": ("dshow", "video={}")}
 """FFmpeg's name of the cameras' interface, and its address of a camera."""

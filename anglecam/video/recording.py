@@ -40,7 +40,9 @@ class Recording:
         self._closed = False
 
     def add(self, packet: av.Packet) -> None:
-        """Write a packet; the packet itself is not changed."""
+        """Write a packet, unless the film is closed; the packet itself is not changed."""
+        if self._closed:
+            return
         copy = av.Packet(bytes(packet))
         copy.stream, copy.time_base = self._stream, packet.time_base
         copy.dts = packet.dts if packet.dts is not None else packet.pts

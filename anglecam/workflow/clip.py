@@ -21,7 +21,6 @@ from anglecam.io.session import SERIES_ENDING, clip_beside, command_beside, rig_
 from anglecam.io.tracks.files import TRACKS_ENDINGS
 from anglecam.measurement.clip import Measurement, measure_clip
 from anglecam.measurement.clock_sync import offset_of, on_clip_clock
-from anglecam.measurement.live_reading import LiveReading
 from anglecam.measurement.step_response import Response, responses, responses_as_dicts
 from anglecam.measurement.tracks import MeasuredTracks, measure_tracks
 from anglecam.video.film import Film
@@ -100,9 +99,7 @@ def _open(path: Path, rig: Rig, command_of: Callable[[Path], Command | None]) ->
     return Source(path, rig, command_of(path), None if clip is None else open_film(clip, rig.frames))
 
 
-def measure_source(
-    source: Source, *, progress: Progress | None = None, live: LiveReading | None = None
-) -> Measurement | MeasuredTracks:
+def measure_source(source: Source, *, progress: Progress | None = None) -> Measurement | MeasuredTracks:
     """Measure the angle in every frame.
 
     Parameters
@@ -111,8 +108,6 @@ def measure_source(
         From `open_source` or `open_recording`.
     progress : callable, optional
         See `Progress`; tracks are measured without it.
-    live : LiveReading, optional
-        What was found while the clip was recorded.
 
     Returns
     -------
@@ -127,7 +122,7 @@ def measure_source(
     with blame(source.path):
         if source.is_tracks or source.film is None:
             return measure_tracks(source.path, source.rig, source.command, film=source.film)
-        return measure_clip(source.film, source.rig, source.command, progress=progress, live=live)
+        return measure_clip(source.film, source.rig, source.command, progress=progress)
 
 
 def write_measurement(

@@ -1,7 +1,7 @@
 """Measure while filming: the angle in each frame as it comes, and the recorded film's files at the end.
 
 Frames that come before the mark and the body are learnt, and frames that cannot be measured in time, are recorded all
-the same. They are measured when the source has ended.
+the same. When the source has ended, the whole recording is measured as any other film.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ import numpy as np
 from anglecam.data.command import Command
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats
-from anglecam.errors import InputError, RigError, blame
+from anglecam.errors import RigError, blame
 from anglecam.identification.running_ekf import RunningEkf
 from anglecam.io.live_csv import LIVE_ENDING, LiveRow, write_live
 from anglecam.io.rig import Rig, RigFrames
 from anglecam.io.session import recording_name
 from anglecam.measurement.clip import Measurement
 from anglecam.measurement.live_meter import LiveMeter
-from anglecam.measurement.live_reading import LiveReading
+from anglecam.measurement.live_model import LiveAngle
 from anglecam.video.decode import Row
 from anglecam.video.live_source import LiveSource
 from anglecam.workflow.clip import Progress, measure_source, open_recording, write_measurement
-from anglecam.workflow.live_lesson import Learning, Lesson
+from anglecam.workflow.live_learning import Learning
 
 LATE_S = 0.1
 """A frame whose turn comes later than this is not measured at once."""
@@ -84,7 +84,7 @@ def measure_live(
     show: Callable[[LiveRow, str | None], None],
     progress: Progress | None = None,
 ) -> LiveResult:
-    """Measure until the source ends or is stopped, then measure what is left of the recording, and write its files.
+    """Measure until the source ends or is stopped, then measure the recording, and write its files.
 
     Parameters
     ----------
@@ -130,7 +130,8 @@ def measure_live(
 
     name = recording_name(path)
     write_live(session.rows, out / f"{name}{LIVE_ENDING}")
-    measurement = _measured_recording(path, rig, command, session.reading(), progress)
+    measurement = measure_source(open_recording(path, rig, command), progress=progress)
+    assert isinstance(measurement, Measurement)  # a film is no file of tracks
     write_measurement(measurement, command, out)
     result = LiveResult(path, tuple(session.rows), measurement, session.learning.cause)
     plot_live(result.rows, out / f"{name}.live.png", name)
@@ -144,55 +145,32 @@ class _Session:
         self.learning = Learning(source, rig, command)
         self.rows: list[LiveRow] = []
         self._meter: LiveMeter | None = None
+        self._neutral = 0.0
         self._filter: RunningEkf | None = None
 
     def add(self, row: Row, ready: float) -> None:
         """Measure the next frame, which was ready at an instant of `time.monotonic`, unless it is too late."""
-        if self._meter is None:
-            lesson = self.learning.add(row)
-            if lesson is not None:
-                self._begin(lesson)
+        lesson = self.learning.add(row)
+        if lesson is not None and self._meter is None:
+            self._meter, self._filter = LiveMeter(lesson.model, lesson.film), lesson.filter
+            self._neutral = lesson.model.neutral
+        elif lesson is not None and self._meter is not None:
+            self._meter.relearn(lesson.model)
         frame = LiveRow(len(self.rows), row[0], LEARNING)
         if self._meter is not None and time.monotonic() - ready > LATE_S:
-            self._meter.skip(row)
+            self._meter.skip()
             frame = replace(frame, status=LATE)
         elif self._meter is not None:
-            frame = self._measured(frame, self._meter, row)
+            frame = self._measured(frame, self._meter.measure(frame.frame, row))
             frame = replace(frame, latency=time.monotonic() - ready)
         self.rows.append(frame)
 
-    def reading(self) -> LiveReading | None:
-        """Return what was found; ``None`` where nothing was learnt."""
-        return None if self._meter is None else self._meter.reading()
-
-    def _begin(self, lesson: Lesson) -> None:
-        self._meter, self._filter = LiveMeter(lesson.model, lesson.film), lesson.filter
-        for before in self.rows:
-            self._meter.skip((before.time, None))
-
-    def _measured(self, frame: LiveRow, meter: LiveMeter, row: Row) -> LiveRow:
-        found = meter.measure(row)
+    def _measured(self, frame: LiveRow, found: LiveAngle) -> LiveRow:
         if found.status != OK:
             return replace(frame, status=found.status)
-        angle = found.line - meter.model.neutral
+        angle = found.line - self._neutral
         frame = replace(frame, status=OK, line=found.line, angle=angle, sigma=found.sigma)
         if self._filter is None:
             return frame
         estimate = self._filter.add(frame.time, angle)
         return replace(frame, parameters=estimate.values, parameter_sigmas=estimate.sigmas)
-
-
-def _measured_recording(
-    path: Path, rig: Rig, command: Command | None, reading: LiveReading | None, progress: Progress | None
-) -> Measurement:
-    """Measure the recording by what was found while it was filmed; anew where that does not serve for all of it."""
-    if reading is not None:
-        try:
-            measurement = measure_source(open_recording(path, rig, command), progress=progress, live=reading)
-            if isinstance(measurement, Measurement) and measurement.doubt is None:
-                return measurement
-        except InputError:
-            pass  # what the first frames showed does not hold for the others
-    measurement = measure_source(open_recording(path, rig, command), progress=progress)
-    assert isinstance(measurement, Measurement)
-    return measurement

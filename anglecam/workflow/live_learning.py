@@ -1,9 +1,15 @@
-"""Learn from the first frames of a source, in a thread, while more frames come."""
+"""Learn from the frames of a source in a thread, while more frames come, and again when there are twice as many.
+
+What is learnt from two seconds holds for the angles that were seen in them. The body is therefore learnt again from
+evenly spaced frames of all that was filmed, at doubled durations: of an hour ten times.
+"""
 
 from __future__ import annotations
 
+import os
+from contextlib import suppress
 from dataclasses import dataclass
-from threading import Thread
+from threading import Thread, get_native_id
 
 from anglecam.data.command import Command
 from anglecam.data.record import Record, record_from_series
@@ -21,21 +27,23 @@ _FIRST_S, _FEWEST = 2.0, 24
 """Duration and number of the frames of the first attempt: less seldom shows a motion."""
 _LONGER = 2.0
 """Ratio of the durations of an attempt and the one before it."""
+_NICENESS = 10
+"""Of the thread: where the processor is short, frames are measured first."""
 
 
 @dataclass(frozen=True)
 class Lesson:
-    """What was learnt."""
+    """What was learnt from some frames."""
 
     model: LiveModel
     film: Film
-    """The first frames."""
+    """These frames."""
     filter: RunningEkf | None
     """After these frames; ``None`` where they are too few."""
 
 
 class Learning:
-    """Attempts to learn from more and more frames, until one succeeds.
+    """Learns from more and more frames.
 
     Parameters
     ----------
@@ -56,38 +64,36 @@ class Learning:
         self._thread: Thread | None = None
         self._lesson: Lesson | None = None
         self.cause: str | None = None
-        """Why the last attempt failed."""
+        """Why nothing could be learnt yet; ``None`` from the first success on."""
 
     def add(self, row: Row) -> Lesson | None:
-        """Keep the next frame; return what was learnt once that is known.
-
-        Raises
-        ------
-        RigError
-            Where the rig file is wrong.
-        """
+        """Keep the next frame; return what was learnt since the last call, if anything."""
         self._kept.add(self._count, row)
         self._count += 1
         self._first_s = row[0] if self._first_s is None else self._first_s
         lasted = row[0] - self._first_s
+        lesson = None
+        if self._thread is not None and not self._thread.is_alive():
+            self._thread, lesson, self._lesson = None, self._lesson, None
         if self._thread is None and lasted >= self._due_s and len(self._kept.rows) >= _FEWEST:
             self._due_s = _LONGER * lasted
             self._thread = Thread(target=self._learn, args=(list(self._kept.rows),), name="learning", daemon=True)
             self._thread.start()
-        if self._thread is not None and not self._thread.is_alive():
-            self.end()
-        return self._lesson
+        return lesson
 
     def end(self) -> None:
-        """Wait for the attempt that is under way."""
+        """Wait for the attempt that is under way: it uses the frames of the source."""
         if self._thread is not None:
             self._thread.join()
             self._thread = None
 
     def _learn(self, numbered: list[tuple[int, Row]]) -> None:
+        with suppress(AttributeError, OSError):  # where a thread has no niceness of its own
+            os.setpriority(os.PRIO_PROCESS, get_native_id(), _NICENESS)
         try:
             with blame(self._source.path):
                 self._lesson = self._lesson_from(numbered)
+                self.cause = None
         except AnglecamError as problem:
             self.cause = str(problem)
 
