@@ -6,7 +6,7 @@ and by whether its surroundings move with it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from statistics import median  # of few values it is faster than NumPy's
 
@@ -15,16 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
+from anglecam.vision.mark.blob_circles import MOVED_PX, TOLERANCE_PX, circle_of, draw_blobs
 from anglecam.vision.mark.blobs import Blobs
 from anglecam.vision.mark.co_motion import co_motion_share
-from anglecam.vision.pivot.circle import circle_through
 
-_TOLERANCE_PX = 2.0
-"""Distance from the circle within which a blob belongs to the track; coarse blobs are located this well."""
-_MOVED_PX = 4.0
-"""A path with a smaller extent counts as rest."""
-_HINT_PX = 30.0
-"""Largest error of a hint at the pivot."""
+_UNLIKE = 0.6
+"""Largest difference of a blob from the drawn ones: the logarithms of the ratios of areas and of contrasts, added."""
+_LEAST_CONTRAST = 1e-3
+_FEWEST = 3
+"""A track has at least as many blobs."""
 _SKIN_A = (4.0, 24.0)
 """Range of a* of skin of every complexion; its b* is one to three times its a*."""
 _BENT_PX = 0.5
@@ -34,7 +33,6 @@ _STRAIGHT_WEIGHT = 0.1
 path."""
 _CO_MOTION_POWER = 2
 """Exponent of the co-motion share in the score."""
-_TRIALS = 600
 
 
 @dataclass(frozen=True)
@@ -61,6 +59,17 @@ class _PathScore:
     """Score of a curved path on which all blobs lie exactly."""
     bent: float
     """How distinctly the path is curved, 0 to 1."""
+
+
+@dataclass(frozen=True)
+class _Close:
+    """The blobs that lie on one circle and are like those through which it was drawn; arrays of length n."""
+
+    index: NDArray[np.int64]
+    off_px: Floats
+    """Distance from the circle."""
+    unlike: Floats
+    """Difference from the drawn blobs in size and contrast."""
 
 
 def moving_track(
@@ -95,33 +104,15 @@ def moving_track(
         The track with the highest score.
     """
     frames = len(images)
-    poses = _distinct_poses(blobs)
-    if len(poses) < 2 or frames < 2:
+    if frames < 2:
         return None
     longest = 1.5 * float(np.hypot(*images[0].shape[:2]))
-    rng = np.random.default_rng(0)
     best: BlobTrack | None = None
-    tried: set[tuple[int, ...]] = set()
     co_motion: dict[tuple[int, int], float] = {}
     path_scores: dict[bytes, _PathScore | None] = {}
-    for trial in range(_TRIALS):
-        # A clip that hardly moves has only two distinct poses.
-        some = rng.choice(poses, size=min(2 + (trial % 4 > 0), len(poses)), replace=False)
-        if through is not None and len(through):
-            some[0] = rng.choice(through)
-        key = tuple(sorted(some))
-        if key in tried or len(set(blobs.frame[some])) < len(some):
-            continue
-        tried.add(key)
-        size, contrast = blobs.area[some], blobs.contrast[some]
-        if size.max() > 1.6 * size.min() or contrast.max() > 1.5 * contrast.min():
-            continue
-        circle = _circle_of(blobs.plane_px[some], hint, longest)
-        if circle is None:
-            continue
+    for circle, close in _blobs_on_circles(blobs, draw_blobs(blobs, through), hint, longest):
         least = 0.0 if best is None else best.score
-        typical = float(median(size)), float(median(contrast))
-        track = _collect(blobs, frames, level, circle, typical, least, path_scores)
+        track = _collect(blobs, frames, level, circle, close, least, path_scores)
         if track is None or (best is not None and track.score <= best.score):
             continue
         if through is not None and not np.isin(track.members, through).any():
@@ -154,32 +145,26 @@ def _co_motion(track: BlobTrack, ends: tuple[int, int], images: Sequence[Image])
     return co_motion_share(first, second, here, there, here + camera_shift, turn, area)
 
 
-def _distinct_poses(blobs: Blobs) -> NDArray[np.int64]:
-    """Pick one blob of each place and size, so that a long rest does not outweigh a short motion."""
-    key = np.column_stack([np.round(blobs.plane_px / _MOVED_PX), np.round(np.log(blobs.area) / 0.3)])
-    _, first = np.unique(key, axis=0, return_index=True)
-    return first
-
-
-def _circle_of(p: Floats, hint: Floats | None, longest: float) -> tuple[Floats, float] | None:
-    """Fit a circle to two or three places; where they do not determine the radius, take the hint as its centre."""
-    chord = p[:, None, :] - p[None, :, :]
-    if np.hypot(chord[..., 0], chord[..., 1])[~np.eye(len(p), dtype=bool)].min() < _MOVED_PX / 2.0:
-        return None
-    if len(p) == 3:
-        centre, radius = circle_through(p)
-        if hint is None or np.hypot(*(centre - hint)) <= _HINT_PX:
-            return (centre, radius) if 20.0 < radius < longest else None
-    if hint is not None:
-        distance = np.hypot(*(p - hint).T)
-        # An error e of the hint changes the distance by up to e times the angle between the places.
-        open_px = _TOLERANCE_PX + _HINT_PX * float(np.hypot(*np.ptp(p, axis=0))) / max(float(distance.min()), 1.0)
-        return (hint, float(np.median(distance))) if np.ptp(distance) < open_px else None
-    if len(p) == 3:
-        return None
-    # Two places and no hint: on so short a path, any circle through them will do to collect further blobs.
-    way = p[1] - p[0]
-    return p.mean(axis=0) + 5.0 * np.array([-way[1], way[0]]), 5.0 * float(np.hypot(*way))
+def _blobs_on_circles(
+    blobs: Blobs, draws: Sequence[NDArray[np.int64]], hint: Floats | None, longest_px: float
+) -> Iterator[tuple[tuple[Floats, float], _Close]]:
+    """Yield the circles through drawn blobs, and the blobs on each that are like the drawn ones."""
+    found = [(circle_of(blobs.plane_px[draw], hint, longest_px), draw) for draw in draws]
+    circles = [circle for circle, _ in found if circle is not None]
+    if not circles:
+        return
+    some = [draw for circle, draw in found if circle is not None]
+    sizes = np.array([median(blobs.area[draw]) for draw in some])[:, None]
+    contrasts = np.array([median(blobs.contrast[draw]) for draw in some])[:, None]
+    centres, radii = np.array([centre for centre, _ in circles]), np.array([radius for _, radius in circles])
+    away = blobs.plane_px[None, :, :] - centres[:, None, :]
+    off = np.abs(np.hypot(away[..., 0], away[..., 1]) - radii[:, None])
+    unlike = np.abs(np.log(blobs.area / sizes))
+    unlike += np.abs(np.log(np.maximum(blobs.contrast, _LEAST_CONTRAST) / contrasts))
+    near = (off < TOLERANCE_PX) & (unlike < _UNLIKE)
+    for k in np.flatnonzero(near.sum(axis=1) >= _FEWEST).tolist():
+        close = np.flatnonzero(near[k])
+        yield circles[k], _Close(close, off[k, close], unlike[k, close])
 
 
 def _collect(
@@ -187,16 +172,16 @@ def _collect(
     frames: int,
     level: float,
     circle: tuple[Floats, float],
-    typical: tuple[float, float],
+    close: _Close,
     least: float,
     path_scores: dict[bytes, _PathScore | None],
 ) -> BlobTrack | None:
-    """Take from each frame the blob that lies on the circle and is most like the typical one; score the track.
+    """Take from each frame the blob on the circle that is most like the typical one; score the track.
 
     Parameters
     ----------
-    typical : tuple of float
-        Area, px², and contrast of the sampled blobs.
+    close : _Close
+        The blobs on the circle.
     least : float
         Score that the track must exceed.
     path_scores : dict
@@ -205,38 +190,34 @@ def _collect(
     Returns
     -------
     BlobTrack or None
-        ``None`` where too few blobs lie on the circle or the score cannot exceed the least one.
+        ``None`` where the score cannot exceed the least one.
     """
-    (centre, radius), (size, contrast) = circle, typical
-    off = np.abs(np.hypot(*(blobs.plane_px - centre).T) - radius)
-    unlike = np.abs(np.log(blobs.area / size)) + np.abs(np.log(np.maximum(blobs.contrast, 1e-3) / contrast))
-    close = np.flatnonzero((off < _TOLERANCE_PX) & (unlike < 0.6))
-    if len(close) < 3:
-        return None
-    # The most similar blob of each frame: sort by similarity, keep the first of each frame.
-    close = close[np.argsort(unlike[close] + off[close] / _TOLERANCE_PX)]
-    _, first = np.unique(blobs.frame[close], return_index=True)
-    members = close[first]
+    # The most similar blob of each frame: from the least similar to the most, the last of each frame remains.
+    order = np.argsort(close.unlike + close.off_px / TOLERANCE_PX)[::-1]
+    which = np.full(frames, -1)
+    which[blobs.frame[close.index[order]]] = order
+    taken = which[which >= 0]
+    members = close.index[taken]
     key = members.tobytes()
     if key not in path_scores:
         path_scores[key] = _path_score(blobs, members, frames)
     path = path_scores[key]
     if path is None or path.score < least:  # the factors below are at most 1
         return None
-    off_px = off[members]
+    off_px = close.off_px[taken]
     score = (
         path.score
-        * np.exp(-np.mean((off_px / _TOLERANCE_PX) ** 2))
+        * np.exp(-np.mean((off_px / TOLERANCE_PX) ** 2))
         * (_STRAIGHT_WEIGHT + (1.0 - _STRAIGHT_WEIGHT) * path.bent)
     )
-    return BlobTrack(score, level, members, blobs, (centre, radius))
+    return BlobTrack(score, level, members, blobs, circle)
 
 
 def _path_score(blobs: Blobs, members: NDArray[np.int64], frames: int) -> _PathScore | None:
     """Score a choice of blobs, whatever circle they lie on; ``None`` where they are few or do not move."""
     place = blobs.plane_px[members]
     extent = float(np.hypot(*np.ptp(place, axis=0)))
-    if extent < _MOVED_PX or len(members) < 3:
+    if extent < MOVED_PX or len(members) < _FEWEST:
         return None
     # Motion to and fro on a straight line shows no centre of rotation.
     bent = 1.0 - np.exp(-((_rms_off_line(place) / _BENT_PX) ** 2))
@@ -282,7 +263,7 @@ def resting_track(
         return None
     best: BlobTrack | None = None
     for seed in np.flatnonzero(blobs.frame == blobs.frame[0]) if through is None else through:
-        near = np.hypot(*(blobs.plane_px - blobs.plane_px[seed]).T) < _MOVED_PX
+        near = np.hypot(*(blobs.plane_px - blobs.plane_px[seed]).T) < MOVED_PX
         alike = np.abs(np.log(blobs.area / blobs.area[seed])) < 0.4
         members = np.flatnonzero(near & alike)
         score = _score(blobs, members, len(images), 0.0) * (0.2 + _skin_share(images[0], blobs, int(seed)))

