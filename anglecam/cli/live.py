@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from anglecam.cli.options import Out, RigFile
+from anglecam.cli.options import Out
 from anglecam.cli.progress import end, progress_bars
 from anglecam.data.series import OK
 from anglecam.errors import AnglecamError, InputError, printable
 from anglecam.io.live_csv import LiveRow
-from anglecam.io.rig import Rig, read_rig
+from anglecam.io.rig import read_rig
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
@@ -42,10 +42,13 @@ def live(
         ),
     ],
     out: Out,
-    rig: RigFile = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option("--rig", help="Rig file; default: rig.yaml beside a film, otherwise in the folder --out."),
+    ] = None,
     command: Annotated[
         Path | None,
-        typer.Option("--command", help="Command file on the source's clock; default: the one beside a film."),
+        typer.Option("--command", help="Command file on the clock of the recording; default: the one beside a film."),
     ] = None,
 ) -> None:
     """Measure while filming: each angle as it comes, the recording, and the files that `measure` makes of it."""
@@ -56,10 +59,10 @@ def live(
 
     try:
         film = Path(source) if Path(source).is_file() else None
-        declared = read_rig(rig) if rig else Rig() if film is None else rig_beside(film)
+        make_folder(out)
+        declared = read_rig(rig) if rig else rig_beside(film or out)
         beside = None if film is None else command_beside(film)
         commanded = beside if command is None else read_command(command)
-        make_folder(out)
         opened = open_live(source)
         with progress_bars() as bars, _stopped_by_signals(opened):
             display = _Display(bars)

@@ -52,18 +52,22 @@ class RunningEkf:
             mean, np.diag(variance), first.command, first.interval, 0.0, PAPER.measurement_variance
         )
         self._time = float(first.time[0])
+        self._diverged = False
         for time, angle in zip(first.time.tolist(), first.angle.tolist(), strict=True):
             self.add(time, angle)
 
     def add(self, time: float, angle: float) -> RunningEstimate:
         """Use the angle, rad, of the next frame, s, and return the parameters after it."""
-        with np.errstate(over="ignore", invalid="ignore"):  # a filter may diverge; it then shows NaN
+        if self._diverged:
+            return RunningEstimate(_UNKNOWN, _UNKNOWN)
+        with np.errstate(over="ignore", invalid="ignore"):
             if time > self._time:
                 self._filter.predict(self._time, time)
             self._filter.update(angle)
         self._time = time
         ekf = self._filter.ekf
         variance = np.diag(ekf.P)[SHARED]
-        if not (np.isfinite(ekf.x).all() and (variance >= 0.0).all()):
+        self._diverged = not (np.isfinite(ekf.x).all() and (variance >= 0.0).all())
+        if self._diverged:
             return RunningEstimate(_UNKNOWN, _UNKNOWN)
         return RunningEstimate(tuple(ekf.x[SHARED].tolist()), tuple(np.sqrt(variance).tolist()))

@@ -12,7 +12,7 @@ import numpy as np
 from anglecam.io.files import write_atomically
 
 LIVE_ENDING = ".live.csv"
-_COLUMNS = ("frame", "time_s", "status", "line_deg", "angle_deg", "sigma_deg", "latency_ms")
+_COLUMNS = ("frame", "time_s", "status", "angle_deg", "sigma_deg", "latency_ms")
 _PARAMETERS = ("a_per_s", "b_per_s2", "c_per_s2")
 _Three = tuple[float, float, float]
 _UNKNOWN: _Three = (np.nan, np.nan, np.nan)
@@ -27,10 +27,8 @@ class LiveRow:
     """s."""
     status: str
     """That of `anglecam.data.series`, or ``learning`` or ``late`` for a frame that was not measured at once."""
-    line: float = np.nan
-    """Direction from pivot to mark, rad."""
     angle: float = np.nan
-    """From the neutral of the first frames, rad."""
+    """From neutral, rad."""
     sigma: float = np.nan
     """Standard uncertainty of ``angle``, rad."""
     latency: float = np.nan
@@ -47,7 +45,7 @@ def write_live(rows: Iterable[LiveRow], path: Path) -> None:
         table = csv.writer(stream, lineterminator="\n")
         table.writerow([*_COLUMNS, *(f"{name}{end}" for name in _PARAMETERS for end in ("", "_sigma"))])
         for row in rows:
-            angles = np.degrees([row.line, row.angle, row.sigma])
+            angles = np.degrees([row.angle, row.sigma])
             pairs = np.column_stack([row.parameters, row.parameter_sigmas]).ravel()
             figures = [_cell(v) for v in (*angles, 1e3 * row.latency, *pairs)]
             table.writerow([row.frame, f"{row.time:.9g}", row.status, *figures])

@@ -13,6 +13,7 @@ from pathlib import Path
 from anglecam.data.command import Command
 from anglecam.errors import InputError, RigError
 from anglecam.io.command_csv import COMMAND_ENDING, read_command
+from anglecam.io.live_csv import LIVE_ENDING
 from anglecam.io.numbered_images import has_numbered_images
 from anglecam.io.rig import Rig, read_rig
 from anglecam.io.tracks.files import TRACKS_ENDINGS, find_tracks, name_by_tool
@@ -189,7 +190,7 @@ def read_session(directory: Path, rig: Rig | None = None) -> Session:
     commands = sorted(directory.glob(f"*{COMMAND_ENDING}"))
     orphans = [p for p in commands if p.name.removesuffix(COMMAND_ENDING) not in sources]
     notes = [f"{p}: not used; there is no recording of that name" for p in orphans]
-    known = {*sources.values(), *commands, *find_tracks(directory)}
+    known = {*sources.values(), *commands, *find_tracks(directory), *directory.glob(f"*{LIVE_ENDING}")}
     others = [p for p in sorted(directory.glob("*.csv")) if p not in known and any(map(p.name.startswith, sources))]
     notes += [f"{p}: not used; a command is NAME{COMMAND_ENDING}, a series NAME{SERIES_ENDING}" for p in others]
     return Session(directory, rig, tuple(recordings), tuple(problems), (*unused, *notes))

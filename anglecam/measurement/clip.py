@@ -93,7 +93,12 @@ class Measurement:
 
 
 def measure_clip(
-    film: Film, rig: Rig, command: Command | None = None, *, progress: Callable[[int, int], None] | None = None
+    film: Film,
+    rig: Rig,
+    command: Command | None = None,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+    mark_only: bool = False,
 ) -> Measurement:
     """Measure the angle in every frame of a clip.
 
@@ -107,6 +112,8 @@ def measure_clip(
         Its first change ends the rest that defines neutral. Where the rig declares a lamp, the lamp dates that change.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
+    mark_only : bool
+        Whether a body without a mark is not sought where there is no mark.
 
     Returns
     -------
@@ -126,7 +133,7 @@ def measure_clip(
     camera = hold_camera(film)
     held = camera.film
     rig = as_seen_at_rest(rig, held)
-    followed = follow_mark_or_body(camera, rig, command, progress)
+    followed = follow_mark_or_body(camera, rig, command, progress, mark_only=mark_only)
     detections = _as_filmed(followed.detections, held)
     series = _series(held, rig, followed, detections.status, lamp)
     zero = why_zero_is_elsewhere(rig, command, followed.time[followed.ok])

@@ -55,7 +55,12 @@ class Followed:
 
 
 def follow_mark_or_body(
-    camera: HeldCamera, rig: Rig, command: Command | None, progress: Callable[[int, int], None] | None = None
+    camera: HeldCamera,
+    rig: Rig,
+    command: Command | None,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    mark_only: bool = False,
 ) -> Followed:
     """Measure the angle of the mark or, where none is declared and none is found, of a rigid body or its outline.
 
@@ -69,6 +74,8 @@ def follow_mark_or_body(
         Its first change ends the rest that defines neutral.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
+    mark_only : bool
+        Whether a body without a mark is not sought.
 
     Returns
     -------
@@ -89,7 +96,7 @@ def follow_mark_or_body(
         causes, ways = [str(problem)], _without_mark(camera, rig)
     except InputError as problem:  # the mark moves otherwise; what turns about a hinted pivot may be another thing
         causes, ways = [str(problem)], [detect_layer] if _is_hinted(camera, rig) else []
-    for follow in ways:
+    for follow in () if mark_only else ways:
         try:
             body = follow(film, rig)
             if isinstance(body, Detections):

@@ -1,9 +1,9 @@
 """What the first frames of a film show, by which the angle in each further frame is measured at once.
 
 The first frames are measured as a clip (`anglecam.measurement.clip`). This finds the mark, the pivot and the body, and
-refuses what is not a rotation. The angle in another frame is that of the whole body where it could be learnt, and within
-the angles at which it was learnt: light and perspective change with the angle. Otherwise it is that of the line from the
-pivot to the mark. Its uncertainty has the terms of `anglecam.measurement.fine_angles` and
+refuses what is not a rotation. The angle in another frame is that of the whole body, where the body could be learnt and
+only among the angles at which it was learnt: light and perspective change with the angle. Otherwise it is that of the
+line from the pivot to the mark. Its uncertainty has the terms of `anglecam.measurement.fine_angles` and
 `anglecam.measurement.angles`. Their part that all frames share is that of the first frames.
 """
 
@@ -149,7 +149,7 @@ def live_model(first: Measurement, rig: Rig) -> LiveModel | str:
         sign=1.0 if rig.facing == "right" else -1.0,
         mark_sigma=float(np.sqrt(np.mean(coarse**2 + angles.view.sigma**2 + angles.within_exposure**2))),
         body=body,
-        terms=None if body is None else _terms(angles, first, rig),
+        terms=None if body is None else _terms(angles, first, rig, coarse),
     )
 
 
@@ -174,7 +174,7 @@ def _body(first: Measurement, path: MarkPath, rig: Rig) -> BodyAhead | None:
     )
 
 
-def _terms(angles: Angles, first: Measurement, rig: Rig) -> BodyTerms:
+def _terms(angles: Angles, first: Measurement, rig: Rig, coarse: Floats) -> BodyTerms:
     """Return the terms that the first frames determine; see `anglecam.measurement.fine_angles.fine_angles`."""
     registered = angles.registered
     assert registered is not None
@@ -184,6 +184,8 @@ def _terms(angles: Angles, first: Measurement, rig: Rig) -> BodyTerms:
     used = seen if angles.resting is None or not (angles.resting & seen).any() else angles.resting & seen
     others = angles.view.sigma**2 + angles.within_exposure**2
     shared = angles.shared**2 + float(others[seen].mean())
+    if angles.resting is None:
+        shared += float(np.median(coarse[seen])) ** 2  # a declared neutral is an absolute direction
     return BodyTerms(
         turns=(float(turn[seen].min()), float(turn[seen].max())),
         zero=float(np.median(angles.line[seen] - sign * turn[seen])),

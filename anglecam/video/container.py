@@ -37,8 +37,10 @@ _ONE_AT_A_TIME = threading.Lock()
 _CONTAINERS = "avi,matroska,webm,mov,mp4,asf,flv,mpegts,mpeg,ogg,nut,mxf,gif"
 """FFmpeg's names of the containers that store time stamps and refer to no other file."""
 
-_STREAMS = f"{_CONTAINERS},mjpeg,mpjpeg,h264,hevc,m4v,ivf,yuv4mpegpipe,rtsp,rtp,sdp"
-"""The same for pipes and network streams."""
+_UNTIMED = ("mjpeg", "mpjpeg", "h264", "hevc", "m4v")
+"""The same of pictures without time stamps: FFmpeg would assume 25 a second."""
+_STREAMS = ",".join([_CONTAINERS, *_UNTIMED, "ivf", "yuv4mpegpipe", "rtsp", "rtp", "sdp"])
+"""The same of what a pipe or a network stream may be; those without time stamps are named when they are refused."""
 _PROTOCOLS = "pipe,file,rtsp,rtp,udp,tcp,http,https,tls,crypto"
 """FFmpeg's names of the protocols of pipes and network streams."""
 _PATIENCE_S = (20.0, 20.0)
@@ -127,6 +129,8 @@ def open_stream(address: str, name: str, form: str | None = None) -> av.containe
     else:
         raise InputError(f"{name}: cannot be opened ({cause})")
     fault = _fault(container)
+    if container.format.name in _UNTIMED:
+        fault = "pictures without time stamps; send them in a container, such as MPEG-TS or Matroska"
     if fault is not None:
         container.close()
         raise InputError(f"{name}: {fault}")

@@ -57,7 +57,7 @@ def open_film(path: Path, frames: RigFrames | None = None) -> Film:
         picture = _first_picture(decode_container(path, container))
         independent = stream.codec_context.name in INTRA_CODECS
         rows = FilmRows(path, partial(decode, path), wanted, independent, declared * picture_bytes(picture))
-        return _film(path, stream, picture, size, form, rows, declared)
+        return _film(path, stream, picture, size, form, rows, declared, is_cut_short(path))
 
 
 def film_of_rows(path: Path, container: av.container.InputContainer, rows: Sequence[Row]) -> Film:
@@ -95,6 +95,7 @@ def _film(
     form: av.VideoFormat | None,
     rows: FilmRows,
     declared: int = 0,
+    cut_short: bool = False,
 ) -> Film:
     codec = stream.codec_context.name
     return Film(
@@ -103,7 +104,7 @@ def _film(
         declared_frames=declared,
         codec=codec,
         coarse_colour=_has_coarse_colour(form),
-        cut_short=path.is_file() and is_cut_short(path),
+        cut_short=cut_short,
         rows=rows,
         bottom_first=None if codec in STILL_CODECS else is_bottom_first(stream.codec_context.field_order),
     )

@@ -13,7 +13,11 @@ import av
 
 from anglecam.errors import InputError
 
-_FRAGMENTS = {"movflags": "empty_moov+default_base_moof+delay_moov", "frag_duration": "1000000"}
+_FRAGMENTS = {
+    "movflags": "empty_moov+default_base_moof+delay_moov",
+    "frag_duration": "1000000",
+    "movie_timescale": "90000",  # of the first frame's time; milliseconds by default
+}
 _Form = tuple[str, str, dict[str, str]]
 _AVI: tuple[_Form, ...] = (("avi", ".avi", {}),)
 _OTHERS: tuple[_Form, ...] = (("mov", ".mov", _FRAGMENTS), ("matroska", ".mkv", {}))
@@ -45,7 +49,7 @@ class Recording:
             return
         copy = av.Packet(bytes(packet))
         copy.stream, copy.time_base = self._stream, packet.time_base
-        copy.dts = packet.dts if packet.dts is not None else packet.pts
+        copy.dts = packet.dts  # Matroska states none while the decoder's delay fills; the container makes them up
         copy.pts = packet.pts if packet.pts is not None else packet.dts
         copy.duration, copy.is_keyframe = packet.duration or 0, packet.is_keyframe
         try:

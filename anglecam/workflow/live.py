@@ -27,7 +27,7 @@ from anglecam.measurement.live_model import LiveAngle
 from anglecam.video.decode import Row
 from anglecam.video.live_source import LiveSource
 from anglecam.workflow.clip import Progress, measure_source, open_recording, write_measurement
-from anglecam.workflow.live_learning import Learning
+from anglecam.workflow.live_learning import Learning, Lesson
 
 LATE_S = 0.1
 """A frame whose turn comes later than this is not measured at once."""
@@ -60,20 +60,16 @@ class LiveResult:
     def disagreement(self) -> float:
         """RMS difference between the angles at once and those of the recording, in standard uncertainties; NaN if none.
 
-        A difference that all frames share is left out: it depends on what counts as neutral.
+        A difference that all frames share is left out: neutral may be the median of all angles.
         """
         series = self.measurement.series
-        if series.line is None:
-            return float("nan")
-        live = np.array([row.line for row in self.rows])
-        sigma = np.array([row.sigma for row in self.rows])
-        n = min(len(live), len(series.line))
-        off = live[:n] - series.line[:n]
+        n = min(len(self.rows), len(series.angle))
+        off = np.array([row.angle for row in self.rows[:n]]) - series.angle[:n]
+        sigma = np.hypot([row.sigma for row in self.rows[:n]], series.sigma[:n])
         seen = np.isfinite(off)
         if not seen.any():
             return float("nan")
-        off = (off - np.median(off[seen]) + np.pi) % (2.0 * np.pi) - np.pi
-        return float(np.sqrt(np.mean((off[seen] / np.hypot(sigma[:n], series.sigma[:n])[seen]) ** 2)))
+        return float(np.sqrt(np.mean(((off - np.median(off[seen]))[seen] / sigma[seen]) ** 2)))
 
 
 def measure_live(
@@ -143,19 +139,18 @@ class _Session:
 
     def __init__(self, source: LiveSource, rig: Rig, command: Command | None) -> None:
         self.learning = Learning(source, rig, command)
+        self._rig = rig
         self.rows: list[LiveRow] = []
         self._meter: LiveMeter | None = None
         self._neutral = 0.0
+        self._lines: dict[int, float] = {}
         self._filter: RunningEkf | None = None
 
     def add(self, row: Row, ready: float) -> None:
         """Measure the next frame, which was ready at an instant of `time.monotonic`, unless it is too late."""
         lesson = self.learning.add(row)
-        if lesson is not None and self._meter is None:
-            self._meter, self._filter = LiveMeter(lesson.model, lesson.film), lesson.filter
-            self._neutral = lesson.model.neutral
-        elif lesson is not None and self._meter is not None:
-            self._meter.relearn(lesson.model)
+        if lesson is not None:
+            self._use(lesson)
         frame = LiveRow(len(self.rows), row[0], LEARNING)
         if self._meter is not None and time.monotonic() - ready > LATE_S:
             self._meter.skip()
@@ -165,11 +160,25 @@ class _Session:
             frame = replace(frame, latency=time.monotonic() - ready)
         self.rows.append(frame)
 
+    def _use(self, lesson: Lesson) -> None:
+        """Measure by a lesson from now on; neutral stays where it is by the frames of this and the last lesson."""
+        shared = [lesson.lines[k] - self._lines[k] for k in self._lines.keys() & lesson.lines.keys()]
+        if self._meter is None:
+            self._meter, self._filter = LiveMeter(lesson.model, lesson.film), lesson.filter
+        else:
+            self._meter.relearn(lesson.model)
+        if shared and self._rig.neutral == "auto":
+            moved = float(np.median(shared))
+            self._neutral += moved - 2.0 * np.pi * round(moved / (2.0 * np.pi))
+        else:
+            self._neutral = lesson.model.neutral
+        self._lines = lesson.lines
+
     def _measured(self, frame: LiveRow, found: LiveAngle) -> LiveRow:
         if found.status != OK:
             return replace(frame, status=found.status)
         angle = found.line - self._neutral
-        frame = replace(frame, status=OK, line=found.line, angle=angle, sigma=found.sigma)
+        frame = replace(frame, status=OK, angle=angle, sigma=found.sigma)
         if self._filter is None:
             return frame
         estimate = self._filter.add(frame.time, angle)

@@ -1,7 +1,8 @@
 """Learn from the frames of a source in a thread, while more frames come, and again when there are twice as many.
 
 What is learnt from two seconds holds for the angles that were seen in them. The body is therefore learnt again from
-evenly spaced frames of all that was filmed, at doubled durations: of an hour ten times.
+evenly spaced frames of all that was filmed, at doubled durations: of an hour ten times. A failed attempt is repeated
+sooner: the mechanism may have rested.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import os
 from contextlib import suppress
 from dataclasses import dataclass
+from math import isnan
 from threading import Thread, get_native_id
 
 from anglecam.data.command import Command
@@ -25,8 +27,8 @@ from anglecam.video.live_source import LiveSource
 
 _FIRST_S, _FEWEST = 2.0, 24
 """Duration and number of the frames of the first attempt: less seldom shows a motion."""
-_LONGER = 2.0
-"""Ratio of the durations of an attempt and the one before it."""
+_LONGER, _SOONER = 2.0, 1.25
+"""Ratio of the durations of an attempt and the one before it, after a success and after a failure."""
 _NICENESS = 10
 """Of the thread: where the processor is short, frames are measured first."""
 
@@ -38,6 +40,8 @@ class Lesson:
     model: LiveModel
     film: Film
     """These frames."""
+    lines: dict[int, float]
+    """Direction of the line from pivot to mark in those that were measured, by their numbers, rad."""
     filter: RunningEkf | None
     """After these frames; ``None`` where they are too few."""
 
@@ -75,8 +79,9 @@ class Learning:
         lesson = None
         if self._thread is not None and not self._thread.is_alive():
             self._thread, lesson, self._lesson = None, self._lesson, None
+            self._due_s *= _SOONER if lesson is None else _LONGER
         if self._thread is None and lasted >= self._due_s and len(self._kept.rows) >= _FEWEST:
-            self._due_s = _LONGER * lasted
+            self._due_s = lasted
             self._thread = Thread(target=self._learn, args=(list(self._kept.rows),), name="learning", daemon=True)
             self._thread.start()
         return lesson
@@ -99,8 +104,9 @@ class Learning:
 
     def _lesson_from(self, numbered: list[tuple[int, Row]]) -> Lesson:
         film = self._source.film_of([row for _, row in numbered])
-        rig = _rig_of_kept(self._rig, [number for number, _ in numbered])
-        first = measure_clip(film, rig, self._command)
+        numbers = [number for number, _ in numbered]
+        rig = _rig_of_kept(self._rig, numbers)
+        first = measure_clip(film, rig, self._command, mark_only=True)
         model = live_model(first, rig)
         if isinstance(model, str):
             raise InputError(f"{film.path}: {model}")
@@ -110,7 +116,10 @@ class Learning:
             )
         except InputError:  # too few frames for the filter
             record = None
-        return Lesson(model, film, None if record is None else RunningEkf(record))
+        line = first.series.line
+        assert line is not None  # only tracks may lack it
+        lines = {k: at for k, at in zip(numbers, line.tolist(), strict=True) if not isnan(at)}
+        return Lesson(model, film, lines, None if record is None else RunningEkf(record))
 
 
 def _rig_of_kept(rig: Rig, numbers: list[int]) -> Rig:

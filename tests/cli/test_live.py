@@ -1,0 +1,60 @@
+"""The command `live` as a user calls it: what it prints, its files, its exit status, and how it is stopped."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from support import things
+
+ANGLES = 20.0 * np.sin(np.arange(300) / 5.0)
+CALL = [sys.executable, "-c", "from anglecam.cli.app import main; main()", "live"]
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("film")
+    return things.film(folder / "swing.mkv", things.ball((200, 40, 40), 12.0), ANGLES)
+
+
+def _live(*arguments):
+    return subprocess.run([*CALL, *map(str, arguments)], capture_output=True, text=True, check=False)
+
+
+def test_an_interruption_ends_the_recording_and_what_came_is_measured(film, tmp_path):
+    pipe = tmp_path / "camera"
+    os.mkfifo(pipe)
+    out = tmp_path / "out"
+    with (
+        subprocess.Popen([*CALL, str(pipe), "--out", str(out)], stdout=-1, stderr=-1, text=True) as called,
+        pipe.open("wb") as stream,
+    ):
+        stream.write(film.read_bytes())
+        stream.flush()
+        assert called.stdout is not None
+        for line in called.stdout:
+            if re.match(r" *\d+\.\d\d s", line):
+                break
+        called.send_signal(signal.SIGINT)
+        printed, told = called.communicate(timeout=300)
+    assert called.returncode == 0, told
+    assert re.search(
+        r"\d+ frames recorded, \d+ measured at once, \d+ while the mark was learnt, \d+ not in time", printed
+    )
+    made = {path.name for path in out.iterdir()}
+    assert {"camera.angles.csv", "camera.live.csv", "camera.live.png", "camera.png"} <= made
+
+
+@pytest.mark.parametrize("source", ["nothing.avi", "77", "http://127.0.0.1:9/film"])
+def test_a_source_that_cannot_be_opened_is_said_in_a_line(source, tmp_path):
+    called = _live(source, "--out", tmp_path / "out")
+    assert called.returncode != 0
+    assert source in called.stderr
+    assert len(called.stderr.strip().splitlines()) == 1
+    assert not called.stdout
