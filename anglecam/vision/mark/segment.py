@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.mark.colour import EMPTY_LEVEL, FULL_LEVEL, ColourModel
+from anglecam.vision.mark.cover import connected_tail, cover_weight
 
 SMALLEST_SHARE, LARGEST_SHARE = 0.25, 8.0
 """Of the mark's area; a smaller region is not the mark, even if partly hidden, nor is a larger one, even if merged."""
@@ -24,10 +25,6 @@ MARGIN_PX = 12
 """Margin around a region, px, that contains the foot of its edges."""
 _FOOT_PX = 3
 """Reach of a filmed edge from the half level, px: optics, chroma at half resolution, a codec's ringing."""
-_LOCAL_PX = 4.0
-"""Scale, px, on which the values inside and outside of an edge are taken to be constant."""
-_PRIOR = np.float32(1e-3)
-"""Weight of the clip's typical values (0 outside, 1 inside) where no pixel is near."""
 _MIN_OUTLINE_PX = 8
 """A patch with a shorter outline is a speck."""
 _SPECK_SHARE = 0.03
@@ -101,13 +98,15 @@ def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], m
     outline = _outline(smooth[box], inner)
     filled = cv2.drawContours(np.zeros_like(inner), [outline], -1, 1, cv2.FILLED)
     reach = _reach(smooth[box], filled, model)
-    near_others = cv2.dilate(others, disc(_FOOT_PX))
-    # Specks of the colour are ignored: they come and go with the noise.
-    touched = bool((others & cv2.dilate(reach, disc(_FOOT_PX))).sum() > _SPECK_SHARE * inner.sum())
-    reach &= 1 - near_others
+    near, touched = reach, False
+    if others.any():
+        near_others = cv2.dilate(others, disc(_FOOT_PX))
+        # Specks of the colour are ignored: they come and go with the noise.
+        touched = bool((others & cv2.dilate(reach, disc(_FOOT_PX))).sum() > _SPECK_SHARE * inner.sum())
+        reach &= 1 - near_others
+        near = reach | near_others
     low = min(0.4, max(0.1, 3.0 * model.noise))
-    cover = _cover(fraction[box], filled, reach | near_others)
-    weight = np.clip((cover - low) / (1.0 - 2.0 * low), 0.0, 1.0) * reach
+    weight = cover_weight(fraction[box], cv2.erode(filled, disc(2)), near, reach, low)
     # A highlight or the teeth inside the outline belong to the mark: away from the edge the outline is filled.
     weight[cv2.erode(filled, disc(_FOOT_PX)) > 0] = 1.0
 
@@ -149,28 +148,7 @@ def _outline(smooth: Image, inner: Image) -> NDArray[Any]:
 def _reach(smooth: Image, filled: Image, model: ColourModel) -> Image:
     """Return the pixels that may contain some of the region: its foot, and the tail that motion blur draws out."""
     low = EMPTY_LEVEL + max(0.25, 4.0 * model.noise) * (FULL_LEVEL - EMPTY_LEVEL)
-    tail = ((smooth >= low) | (filled > 0)).astype(np.uint8)
-    _, labels = cv2.connectedComponents(tail, connectivity=8)
-    belongs = np.zeros(labels.max() + 1, np.uint8)
-    belongs[labels[filled > 0]] = 1
-    belongs[0] = 0
-    connected = belongs[labels]
-    return cv2.dilate(connected, disc(_FOOT_PX))
-
-
-def _cover(fraction: Image, filled: Image, reach: Image) -> NDArray[Any]:
-    """Return the covered share of each pixel, scaled between the local values just inside and just outside the region.
-
-    A single scale for the whole picture would shift the edge as bright and dark wallpaper pass behind it.
-    """
-    value = (fraction.astype(np.float32) - EMPTY_LEVEL) / (FULL_LEVEL - EMPTY_LEVEL)
-    inside = cv2.erode(filled, disc(2)).astype(np.float32)
-    outside = (1 - reach).astype(np.float32)
-    # normalised convolution (Knutsson & Westin 1993) extends known values smoothly to where none is known
-    known = cv2.merge([value * inside + _PRIOR, _PRIOR + inside, value * outside, _PRIOR + outside])
-    within, of_within, without, of_without = cv2.split(cv2.GaussianBlur(known, (0, 0), _LOCAL_PX))
-    low = without / of_without
-    return (value - low) / np.maximum(within / of_within - low, 0.3)
+    return cv2.dilate(connected_tail(smooth, filled, low), disc(_FOOT_PX))
 
 
 @cache
