@@ -51,6 +51,22 @@ class Region:
     """False where the region touches the picture's edge or another region."""
 
 
+@dataclass(frozen=True)
+class Patch:
+    """A patch of the mark's colour that is not measured yet."""
+
+    fraction: Image
+    """(h, w) fraction map of the whole picture."""
+    smooth: Image
+    """The same without single pixels' noise."""
+    core: Image
+    """(h, w) bytes: 1 in the patches of the picture."""
+    contour_px: NDArray[Any]
+    """(k, 1, 2) outline."""
+    cut: bool
+    """Whether it touches the picture's edge; its region is then not whole."""
+
+
 def find_regions(image: Image, model: ColourModel, areas_px2: tuple[float, float], opening_px: int = 0) -> list[Region]:
     """Find the regions of the mark's colour in an image.
 
@@ -71,29 +87,40 @@ def find_regions(image: Image, model: ColourModel, areas_px2: tuple[float, float
     list of Region
         Largest first, at most 12.
     """
+    measured = (measure(patch, model) for patch in find_patches(image, model, areas_px2, opening_px))
+    return [region for region in measured if region is not None]
+
+
+def find_patches(image: Image, model: ColourModel, areas_px2: tuple[float, float], opening_px: int = 0) -> list[Patch]:
+    """Find the patches that `find_regions` measures; parameters and order are the same."""
     fraction = model.fraction_map(image)
     smooth = cv2.GaussianBlur(fraction, (3, 3), 0)
     half = (EMPTY_LEVEL + FULL_LEVEL) / 2.0
     core = (smooth >= half).astype(np.uint8)
     compact = cv2.morphologyEx(core, cv2.MORPH_OPEN, disc(opening_px)) if opening_px else core
-    patches, _ = cv2.findContours(compact, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    sized = sorted(((cv2.contourArea(p), k) for k, p in enumerate(patches) if len(p) >= _MIN_OUTLINE_PX), reverse=True)
+    outlines, _ = cv2.findContours(compact, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    sized = sorted(((cv2.contourArea(o), k) for k, o in enumerate(outlines) if len(o) >= _MIN_OUTLINE_PX), reverse=True)
     least, most = areas_px2
-    likely = [patches[k] for area, k in sized[:_MAX_REGIONS] if least <= area <= most]
-    measured = (_measure(fraction, smooth, compact, patch, model) for patch in likely)
-    return [region for region in measured if region is not None]
+    likely = [outlines[k] for area, k in sized[:_MAX_REGIONS] if least <= area <= most]
+    return [Patch(fraction, smooth, compact, outline, _is_cut(outline, fraction)) for outline in likely]
 
 
-def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], model: ColourModel) -> Region | None:
+def _is_cut(outline: NDArray[Any], picture: Image) -> bool:
+    left, top, across, down = cv2.boundingRect(outline)
+    height, width = picture.shape
+    return left <= 0 or top <= 0 or left + across >= width or top + down >= height
+
+
+def measure(patch: Patch, model: ColourModel) -> Region | None:
     """Measure one patch; ``None`` where nothing of it remains after its neighbours are excluded."""
+    fraction, smooth, core = patch.fraction, patch.smooth, patch.core
     height, width = fraction.shape
-    left, top, across, down = cv2.boundingRect(patch)
+    left, top, across, down = cv2.boundingRect(patch.contour_px)
     right, bottom = left + across, top + down
-    cut = left <= 0 or top <= 0 or right >= width or bottom >= height
     x0, y0 = max(left - MARGIN_PX, 0), max(top - MARGIN_PX, 0)
     box = np.s_[y0 : min(bottom + MARGIN_PX, height), x0 : min(right + MARGIN_PX, width)]
     inner = np.zeros_like(core[box])
-    cv2.drawContours(inner, [patch], -1, 1, cv2.FILLED, offset=(-x0, -y0))
+    cv2.drawContours(inner, [patch.contour_px], -1, 1, cv2.FILLED, offset=(-x0, -y0))
     others = core[box] & (1 - inner)
     outline = _outline(smooth[box], inner)
     filled = cv2.drawContours(np.zeros_like(inner), [outline], -1, 1, cv2.FILLED)
@@ -122,7 +149,7 @@ def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], m
         moments_px2=moments,
         noise_px2=(slope / area) ** 2 * _moments(soft, 1.0, centre)[1],
         contour_px=(outline.reshape(-1, 2) + [x0, y0]).astype(np.int32),
-        whole=not (cut or touched),
+        whole=not (patch.cut or touched),
     )
 
 
