@@ -217,8 +217,11 @@ def _steadiness(followed: MarkTrack, circle: tuple[Floats, float]) -> float:
 
 def _contrast_range(maps: Sequence[NDArray[Any]], at_rest: bool) -> tuple[float, float]:
     """Return the usual contrast of the picture and the highest one, of moving pixels where there are enough."""
-    stack_max = np.maximum.reduce(list(maps))
-    change = stack_max - np.minimum.reduce(list(maps))
+    stack_max, stack_min = maps[0].copy(), maps[0].copy()
+    for contrast in maps[1:]:
+        np.maximum(stack_max, contrast, out=stack_max)
+        np.minimum(stack_min, contrast, out=stack_min)
+    change = np.subtract(stack_max, stack_min, out=stack_min)
     usual = float(np.median(maps[0]))
     # Moving pixels set the scale, because a static thing may have far more of the colour than the mark.
     moving = stack_max[change > MIN_CONTRAST]

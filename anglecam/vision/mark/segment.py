@@ -25,6 +25,8 @@ MARGIN_PX = 12
 """Margin around a region, px, that contains the foot of its edges."""
 _FOOT_PX = 3
 """Reach of a filmed edge from the half level, px: optics, chroma at half resolution, a codec's ringing."""
+_BELOW_HALF = np.ceil((EMPTY_LEVEL + FULL_LEVEL) / 2.0) - 1.0
+"""Highest grey level of a pixel that the mark covers by less than half."""
 _MIN_OUTLINE_PX = 8
 """A patch with a shorter outline is a speck."""
 _SPECK_SHARE = 0.03
@@ -95,8 +97,7 @@ def find_patches(image: Image, model: ColourModel, areas_px2: tuple[float, float
     """Find the patches that `find_regions` measures; parameters and order are the same."""
     fraction = model.fraction_map(image)
     smooth = cv2.GaussianBlur(fraction, (3, 3), 0)
-    half = (EMPTY_LEVEL + FULL_LEVEL) / 2.0
-    core = (smooth >= half).astype(np.uint8)
+    _, core = cv2.threshold(smooth, _BELOW_HALF, 1, cv2.THRESH_BINARY)
     compact = cv2.morphologyEx(core, cv2.MORPH_OPEN, disc(opening_px)) if opening_px else core
     outlines, _ = cv2.findContours(compact, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     sized = sorted(((cv2.contourArea(o), k) for k, o in enumerate(outlines) if len(o) >= _MIN_OUTLINE_PX), reverse=True)

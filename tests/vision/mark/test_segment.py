@@ -45,3 +45,15 @@ def test_a_patch_at_the_pictures_edge_is_cut_before_and_after_it_is_measured():
     assert [region.whole for region in regions] == [False, True]
     assert regions[1].centre_px == pytest.approx([59.5, 29.5], abs=1e-6)
     assert regions[1].area_px2 == measure(patches[1], RED).area_px2
+
+
+@pytest.mark.parametrize(("level", "found"), [(127, 0), (128, 1)])
+def test_a_patch_is_where_the_mark_covers_at_least_half_of_a_pixel(level, found):
+    grey = ColourModel(
+        np.array([0.0, 0.0, 1 / 175]), -40 / 175, 0.01, np.zeros(3)
+    )  # the fraction map is the red channel
+    red = np.full((40, 40), 40.0)
+    red[10:30, 10:30] = level
+    patches = find_patches(_picture(red), grey, (10.0, np.inf))
+    assert len(patches) == found
+    assert all(patch.core.sum() == 18**2 for patch in patches)  # smoothing empties its outermost pixels
