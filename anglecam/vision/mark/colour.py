@@ -89,28 +89,40 @@ def lab_of(rgb: tuple[int, int, int]) -> Floats:
     return (stored - [0.0, 128.0, 128.0]) * [100.0 / 255.0, 1.0, 1.0]
 
 
-def fit_discriminant(inside: Floats, around: Floats, elsewhere: Floats) -> ColourModel:
+def fit_discriminant(inside: Image, around: Image, elsewhere: Image) -> ColourModel:
     """Fit the linear discriminant between the mark and its surroundings: w ∝ Σ⁻¹ (μ_mark − μ_around) (Fisher 1936).
 
     Parameters
     ----------
     inside, around, elsewhere : ndarray
-        (n, 3) blue, green, red: of the mark's inner pixels, of the pixels next to it, and of the rest of the picture
-        without things of the mark's colour.
+        (n, 3) blue, green, red, bytes: of the mark's inner pixels, of the pixels next to it, and of the rest of the
+        picture without things of the mark's colour.
 
     Returns
     -------
     ColourModel
         Scaled so that the mean of the surroundings maps to 0 and that of the mark to 1.
     """
-    mean_in, mean_around = inside.mean(axis=0), around.mean(axis=0)
+    mean_in, mean_around = _mean(inside), _mean(around)
     # The scatter is taken around the neighbours' mean, so that colours far from it (dark hair) are suppressed too.
-    off = elsewhere.astype(float) - mean_around
-    spread = (1.0 - _ELSEWHERE_SHARE) * np.cov(around.T) + _ELSEWHERE_SHARE * off.T @ off / len(off)
-    within = np.cov(inside.T) + spread + _NOISE_FLOOR**2 * np.eye(3)
-    w = np.linalg.solve(within, mean_in - mean_around)
+    off = elsewhere - mean_around
+    spread = (1.0 - _ELSEWHERE_SHARE) * _covariance(around, mean_around) + _ELSEWHERE_SHARE * off.T @ off / len(off)
+    within = _covariance(inside, mean_in) + spread + _NOISE_FLOOR**2 * np.eye(3)
+    w = np.asarray(np.linalg.solve(within, mean_in - mean_around), float)
     w /= w @ (mean_in - mean_around)
     offset = -float(w @ mean_around)
-    value = around @ w + offset
+    value = around.astype(float) @ w + offset
     noise = 1.4826 * float(np.median(np.abs(value - np.median(value))))
     return ColourModel(w, offset, noise, mean_in)
+
+
+def _mean(pixels: Image) -> Floats:
+    """Return the mean colour (3,) of pixels (n, 3)."""
+    sums = [int(pixels[:, k].sum(dtype=np.int64)) for k in range(3)]  # a sum of bytes is exact, and faster by column
+    return np.array(sums, float) / len(pixels)
+
+
+def _covariance(pixels: Image, mean: Floats) -> Floats:
+    """Return the covariance (3, 3) of pixels (n, 3) around their mean (3,)."""
+    off = pixels - mean
+    return np.asarray(off.T @ off * (1.0 / (len(pixels) - 1)))

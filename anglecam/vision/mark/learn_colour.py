@@ -42,18 +42,25 @@ def learn_colour(
         collar: Image = cv2.dilate(grown, np.ones((2 * collar_px + 1, 2 * collar_px + 1), np.uint8)) - grown
         near_coloured: Image = cv2.dilate(coloured, edge)
         collar = collar & (1 - near_coloured[part])
-        inside.append(images[t][part][core > 0])
-        around.append(images[t][part][collar > 0])
-        if collar.any():
-            contrast.append(float(np.median(maps[t][part][core > 0]) - np.median(maps[t][part][collar > 0])))
+        inside.append(_picked(images[t][part], core))
+        around.append(_picked(images[t][part], collar))
+        if len(around[-1]):
+            here, beside = _picked(maps[t][part], core), _picked(maps[t][part], collar)
+            contrast.append(float(np.median(here) - np.median(beside)))
         rest = np.s_[::8, ::8]
         elsewhere.append(images[t][rest][near_coloured[rest] == 0])
-    parts = [np.concatenate(p).astype(float) for p in (inside, around, elsewhere)]
+    parts = [np.concatenate(p) for p in (inside, around, elsewhere)]
     # The contrast to the collar excludes a blush: it stands out from the wall, but not from the face.
     if min(map(len, parts)) < 20 or np.median(contrast) < MIN_CONTRAST:
         return None
     model = fit_discriminant(*parts)
     return model if model.noise < max_noise else None
+
+
+def _picked(picture: NDArray[Any], mask: Image) -> NDArray[Any]:
+    """Return the pixels of a picture (h, w) or (h, w, 3) where a mask of bytes is not 0."""
+    pixels = picture.reshape(-1, *picture.shape[2:])
+    return pixels.take(np.flatnonzero(mask), axis=0)  # indexing with booleans takes several times as long
 
 
 def is_same_colour(model: ColourModel, rgb: tuple[int, int, int] | None) -> bool:

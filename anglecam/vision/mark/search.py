@@ -25,7 +25,7 @@ from anglecam.vision.mark.blobs import Blobs, blobs_of_regions, find_blobs
 from anglecam.vision.mark.cues import RED, Cue, declared_cue, moving_cues, pointed_cues
 from anglecam.vision.mark.found_mark import FoundMark, Samples
 from anglecam.vision.mark.learn_colour import MIN_CONTRAST, is_same_colour, learn_colour
-from anglecam.vision.mark.segment import SMALLEST_SHARE, disc, find_regions
+from anglecam.vision.mark.segment import SMALLEST_SHARE, Patch, Region, disc, find_patches, measure
 from anglecam.vision.mark.track import MarkTrack, follow_mark
 
 _LEVEL_SHARES = (0.3, 0.4, 0.5, 0.6, 0.7)
@@ -163,18 +163,21 @@ def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hi
     The threshold that found the blobs may have cut off a part of the mark, or joined it to something. A disc that
     another thing passes in front of seems to move, but its area changes.
     """
-    regions = [
-        [
-            samples.in_plane(i, region)
-            for region in find_regions(image, mark.model, (SMALLEST_SHARE * mark.area_px2, np.inf), mark.opening_px)
-        ]
-        for i, image in enumerate(samples.images)
-    ]
-    blobs = blobs_of_regions(regions)
+    areas = SMALLEST_SHARE * mark.area_px2, np.inf
+    patches = [find_patches(image, mark.model, areas, mark.opening_px) for image in samples.images]
+
+    def region_of(i: int, patch: Patch) -> Region | None:
+        region = measure(patch, mark.model)
+        return None if region is None else samples.in_plane(i, region)
+
+    # A cut patch is never the mark, and the whole wall may be one: it is measured only where a mark goes on a circle.
+    inner = [[None if patch.cut else region_of(i, patch) for patch in some] for i, some in enumerate(patches)]
+    blobs = blobs_of_regions([[region for region in some if region is not None] for some in inner])
     through = None
     if samples.pointed_px is not None:
         first = np.flatnonzero(blobs.frame == 0)
         through = first[_in_box(blobs.picture_px[first], samples.pointed_px, np.sqrt(mark.area_px2))]
+    regions: list[list[Region]] = []
     best: FoundMark | None = None
     for centre in (hint,) if hint is None else (hint, None):
         track = moving_track(blobs, samples.images, 0.0, centre, on_body=cue.on_body, through=through)
@@ -183,6 +186,12 @@ def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hi
         area, place = _typical(track)
         if area > _LARGEST_SHARE * samples.images[0].shape[0] * samples.images[0].shape[1]:
             continue
+        if not regions:
+            every = [
+                [region_of(i, patch) if patch.cut else region for patch, region in zip(*both, strict=True)]
+                for i, both in enumerate(zip(patches, inner, strict=True))
+            ]
+            regions = [[region for region in some if region is not None] for some in every]
         again = replace(mark, area_px2=area, place_px=place, circle=track.circle)
         followed = follow_mark(regions, samples.time, again)
         share = followed.status.count(OK) / len(followed.status)
@@ -208,8 +217,11 @@ def _steadiness(followed: MarkTrack, circle: tuple[Floats, float]) -> float:
 
 def _contrast_range(maps: Sequence[NDArray[Any]], at_rest: bool) -> tuple[float, float]:
     """Return the usual contrast of the picture and the highest one, of moving pixels where there are enough."""
-    stack_max = np.maximum.reduce(list(maps))
-    change = stack_max - np.minimum.reduce(list(maps))
+    stack_max, stack_min = maps[0].copy(), maps[0].copy()
+    for contrast in maps[1:]:
+        np.maximum(stack_max, contrast, out=stack_max)
+        np.minimum(stack_min, contrast, out=stack_min)
+    change = np.subtract(stack_max, stack_min, out=stack_min)
     usual = float(np.median(maps[0]))
     # Moving pixels set the scale, because a static thing may have far more of the colour than the mark.
     moving = stack_max[change > MIN_CONTRAST]

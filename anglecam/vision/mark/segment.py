@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.mark.colour import EMPTY_LEVEL, FULL_LEVEL, ColourModel
+from anglecam.vision.mark.cover import connected_tail, cover_weight
 
 SMALLEST_SHARE, LARGEST_SHARE = 0.25, 8.0
 """Of the mark's area; a smaller region is not the mark, even if partly hidden, nor is a larger one, even if merged."""
@@ -24,10 +25,8 @@ MARGIN_PX = 12
 """Margin around a region, px, that contains the foot of its edges."""
 _FOOT_PX = 3
 """Reach of a filmed edge from the half level, px: optics, chroma at half resolution, a codec's ringing."""
-_LOCAL_PX = 4.0
-"""Scale, px, on which the values inside and outside of an edge are taken to be constant."""
-_PRIOR = np.float32(1e-3)
-"""Weight of the clip's typical values (0 outside, 1 inside) where no pixel is near."""
+_BELOW_HALF = np.ceil((EMPTY_LEVEL + FULL_LEVEL) / 2.0) - 1.0
+"""Highest grey level of a pixel that the mark covers by less than half."""
 _MIN_OUTLINE_PX = 8
 """A patch with a shorter outline is a speck."""
 _SPECK_SHARE = 0.03
@@ -54,6 +53,22 @@ class Region:
     """False where the region touches the picture's edge or another region."""
 
 
+@dataclass(frozen=True)
+class Patch:
+    """A patch of the mark's colour that is not measured yet."""
+
+    fraction: Image
+    """(h, w) fraction map of the whole picture."""
+    smooth: Image
+    """The same without single pixels' noise."""
+    core: Image
+    """(h, w) bytes: 1 in the patches of the picture."""
+    contour_px: NDArray[Any]
+    """(k, 1, 2) outline."""
+    cut: bool
+    """Whether it touches the picture's edge; its region is then not whole."""
+
+
 def find_regions(image: Image, model: ColourModel, areas_px2: tuple[float, float], opening_px: int = 0) -> list[Region]:
     """Find the regions of the mark's colour in an image.
 
@@ -74,40 +89,52 @@ def find_regions(image: Image, model: ColourModel, areas_px2: tuple[float, float
     list of Region
         Largest first, at most 12.
     """
-    fraction = model.fraction_map(image)
-    smooth = cv2.GaussianBlur(fraction, (3, 3), 0)
-    half = (EMPTY_LEVEL + FULL_LEVEL) / 2.0
-    core = (smooth >= half).astype(np.uint8)
-    compact = cv2.morphologyEx(core, cv2.MORPH_OPEN, disc(opening_px)) if opening_px else core
-    patches, _ = cv2.findContours(compact, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    sized = sorted(((cv2.contourArea(p), k) for k, p in enumerate(patches) if len(p) >= _MIN_OUTLINE_PX), reverse=True)
-    least, most = areas_px2
-    likely = [patches[k] for area, k in sized[:_MAX_REGIONS] if least <= area <= most]
-    measured = (_measure(fraction, smooth, compact, patch, model) for patch in likely)
+    measured = (measure(patch, model) for patch in find_patches(image, model, areas_px2, opening_px))
     return [region for region in measured if region is not None]
 
 
-def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], model: ColourModel) -> Region | None:
+def find_patches(image: Image, model: ColourModel, areas_px2: tuple[float, float], opening_px: int = 0) -> list[Patch]:
+    """Find the patches that `find_regions` measures; parameters and order are the same."""
+    fraction = model.fraction_map(image)
+    smooth = cv2.GaussianBlur(fraction, (3, 3), 0)
+    _, core = cv2.threshold(smooth, _BELOW_HALF, 1, cv2.THRESH_BINARY)
+    compact = cv2.morphologyEx(core, cv2.MORPH_OPEN, disc(opening_px)) if opening_px else core
+    outlines, _ = cv2.findContours(compact, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    sized = sorted(((cv2.contourArea(o), k) for k, o in enumerate(outlines) if len(o) >= _MIN_OUTLINE_PX), reverse=True)
+    least, most = areas_px2
+    likely = [outlines[k] for area, k in sized[:_MAX_REGIONS] if least <= area <= most]
+    return [Patch(fraction, smooth, compact, outline, _is_cut(outline, fraction)) for outline in likely]
+
+
+def _is_cut(outline: NDArray[Any], picture: Image) -> bool:
+    left, top, across, down = cv2.boundingRect(outline)
+    height, width = picture.shape
+    return left <= 0 or top <= 0 or left + across >= width or top + down >= height
+
+
+def measure(patch: Patch, model: ColourModel) -> Region | None:
     """Measure one patch; ``None`` where nothing of it remains after its neighbours are excluded."""
+    fraction, smooth, core = patch.fraction, patch.smooth, patch.core
     height, width = fraction.shape
-    left, top, across, down = cv2.boundingRect(patch)
+    left, top, across, down = cv2.boundingRect(patch.contour_px)
     right, bottom = left + across, top + down
-    cut = left <= 0 or top <= 0 or right >= width or bottom >= height
     x0, y0 = max(left - MARGIN_PX, 0), max(top - MARGIN_PX, 0)
     box = np.s_[y0 : min(bottom + MARGIN_PX, height), x0 : min(right + MARGIN_PX, width)]
     inner = np.zeros_like(core[box])
-    cv2.drawContours(inner, [patch], -1, 1, cv2.FILLED, offset=(-x0, -y0))
+    cv2.drawContours(inner, [patch.contour_px], -1, 1, cv2.FILLED, offset=(-x0, -y0))
     others = core[box] & (1 - inner)
     outline = _outline(smooth[box], inner)
     filled = cv2.drawContours(np.zeros_like(inner), [outline], -1, 1, cv2.FILLED)
     reach = _reach(smooth[box], filled, model)
-    near_others = cv2.dilate(others, disc(_FOOT_PX))
-    # Specks of the colour are ignored: they come and go with the noise.
-    touched = bool((others & cv2.dilate(reach, disc(_FOOT_PX))).sum() > _SPECK_SHARE * inner.sum())
-    reach &= 1 - near_others
+    near, touched = reach, False
+    if others.any():
+        near_others = cv2.dilate(others, disc(_FOOT_PX))
+        # Specks of the colour are ignored: they come and go with the noise.
+        touched = bool((others & cv2.dilate(reach, disc(_FOOT_PX))).sum() > _SPECK_SHARE * inner.sum())
+        reach &= 1 - near_others
+        near = reach | near_others
     low = min(0.4, max(0.1, 3.0 * model.noise))
-    cover = _cover(fraction[box], filled, reach | near_others)
-    weight = np.clip((cover - low) / (1.0 - 2.0 * low), 0.0, 1.0) * reach
+    weight = cover_weight(fraction[box], cv2.erode(filled, disc(2)), near, reach, low)
     # A highlight or the teeth inside the outline belong to the mark: away from the edge the outline is filled.
     weight[cv2.erode(filled, disc(_FOOT_PX)) > 0] = 1.0
 
@@ -123,7 +150,7 @@ def _measure(fraction: Image, smooth: Image, core: Image, patch: NDArray[Any], m
         moments_px2=moments,
         noise_px2=(slope / area) ** 2 * _moments(soft, 1.0, centre)[1],
         contour_px=(outline.reshape(-1, 2) + [x0, y0]).astype(np.int32),
-        whole=not (cut or touched),
+        whole=not (patch.cut or touched),
     )
 
 
@@ -149,28 +176,7 @@ def _outline(smooth: Image, inner: Image) -> NDArray[Any]:
 def _reach(smooth: Image, filled: Image, model: ColourModel) -> Image:
     """Return the pixels that may contain some of the region: its foot, and the tail that motion blur draws out."""
     low = EMPTY_LEVEL + max(0.25, 4.0 * model.noise) * (FULL_LEVEL - EMPTY_LEVEL)
-    tail = ((smooth >= low) | (filled > 0)).astype(np.uint8)
-    _, labels = cv2.connectedComponents(tail, connectivity=8)
-    belongs = np.zeros(labels.max() + 1, np.uint8)
-    belongs[labels[filled > 0]] = 1
-    belongs[0] = 0
-    connected = belongs[labels]
-    return cv2.dilate(connected, disc(_FOOT_PX))
-
-
-def _cover(fraction: Image, filled: Image, reach: Image) -> NDArray[Any]:
-    """Return the covered share of each pixel, scaled between the local values just inside and just outside the region.
-
-    A single scale for the whole picture would shift the edge as bright and dark wallpaper pass behind it.
-    """
-    value = (fraction.astype(np.float32) - EMPTY_LEVEL) / (FULL_LEVEL - EMPTY_LEVEL)
-    inside = cv2.erode(filled, disc(2)).astype(np.float32)
-    outside = (1 - reach).astype(np.float32)
-    # normalised convolution (Knutsson & Westin 1993) extends known values smoothly to where none is known
-    known = cv2.merge([value * inside + _PRIOR, _PRIOR + inside, value * outside, _PRIOR + outside])
-    within, of_within, without, of_without = cv2.split(cv2.GaussianBlur(known, (0, 0), _LOCAL_PX))
-    low = without / of_without
-    return (value - low) / np.maximum(within / of_within - low, 0.3)
+    return cv2.dilate(connected_tail(smooth, filled, low), disc(_FOOT_PX))
 
 
 @cache
