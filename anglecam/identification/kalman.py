@@ -202,14 +202,16 @@ def _compile_once(code):  # type: ignore[no-untyped-def]  # compiled
     def _flow(state, span, knots, steps, table, max_step):  # type: ignore[no-untyped-def]
         assert len(code) > 0
         slopes = np.empty((2, 5))
+        edges, spans, near = np.array([0, 2]), np.array([[0, knots.shape[1]]]), np.empty((0, 2))
         for j in range(5):
             low, high = state.copy(), state.copy()
             low[j] -= steps[j]
             high[j] += steps[j]
-            below = integrate(span, low[0], low[1], knots, 0.0, low[2:], table, max_step)[1]
-            above = integrate(span, high[0], high[1], knots, 0.0, high[2:], table, max_step)[1]
+            below = integrate(span, edges, low[None, :2], knots, spans, 0.0, low[2:], table, max_step, near)[1]
+            above = integrate(span, edges, high[None, :2], knots, spans, 0.0, high[2:], table, max_step, near)[1]
             slopes[:, j] = (above - below) / (high[j] - low[j])
-        return integrate(span, state[0], state[1], knots, 0.0, state[2:], table, max_step)[1], slopes
+        end = integrate(span, edges, state[None, :2], knots, spans, 0.0, state[2:], table, max_step, near)[1]
+        return end, slopes
 
     return _flow
 

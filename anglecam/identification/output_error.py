@@ -18,18 +18,15 @@ from threadpoolctl import ThreadpoolController
 
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
-from anglecam.identification.fit import Fit, whiten
+from anglecam.identification.fit import Fit
+from anglecam.identification.joined import Joined, Predicted, join
 from anglecam.models.model import Model
 
-STEP = 1e-6
-"""Step of the difference quotients, as a share of a parameter's magnitude."""
 SETTLED = 1e-3
 """Log-likelihood; a fit ends when its last `PATIENCE` steps have gained no more than this. Along a ridge it would
 otherwise continue with many tiny steps."""
 PATIENCE = 3
 """Steps; with a kinked prediction one small step may precede a large one, so a single small step does not end a fit."""
-RUNAWAY = 1e100
-"""rad; a larger angle counts as divergence: the squares of its derivatives would soon overflow."""
 TRIAL_EVALUATIONS = 8
 """Evaluations of each of several starts before only the best of them is continued."""
 MAX_EVALUATIONS = 60
@@ -94,9 +91,10 @@ def _fit_all(
     fixed: bool,
     most: int,
 ) -> list[Fit]:
+    joined = join(records, phi)
     # a trial step may make the plant diverge; its cost is then not finite and the step is rejected
     with _BLAS.limit(limits=1, user_api="blas"), np.errstate(over="ignore", invalid="ignore"):
-        return [_fit_once(model, records, start, nuisance, phi, fixed, most) for start in starts]
+        return [_fit_once(model, joined, start, nuisance, phi, fixed, most) for start in starts]
 
 
 def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:
@@ -116,88 +114,45 @@ def predict_output_error(fit: Fit, records: Sequence[Record]) -> Fit:
     return min(fits, key=lambda one: one.cost)
 
 
-def predicted_angle(model: Model, parameters: Floats, record: Record, nuisance: Floats) -> Floats:
-    """Return the (n,) angle, rad, that a model predicts for a recording; NaN where it diverges."""
-    zero = 0.0 if record.zero_known else nuisance[model.states]
-    angle = zero + model.predict(parameters, record.time, record.command, nuisance[: model.states], record.view)
-    return np.where(np.abs(angle) < RUNAWAY, angle, np.nan)
-
-
 def output_error(
     model: Model, parameters: Floats, records: Sequence[Record], nuisance: Sequence[Floats], phi: float
 ) -> float:
     """Return the sum of squared whitened residuals, rad², at given parameters; infinite if the model diverges."""
+    joined = join(records, phi)
     with np.errstate(over="ignore", invalid="ignore"):
-        residuals = [
-            whiten(r, phi, r.angle - predicted_angle(model, parameters, r, o))
-            for r, o in zip(records, nuisance, strict=True)
-        ]
-        cost = float(sum(one @ one for one in residuals))
+        white = joined.errors(joined.predict(model, parameters, joined.stack(nuisance)))
+        cost = float(white @ white)
     return cost if np.isfinite(cost) else np.inf
 
 
 def _fit_once(
-    model: Model,
-    records: Sequence[Record],
-    start: Floats,
-    nuisance: Sequence[Floats],
-    phi: float,
-    fixed: bool,
-    most: int,
+    model: Model, joined: Joined, start: Floats, nuisance: Sequence[Floats], phi: float, fixed: bool, most: int
 ) -> Fit:
     start = np.clip(start, model.lower, model.upper)
-    p = len(start)
-    edges = np.cumsum([p, *(len(o) for o in nuisance)])
-    rows = np.cumsum([0, *(len(r.time) for r in records)])
-    shared = [] if fixed else list(range(p))
+    p, rows = len(start), len(joined.angle)
+    unknown = joined.fitted(joined.stack(nuisance))
+    x0 = np.concatenate([start, *nuisance])
+    latest: dict[bytes, Predicted] = {}
 
-    def split(x: Floats) -> tuple[Floats, list[Floats]]:
-        return x[:p], [x[edges[i] : edges[i + 1]] for i in range(len(records))]
+    def split(x: Floats) -> tuple[Floats, Floats]:
+        own = np.zeros(unknown.shape)
+        own[unknown] = x[p:]
+        return x[:p], own
 
-    latest: dict[bytes, list[Floats]] = {}
-
-    def predicted(x: Floats) -> list[Floats]:
+    def predicted(x: Floats) -> Predicted:
         """Predict all recordings; the last result is kept, as the Jacobian follows the errors at the same point."""
         if x.tobytes() not in latest:
-            parameters, unknowns = split(x)
             latest.clear()
-            latest[x.tobytes()] = [
-                predicted_angle(model, parameters, r, o) for r, o in zip(records, unknowns, strict=True)
-            ]
+            latest[x.tobytes()] = joined.predict(model, *split(x))
         return latest[x.tobytes()]
 
     def errors(x: Floats) -> Floats:
-        parts = [whiten(r, phi, r.angle - p) for r, p in zip(records, predicted(x), strict=True)]
-        return np.concatenate(parts)
-
-    def slope(record: Record, both: Floats, here: Floats, j: int, step: float) -> Floats:
-        shifted = both.copy()
-        shifted[j] += step
-        return (predicted_angle(model, shifted[:p], record, shifted[p:]) - here) / step
+        return joined.errors(predicted(x))
 
     def jacobian(x: Floats) -> Floats:
-        parameters, unknowns = split(x)
-        result = np.zeros((rows[-1], len(x)))
-        for i, (record, o, here) in enumerate(zip(records, unknowns, predicted(x), strict=True)):
-            both = np.concatenate([parameters, o])
-            steps = STEP * np.concatenate([np.maximum(model.scales, np.abs(parameters)), np.full(len(o), 0.1)])
-            columns = [*shared, *range(p, p + len(o))]
-            place = [*shared, *range(edges[i], edges[i + 1])]
-            block = np.empty((len(record.time), len(columns)))
-            for k, j in enumerate(columns):
-                if j == p + model.states:  # the prediction contains the zero as a summand
-                    block[:, k] = 1.0
-                    continue
-                # beyond a bound the model may be undefined: take the difference on the inner side
-                step = -steps[j] if j < p and both[j] + steps[j] > model.upper[j] else steps[j]
-                # near divergence the plant may be finite here and diverge one step away: then take the other side
-                slopes = (slope(record, both, here, j, by) for by in (step, -step))
-                block[:, k] = next((one for one in slopes if np.isfinite(one).all()), 0.0)
-            result[rows[i] : rows[i + 1], place] = -whiten(record, phi, block)
-        return result
+        return -joined.dense(joined.slopes(model, *split(x), predicted(x), fixed=fixed))
 
-    x0 = np.concatenate([start, *nuisance])
-    free = np.array([*shared, *range(p, len(x0))])
+    free = np.arange(p if fixed else 0, len(x0))
     lower, upper = np.full(len(x0), -np.inf), np.full(len(x0), np.inf)
     lower[:p], upper[:p] = model.lower, model.upper
 
@@ -207,18 +162,19 @@ def _fit_once(
         return unknowns
 
     def fit_at(x: Floats, white: Floats, slopes: Floats) -> Fit:
-        parameters, unknowns = split(x)
-        residuals = tuple(r.angle - here for r, here in zip(records, predicted(x), strict=True))
-        return Fit(model, parameters, tuple(unknowns), residuals, slopes, phi, white)
+        parameters, own = split(x)
+        residuals = tuple(joined.runs.split(joined.angle - predicted(x).angle))
+        fitted = tuple(one[which] for one, which in zip(own, unknown, strict=True))
+        return Fit(model, parameters, fitted, residuals, slopes, phi, white)
 
     inside = np.clip(x0, np.nextafter(lower, np.inf), np.nextafter(upper, -np.inf))
     costs = [0.5 * float(np.sum(errors(inside) ** 2))]
     if not math.isfinite(costs[0]):
-        return fit_at(x0, np.full(rows[-1], np.inf), np.zeros((rows[-1], len(x0))))
+        return fit_at(x0, np.full(rows, np.inf), np.zeros((rows, len(x0))))
 
     def settled(intermediate_result: OptimizeResult) -> None:
         costs.append(intermediate_result.cost)
-        if len(costs) > PATIENCE and costs[-1 - PATIENCE] - costs[-1] <= 2.0 * SETTLED / rows[-1] * costs[-1]:
+        if len(costs) > PATIENCE and costs[-1 - PATIENCE] - costs[-1] <= 2.0 * SETTLED / rows * costs[-1]:
             raise StopIteration
 
     found = least_squares(
@@ -233,7 +189,7 @@ def _fit_once(
         max_nfev=most,
         callback=settled,
     )
-    slopes = np.zeros((rows[-1], len(x0)))
+    slopes = np.zeros((rows, len(x0)))
     slopes[:, free] = -found.jac
     return fit_at(full(found.x), found.fun, slopes)
 

@@ -23,7 +23,8 @@ from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.errors import RigError
 from anglecam.identification.fit import Fit, whiten
-from anglecam.identification.output_error import fit_output_error, predict_output_error, predicted_angle
+from anglecam.identification.joined import join
+from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.loop.policy import DEFAULT, Policy
 
 DRAWS = 999
@@ -136,13 +137,13 @@ def predict_held_out(
 def _cross_validate(fit: Fit, records: Sequence[Record], policy: Policy) -> Prediction:
     """Predict every recording except its first frames, each fold by a fit to the other folds."""
     errors = [np.zeros(len(r.time)) for r in records]
-    fold_of = [_folds(r, policy) for r in records]
+    fold_of, joined = [_folds(r, policy) for r in records], join(records, fit.phi)
     for fold in range(policy.cross_validation.folds):
         train = [record.only(folds != fold) for record, folds in zip(records, fold_of, strict=True)]
         trained = fit_output_error(fit.model, train, [fit.parameters], nuisance=fit.nuisance, phi=fit.phi)
-        for record, folds, nuisance, error in zip(records, fold_of, trained.nuisance, errors, strict=True):
-            predicted = predicted_angle(trained.model, trained.parameters, record, nuisance)
-            error[folds == fold] = (record.angle - predicted)[folds == fold]
+        predicted = joined.predict(trained.model, trained.parameters, joined.stack(trained.nuisance)).angle
+        for left, folds, error in zip(joined.runs.split(joined.angle - predicted), fold_of, errors, strict=True):
+            error[folds == fold] = left[folds == fold]
     tested = tuple(record.only(folds != NEVER_LEFT_OUT) for record, folds in zip(records, fold_of, strict=True))
     residuals = tuple(error[folds != NEVER_LEFT_OUT] for error, folds in zip(errors, fold_of, strict=True))
     with np.errstate(over="ignore"):  # a prediction may diverge if the training frames do not determine a parameter

@@ -16,9 +16,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from anglecam.data.record import Record
+from anglecam.data.runs import runs_of
 from anglecam.data.typing import Floats
 from anglecam.effects import Effect
-from anglecam.identification.fit import Fit, whiten
+from anglecam.identification.fit import Fit
+from anglecam.identification.joined import join
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import plant_of
 from anglecam.models.plant import Plant
@@ -34,8 +36,8 @@ class Change:
     effect: Effect
     start: Floats
     """Parameters of the effect, SI."""
-    parts: tuple[Floats, ...] = field(repr=False)
-    """Change of the prediction of each recording, (n,) each, rad."""
+    angle: Floats = field(repr=False)
+    """(N,) change of the predictions of all recordings, rad."""
 
 
 @dataclass(frozen=True)
@@ -99,23 +101,20 @@ def changes(fit: Fit, records: Sequence[Record], effects: Sequence[Effect]) -> l
     list of Change
         Grouped by effect, without those that make the plant's motion diverge.
     """
-    plant = plant_of(fit)
+    plant, runs = plant_of(fit), runs_of(records)
+    first = np.stack([nuisance[: plant.states] for nuisance in fit.nuisance])
     found = []
     for effect in effects:
         richer = plant.with_effect(effect)
 
-        def predict(effect_parameters: Floats, richer: Plant = richer) -> list[Floats]:
-            values = np.append(fit.parameters, effect_parameters)
-            return [
-                richer.predict(values, record.time, record.command, nuisance[: plant.states], record.view)
-                for record, nuisance in zip(records, fit.nuisance, strict=True)
-            ]
+        def predict(effect_parameters: Floats, richer: Plant = richer) -> Floats:
+            return richer.predict_all(np.append(fit.parameters, effect_parameters), runs, first)[0]
 
         base = predict(effect.null)  # with the effect in the model, so that errors of the integrator cancel
         for start in starts_of(effect):
-            parts = tuple(after - before for after, before in zip(predict(start), base, strict=True))
-            if all(np.all(np.isfinite(part)) for part in parts):
-                found.append(Change(effect, start, parts))
+            change = predict(start) - base
+            if np.all(np.isfinite(change)):
+                found.append(Change(effect, start, change))
     return found
 
 
@@ -140,9 +139,9 @@ def directions(
     list of Direction
         Without changes that the fit can reproduce completely.
     """
-    absorbed, found = absorbed_space(fit), []
+    absorbed, joined, found = absorbed_space(fit), join(records, fit.phi), []
     for one in prediction_changes:
-        change = np.concatenate([whiten(r, fit.phi, part) for r, part in zip(records, one.parts, strict=True)])
+        change = joined.whiten(one.angle)
         whole = float(np.linalg.norm(change))
         change = change - absorbed @ (absorbed.T @ change)
         if np.linalg.norm(change) > policy.screen.smallest_free_share * whole:

@@ -3,7 +3,9 @@
     θ̈ = servo(c·v − b·θ) − a·θ̇ + Σ load_i(θ, θ̇) + Σ dynamics_i(θ, θ̇, v, x_i) − dry friction
 
 The functions are composed from the ledger, so that nobody edits the integrator to add an effect. Parameters travel as
-tuples: reading them from an array in every evaluation costs more than the evaluation itself.
+tuples: reading them from an array in every evaluation costs more than the evaluation itself. So does passing them in a
+call; the functions of a step are therefore compiled into one (``forceinline``). A port at which the plant has no effect
+is not evaluated.
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ class CompiledEffects:
     width: int
     """Largest number of parameters of an effect."""
     rows: Any
-    """(table) → the rows as tuples, by port."""
+    """(table) → the rows as tuples, by port; then whether any servo, and any load, is in the plant."""
     rates: Any
     """(θ, ω, additional states, v, abc, rows) → θ̈ without dry friction (rad/s²), derivatives of the states."""
     friction: Any
@@ -80,10 +82,11 @@ def compile_effects(ledger: Sequence[Effect]) -> CompiledEffects:
     ports = {port: [e for e in ledger if e.port == port] for port in STEPPED_PORTS}
     ports["servo"].sort(key=lambda e: e.rank)
     width = max((len(e.parameters) for e in ledger), default=0)
-    edges = np.cumsum([0, *(len(entries) for entries in ports.values())])
+    edges = np.cumsum([0, *(len(entries) for entries in ports.values())]).tolist()
+    servos, loads = edges[1:3]
     numbers = _tuple_of(width + 1, njit(lambda value: value))
     servo_rows, load_rows, friction_rows, dynamic_rows = (
-        _tuple_of(len(entries), numbers, int(first)) for entries, first in zip(ports.values(), edges, strict=False)
+        _tuple_of(len(entries), numbers, first) for entries, first in zip(ports.values(), edges, strict=False)
     )
     servo = _chain_of_servos([e.servo for e in ports["servo"]])
     load = _sum_of_loads([e.load for e in ports["load"]])
@@ -93,12 +96,17 @@ def compile_effects(ledger: Sequence[Effect]) -> CompiledEffects:
 
     @njit
     def rows(table):  # type: ignore[no-untyped-def]  # compiled
-        return servo_rows(table), load_rows(table), friction_rows(table), dynamic_rows(table)
+        served, loaded = np.any(table[:servos, width] != 0.0), np.any(table[servos:loads, width] != 0.0)
+        return servo_rows(table), load_rows(table), friction_rows(table), dynamic_rows(table), served, loaded
 
-    @njit
+    @njit(forceinline=True)
     def rates(theta, omega, extra, v, abc, rows):  # type: ignore[no-untyped-def]  # compiled
-        torque = servo(abc[2] * v - abc[1] * theta, theta, abc, rows[0])
-        smooth = torque - abc[0] * omega + load(theta, omega, rows[1])
+        torque = abc[2] * v - abc[1] * theta
+        if rows[4]:
+            torque = servo(torque, theta, abc, rows[0])
+        smooth = torque - abc[0] * omega
+        if rows[5]:
+            smooth += load(theta, omega, rows[1])
         return dynamics(smooth, theta, omega, v, abc, extra, rows[3])
 
     @njit

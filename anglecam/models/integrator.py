@@ -36,19 +36,18 @@ def _compile_run(effects: CompiledEffects):  # type: ignore[no-untyped-def]  # c
     rows_of, friction_of, initial, advance = effects.rows, effects.friction, effects.initial, compile_advance(effects)
 
     @njit(nogil=True)
-    def run(time, theta, omega, knots, lag, abc, table, max_step):  # type: ignore[no-untyped-def]  # compiled
+    def run(states, time, theta, omega, knots, lag, plant, rows, friction, max_step, near):  # type: ignore[no-untyped-def]
+        """Write one run's angle and rate to ``states``, (n, 2)."""
         n, m = len(time), knots.shape[1]
-        plant, rows = (abc[0], abc[1], abc[2]), rows_of(table)
-        states = np.empty((n, 2))
+        abc = np.array(plant)
         states[0] = theta, omega
-        friction = friction_of(rows)
-        k, now = -1, time[0]
-        while k + 1 < m and knots[0, k + 1] <= now:
-            k += 1
+        now = time[0]
+        k = np.searchsorted(knots[0], now, side="right") - 1
         segment = np.zeros(3)
         segment[0], segment[1] = line_at(knots, k, now)
         v = segment[0]
         extra = initial(theta, omega, v, plant, rows)
+        merges = len(near) == n and len(extra) == 0
         for i in range(1, n):
             while now < time[i]:
                 stop = time[i]
@@ -75,9 +74,22 @@ def _compile_run(effects: CompiledEffects):  # type: ignore[no-untyped-def]  # c
                 while k + 1 < m and knots[0, k + 1] <= now:
                     k += 1
             states[i] = theta, omega
+            if merges and theta == near[i, 0] and omega == near[i, 1]:
+                states[i + 1 :] = near[i + 1 :]
+                break
+
+    @njit(nogil=True)
+    def run_all(time, edges, first, knots, spans, lag, abc, table, max_step, near):  # type: ignore[no-untyped-def]
+        plant, rows = (abc[0], abc[1], abc[2]), rows_of(table)
+        friction = friction_of(rows)
+        states = np.empty((len(time), 2))
+        for i in range(len(first)):
+            part, command = slice(edges[i], edges[i + 1]), knots[:, spans[i, 0] : spans[i, 1]]
+            theta, omega = first[i]
+            run(states[part], time[part], theta, omega, command, lag, plant, rows, friction, max_step, near[part])
         return states
 
-    return run
+    return run_all
 
 
 @dataclass(frozen=True)
@@ -121,25 +133,33 @@ def _compile_once(code):  # type: ignore[no-untyped-def]  # compiled
     """Return the integrator of the package's ledger, compiled by the first process that runs it."""
 
     @njit(nogil=True, cache=True)
-    def integrate(time, theta, omega, knots, lag, abc, table, max_step):  # type: ignore[no-untyped-def]  # compiled
-        """Return angle and rate at ``time``; compiled, so the arguments are not checked.
+    def integrate(time, edges, first, knots, spans, lag, abc, table, max_step, near):  # type: ignore[no-untyped-def]
+        """Return angle and rate at ``time`` in one or several runs; compiled, so the arguments are not checked.
 
         Parameters
         ----------
         time : (n,) ndarray
-            Increasing instants, s; the state is given at the first, where a lag and the effects' states have settled.
-        theta, omega : float
-            Angle from equilibrium at zero command (rad) and its rate (rad/s) at ``time[0]``.
+            Instants of all runs, s, increasing in each; the state is given at the first of each, where a lag and the
+            effects' states have settled.
+        edges : (r + 1,) ndarray of int
+            Where each run begins in ``time``, and the end.
+        first : (r, 2) ndarray
+            Angle from equilibrium at zero command (rad) and its rate (rad/s) at the first instant of each run.
         knots : (3, m) ndarray
-            Command: instants (s), levels (rad) and slopes (rad/s); before the first knot its level holds.
+            Commands: instants (s), levels (rad) and slopes (rad/s); before its first knot a command's level holds.
+        spans : (r, 2) ndarray of int
+            First knot of each run's command, and the end.
         lag : float
             τ, s.
         abc : (3,) ndarray
             a (1/s), b (1/s²), c (1/s²) of Eq. (30).
-        table : (r, width + 1) ndarray
+        table : (k, width + 1) ndarray
             Parameters of the effects inside the equation of motion, from `CompiledEffects.table`.
         max_step : float
             Longest Runge-Kutta step, s; 0 if no effect is inside the equation of motion.
+        near : (n, 2) or (0, 2) ndarray
+            Result with the same arguments from other states at the first instants, if it is known. A run that reaches
+            the same state has forgotten where it started; the rest is copied.
 
         Returns
         -------
@@ -147,7 +167,7 @@ def _compile_once(code):  # type: ignore[no-untyped-def]  # compiled
             Angle, rad, and rate, rad/s.
         """
         assert len(code) > 0
-        return _run(time, theta, omega, knots, lag, abc, table, max_step)
+        return _run(time, edges, first, knots, spans, lag, abc, table, max_step, near)
 
     return integrate
 

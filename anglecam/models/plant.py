@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from anglecam.data.camera_evidence import UNKNOWN_VIEW, View
 from anglecam.data.command import Command
+from anglecam.data.runs import Runs, one_run
 from anglecam.data.typing import Floats
 from anglecam.effects import Effect, Knots
 from anglecam.models.integrator import INTEGRATOR, Integrator
@@ -23,6 +25,7 @@ SHUTTER_ITERATIONS = 3
 """Fixed-point iterations for the instant at which a frame was exposed; each leaves a few hundredths of the error."""
 EXACT = 0.0
 """Value of the longest step that selects the exact series, for a plant that is linear between the command's knots."""
+_NOTHING_NEAR = np.empty((0, 2))
 _NO_COMMAND = Knots(np.zeros(1), np.zeros(1), np.zeros(1))
 
 
@@ -85,21 +88,48 @@ class Plant:
         self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNKNOWN_VIEW
     ) -> Floats:
         """Return the (n,) angle, rad, that the camera would measure of the motion that `run` returns."""
+        return self.predict_all(parameters, one_run(time, command, view), state[None])[0]
+
+    def predict_all(
+        self, parameters: Floats, runs: Runs, first: Floats, near: Floats | None = None
+    ) -> tuple[Floats, Floats]:
+        """Return the angle that the camera would measure in several runs, and their motion.
+
+        Parameters
+        ----------
+        parameters : (p,) ndarray
+            In the order of `names`, SI.
+        runs : Runs
+            N instants of R runs, with their commands and views.
+        first : (R, 2) ndarray
+            Angle (rad) and rate (rad/s) at the first instant of each run.
+        near : (N, 2) ndarray, optional
+            Motion with the same parameters from a slightly different ``first``. A run that reaches the same state is
+            not integrated further.
+
+        Returns
+        -------
+        angle : (N,) ndarray
+            rad.
+        motion : (N, 2) ndarray
+            As `run` returns it.
+        """
         pairs = self.parameters_by_effect(parameters)
-        angle, rate = self.run(parameters, time, command, state).T
+        motion = self._run(parameters, pairs, runs, first, near)
+        angle, rate = motion.T
         timed = [(e, p) for e, p in pairs if e.timing is not None]
         if timed:
-            exposed = time
+            exposed = runs.time
             for _ in range(SHUTTER_ITERATIONS):
-                shown = angle + rate * (exposed - time)
-                exposed = time
+                shown = angle + rate * (exposed - runs.time)
+                exposed = runs.time
                 for effect, values in timed:
-                    exposed = effect.timing(exposed, shown, values, view)  # type: ignore[misc]
-            angle = self._at(parameters, time, exposed, command, state)
+                    exposed = runs.each(effect.timing, exposed, shown, values)  # type: ignore[arg-type]
+            angle = self._at(parameters, pairs, runs, exposed, first)
         for effect, values in pairs:
             if effect.observation is not None:
-                angle = effect.observation(time, angle, values, view)
-        return angle
+                angle = runs.each(effect.observation, runs.time, angle, values)
+        return angle, motion
 
     def run(self, parameters: Floats, time: Floats, command: Command | None, state: Floats) -> Floats:
         """Run the plant freely from an initial state.
@@ -120,19 +150,36 @@ class Plant:
         (n, 2) ndarray
             Angle, rad, and rate, rad/s; not finite where the plant diverges.
         """
+        runs = one_run(time, command, UNKNOWN_VIEW)
+        return self._run(parameters, self.parameters_by_effect(parameters), runs, state[None])
+
+    def _run(
+        self,
+        parameters: Floats,
+        pairs: Sequence[tuple[Effect, Floats]],
+        runs: Runs,
+        first: Floats,
+        near: Floats | None = None,
+    ) -> Floats:
+        """Run the plant freely through several runs; (N, 2)."""
         abc = np.zeros(3)
         abc[: self.base_count] = parameters[: self.base_count]
-        pairs = self.parameters_by_effect(parameters)
-        knots, lag = _NO_COMMAND, 0.0
-        if command is not None:
-            knots = Knots(command.time, command.angle, np.zeros(len(command.time)))
-        for effect, values in pairs:
-            if effect.command is not None:
-                knots = effect.command(knots, values)
-            if effect.lag is not None:
-                lag += effect.lag(values)
-        rows, table = np.stack([knots.time, knots.level, knots.slope]), self.integrator.effects.table(pairs)
-        return self.integrator.integrate(time, state[0], state[1], rows, lag, abc, table, self._max_step)
+        lag = float(sum(effect.lag(values) for effect, values in pairs if effect.lag is not None))
+        given, number = runs.played
+        arrived = [_arrived(command, pairs) for command in given]
+        edges = np.cumsum([0, *(each.shape[1] for each in arrived)])
+        return self.integrator.integrate(
+            runs.time,
+            runs.edges,
+            np.ascontiguousarray(first, dtype=float),
+            arrived[0] if len(arrived) == 1 else np.concatenate(arrived, axis=1),
+            np.stack([edges[number], edges[number + 1]], axis=1),
+            lag,
+            abc,
+            self.integrator.effects.table(pairs),
+            self._max_step,
+            _NOTHING_NEAR if near is None else near,
+        )
 
     @property
     def _max_step(self) -> float:
@@ -142,16 +189,21 @@ class Plant:
             return KINKED_STEP
         return MAX_STEP if ports & {"load", "friction"} else EXACT
 
-    def _at(self, parameters: Floats, time: Floats, exposed: Floats, command: Command | None, state: Floats) -> Floats:
-        """Return the angle, rad, at instants near the frames, in any order; ``state`` is that of the first frame."""
-        order = np.argsort(exposed)
-        early = exposed[order] < time[0]
-        grid = np.concatenate([time[:1], exposed[order][~early]])
-        states = self.run(parameters, grid, command, state)
-        angle = np.empty(len(time))
-        angle[order[~early]] = states[1:, 0]
+    def _at(
+        self, parameters: Floats, pairs: Sequence[tuple[Effect, Floats]], runs: Runs, exposed: Floats, first: Floats
+    ) -> Floats:
+        """Return the (N,) angle, rad, at instants near the frames, in any order within each run."""
+        late = exposed >= runs.first[runs.owner]
+        count, owner = len(first), runs.owner[late]
+        numbers, instants = np.append(np.arange(count), owner), np.append(runs.first, exposed[late])
+        order = np.lexsort((instants, numbers))
+        edges = np.searchsorted(numbers[order], np.arange(count + 1))
+        grid = Runs(instants[order], edges, runs.commands, runs.views)
+        reached = np.empty(len(order))
+        reached[order] = self._run(parameters, pairs, grid, first)[:, 0]
         # before the first frame the motion is unknown: follow its tangent
-        angle[order[early]] = state[0] + state[1] * (exposed[order][early] - time[0])
+        angle = first[runs.owner, 0] + first[runs.owner, 1] * (exposed - runs.first[runs.owner])
+        angle[late] = reached[count:]
         return angle
 
     def parameters_by_effect(self, parameters: Floats) -> list[tuple[Effect, Floats]]:
@@ -159,3 +211,12 @@ class Plant:
         edges = self.base_count + np.cumsum([0, *(len(e.parameters) for e in self.effects)])
         pairs = [(e, e.complete(parameters[i:j])) for e, i, j in zip(self.effects, edges, edges[1:], strict=False)]
         return sorted(pairs, key=lambda pair: pair[0].rank)
+
+
+def _arrived(command: Command | None, pairs: Sequence[tuple[Effect, Floats]]) -> Floats:
+    """Return the knots (3, m) of the command that arrives at the drive: instants, levels and slopes."""
+    knots = _NO_COMMAND if command is None else Knots(command.time, command.angle, np.zeros(len(command.time)))
+    for effect, values in pairs:
+        if effect.command is not None:
+            knots = effect.command(knots, values)
+    return np.stack([knots.time, knots.level, knots.slope])

@@ -49,7 +49,7 @@ def compile_advance(effects):  # type: ignore[no-untyped-def]  # compiled
     """
     rates, moved = effects.rates, effects.moved
 
-    @njit
+    @njit(forceinline=True)
     def runge_kutta(theta, omega, extra, begin, h, segment, lag, abc, rows, friction, direction):  # type: ignore[no-untyped-def]
         """Advance by one step of ``h`` seconds while the load slides in one direction."""
         v1, v2, v3 = (
@@ -76,7 +76,7 @@ def compile_advance(effects):  # type: ignore[no-untyped-def]  # compiled
             moved(moved(moved(moved(extra, h / 6.0, d1), h / 3.0, d2), h / 3.0, d3), h / 6.0, d4),
         )
 
-    @njit
+    @njit(forceinline=True)
     def at_rest(theta, extra, begin, h, segment, lag, abc, rows):  # type: ignore[no-untyped-def]  # compiled
         """Advance only the effects' additional states by ``h`` seconds while the load sticks at ``theta``."""
         if len(extra) == 0:
@@ -92,7 +92,7 @@ def compile_advance(effects):  # type: ignore[no-untyped-def]  # compiled
         d4 = rates(theta, 0.0, moved(extra, h, d3), v3, abc, rows)[1]
         return moved(moved(moved(moved(extra, h / 6.0, d1), h / 3.0, d2), h / 3.0, d3), h / 6.0, d4)
 
-    @njit
+    @njit(forceinline=True)
     def advance(theta, omega, extra, begin, h, segment, lag, abc, rows, friction):  # type: ignore[no-untyped-def]
         """Advance by ``h`` seconds, through any number of standstills.
 

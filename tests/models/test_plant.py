@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from anglecam.data.camera_evidence import View
 from anglecam.data.command import Command
+from anglecam.data.runs import runs_of
 from anglecam.effects import LEDGER, effect
 from anglecam.effects.effect import PORTS
 from anglecam.models.compiled_effects import STEPPED_PORTS
 from anglecam.models.plant import Plant
 from support.motion import Plant as TruePlant
 from support.motion import Recording, command_rows, move
+from support.series import session
 
 TIME = np.arange(0.0, 8.0, 1 / 30)
 
@@ -103,3 +108,29 @@ def test_every_entry_of_the_ledger_is_complete():
             assert p.symbol in entry.equation
             assert p.lower <= p.null <= p.upper
             assert all(p.lower <= start <= p.upper for start in p.starts)
+
+
+@pytest.mark.parametrize("ids", [(), ("coulomb_friction",), ("rolling_shutter", "pivot_offset"), ("backlash",)])
+def test_several_runs_are_those_that_follow_one_another(ids):
+    effects = tuple(effect(name) for name in ids)
+    parameters = np.array([26.0, 524.0, 508.0, *(p.starts[0] for e in effects for p in e.parameters)])
+    plant, view = Plant(effects), View(0.3, 120.0, (10.0, 40.0))
+    records = [replace(one, view=view) for one in session(TruePlant(), 0)]
+    first = np.array([[0.01 * i, 0.1] for i in range(len(records))])
+    angle, motion = plant.predict_all(parameters, runs_of(records), first)
+    each = [plant.predict(parameters, r.time, r.command, s, view) for r, s in zip(records, first, strict=True)]
+    assert list(angle) == list(np.concatenate(each))
+    assert list(motion[: len(records[0].time), 0]) == list(
+        plant.run(parameters, records[0].time, records[0].command, first[0])[:, 0]
+    )
+
+
+@pytest.mark.parametrize("name", [None, "coulomb_friction", "dead_zone", "stiffening_spring"])
+def test_a_run_that_is_told_of_a_near_one_is_the_same(name):
+    effects = () if name is None else (effect(name),)
+    parameters = np.array([26.0, 524.0, 508.0, *(p.starts[0] for e in effects for p in e.parameters)])
+    runs, first = runs_of(session(TruePlant(), 0)), np.zeros((5, 2))
+    plant = Plant(effects)
+    near = plant.predict_all(parameters, runs, first)[1]
+    told, alone = (plant.predict_all(parameters, runs, first + 1e-7, each)[0] for each in (near, None))
+    assert list(told) == list(alone)
