@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import time
 from collections import deque
@@ -52,8 +53,8 @@ def live(
     ] = None,
 ) -> None:
     """Measure while filming: each angle as it comes, the recording, and the files that `measure` makes of it."""
-    from anglecam.io.command_csv import read_command
-    from anglecam.io.session import command_beside, rig_beside
+    from anglecam.io.command_csv import COMMAND_ENDING, read_command
+    from anglecam.io.session import recording_name, rig_beside
     from anglecam.video.live_source import open_live
     from anglecam.workflow.live import measure_live
 
@@ -61,12 +62,16 @@ def live(
         film = Path(source) if Path(source).is_file() else None
         make_folder(out)
         declared = read_rig(rig) if rig else rig_beside(film or out)
-        beside = None if film is None else command_beside(film)
-        commanded = beside if command is None else read_command(command)
+        if command is None and film is not None:
+            beside = film.with_name(recording_name(film) + COMMAND_ENDING)
+            command = beside if beside.is_file() else None
+        commanded = None if command is None else read_command(command)
         opened = open_live(source)
         with progress_bars() as bars, _stopped_by_signals(opened):
             display = _Display(bars)
             result = measure_live(opened, out, declared, commanded, display.show, display.progress)
+        if command is not None:
+            _copy(command, out / (recording_name(result.film) + COMMAND_ENDING))
     except AnglecamError as problem:
         end([problem])
         return
@@ -143,6 +148,12 @@ def _stopped_by_signals(source: LiveSource) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _copy(file: Path, kept: Path) -> None:
+    """Copy a file, so that the folder of the recording is a session."""
+    if not (kept.exists() and kept.samefile(file)):
+        shutil.copyfile(file, kept)
 
 
 def _report(result: LiveResult) -> None:

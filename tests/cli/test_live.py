@@ -31,8 +31,11 @@ def test_an_interruption_ends_the_recording_and_what_came_is_measured(film, tmp_
     pipe = tmp_path / "camera"
     os.mkfifo(pipe)
     out = tmp_path / "out"
+    command = tmp_path / "played.csv"
+    command.write_text("time_s,command_deg\n0,0\n1,10\n")
+    call = [*CALL, str(pipe), "--out", str(out), "--command", str(command)]
     with (
-        subprocess.Popen([*CALL, str(pipe), "--out", str(out)], stdout=-1, stderr=-1, text=True) as called,
+        subprocess.Popen(call, stdout=-1, stderr=-1, text=True) as called,
         pipe.open("wb") as stream,
     ):
         stream.write(film.read_bytes())
@@ -49,6 +52,7 @@ def test_an_interruption_ends_the_recording_and_what_came_is_measured(film, tmp_
     )
     made = {path.name for path in out.iterdir()}
     assert {"camera.angles.csv", "camera.live.csv", "camera.live.png", "camera.png"} <= made
+    assert (out / "camera.command.csv").read_text() == command.read_text()
 
 
 @pytest.mark.parametrize("source", ["nothing.avi", "77", "http://127.0.0.1:9/film"])
