@@ -104,14 +104,14 @@ def test_pictures_that_are_not_needed_are_not_decoded(monkeypatch, tmp_path):
     whole = [frame.image for frame in open_film(clip).frames()]
     monkeypatch.setattr(film_rows, "MOST_BYTES", 4 * whole[0].size)
     decoded = []
-    to_packets = decode_module._packets
+    to_packets = decode_module._decoded_packets
 
     def counted(*args):
         for packet, pictures in to_packets(*args):
             decoded.extend(pictures or ())
             yield packet, pictures
 
-    monkeypatch.setattr(decode_module, "_packets", counted)
+    monkeypatch.setattr(decode_module, "_decoded_packets", counted)
     film = open_film(clip)
     decoded.clear()
     sample = film.sample(8)
