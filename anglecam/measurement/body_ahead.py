@@ -31,7 +31,7 @@ from anglecam.vision.mark.segment import LARGEST_SHARE, SMALLEST_SHARE, Region, 
 from anglecam.vision.mark.track import follow_mark
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.registration.tiles import FrameView, motion_plane
-from anglecam.vision.registration.turn import NO_TURN, BodyAppearance, TurnEstimate, find_turn
+from anglecam.vision.registration.turn import NO_TURN, BodyAppearance, TurnEstimate, find_turn, refine_doubtful_turn
 
 LESS_THAN_A_TURN = 5.0
 """Largest range of directions in such frames, rad. Between frames far apart, whole turns are not counted."""
@@ -172,7 +172,7 @@ class TurnsAhead:
 
 
 def turn_ahead(
-    body: BodyAhead, film: Film, picture: Picture, before: Picture | None, begin: float
+    body: BodyAhead, film: Film, picture: Picture, before: Picture | None, begin: float, reach_px: float = 0.0
 ) -> Callable[[], TurnEstimate]:
     """Return the work of finding the rotation in a frame.
 
@@ -188,6 +188,8 @@ def turn_ahead(
         The previous frame, from which a codec may have copied.
     begin : float
         Angle at which the search begins, rad, from `BodyAhead.begin`; NaN where there is none.
+    reach_px : float
+        Distance from there, px, within which other angles are tried first.
 
     Returns
     -------
@@ -199,7 +201,9 @@ def turn_ahead(
         return lambda: NO_TURN
     view = FrameView(image, begin, body.appearance.pivot_px, 0.0, 0.0)
     copied = None if before is None or not picture.predicted else _registered(film, before)
-    return partial(find_turn, body.appearance, view, copied)
+    if not reach_px:
+        return partial(find_turn, body.appearance, view, copied)
+    return lambda: find_turn(body.appearance, refine_doubtful_turn(body.appearance, view, reach_px), copied)
 
 
 def _wrapped(angle: Floats) -> Floats:

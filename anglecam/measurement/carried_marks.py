@@ -7,7 +7,7 @@ measured all the same, and says where the mark is. A mark is hidden where the pa
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,47 @@ def smeared_marks(detections: Detections, start: Start, registered: Registered, 
         return np.asarray(detections.smeared & (np.hypot(along, outward) < _CARRIED_PX))
 
 
+@dataclass(frozen=True)
+class UncoveredBody:
+    """How a body looks where nothing covers it."""
+
+    misfit: float
+    """Its largest misfit."""
+    around: Flags
+    """(tiles,) which parts of it are around the mark."""
+
+    def is_seen(self, misfit: Floats | float, clear: Flags) -> Flags:
+        """Return whether a body with this misfit and these visible parts (…, tiles) is seen, and its mark with it."""
+        with np.errstate(invalid="ignore"):
+            fits = np.asarray(misfit) <= self.misfit
+        return np.asarray(fits & (clear.mean(axis=-1) >= _CLEAR_SHARE) & clear[..., self.around].all(axis=-1))
+
+
+def uncovered_body(detections: Detections, ok: Flags, registered: Registered) -> UncoveredBody | None:
+    """Return how the body looks in the frames in which its mark is found; ``None`` if no part of it is at the mark.
+
+    Parameters
+    ----------
+    detections : Detections
+        By the mark alone.
+    ok : ndarray
+        (n,) frames in which the mark is found.
+    registered : Registered
+        The body in every frame.
+    """
+    known = np.flatnonzero(ok & np.isfinite(registered.turn))
+    if detections.body is not None or not len(known):
+        return None
+    arms = detections.places_px[known] - registered.pivot_px
+    at_mark = np.median(rotate_each(arms, -registered.turn[known]), axis=0)
+    moments = np.array([r.moments_px2 for i in known if (r := detections.regions[i]) is not None])
+    half = 2.0 * np.sqrt(np.median(np.linalg.eigvalsh(moments)[:, -1]))  # of an ellipse's length
+    middles = registered.appearance.tiles.corners + TILE_SIDE_PX / 2 - registered.appearance.pivot_px
+    around = np.hypot(*(middles - at_mark).T) < half + TILE_SIDE_PX
+    limit = _MISFIT * float(np.quantile(registered.misfit[known], 0.95))
+    return UncoveredBody(limit, around) if around.any() else None
+
+
 def carried_marks(detections: Detections, ok: Flags, registered: Registered) -> tuple[Region | None, ...]:
     """Return the mark in the frames in which it is not found and nothing covers it, ``None`` in all others.
 
@@ -55,21 +96,11 @@ def carried_marks(detections: Detections, ok: Flags, registered: Registered) -> 
         is followed without a mark.
     """
     regions: list[Region | None] = [None] * len(ok)
+    uncovered = uncovered_body(detections, ok, registered)
+    if uncovered is None:
+        return tuple(regions)
     known = np.flatnonzero(ok & np.isfinite(registered.turn))
-    if detections.body is not None or not len(known):
-        return tuple(regions)
-    arms = detections.places_px[known] - registered.pivot_px
-    at_mark = np.median(rotate_each(arms, -registered.turn[known]), axis=0)
-    moments = np.array([r.moments_px2 for i in known if (r := detections.regions[i]) is not None])
-    half = 2.0 * np.sqrt(np.median(np.linalg.eigvalsh(moments)[:, -1]))  # of an ellipse's length
-    middles = registered.appearance.tiles.corners + TILE_SIDE_PX / 2 - registered.appearance.pivot_px
-    around = np.hypot(*(middles - at_mark).T) < half + TILE_SIDE_PX
-    if not around.any():
-        return tuple(regions)
-    limit = _MISFIT * float(np.quantile(registered.misfit[known], 0.95))
-    clear = (registered.clear.mean(axis=1) >= _CLEAR_SHARE) & registered.clear[:, around].all(axis=1)
-    with np.errstate(invalid="ignore"):
-        carried = ~ok & np.isfinite(registered.turn) & (registered.misfit <= limit) & clear
+    carried = ~ok & np.isfinite(registered.turn) & uncovered.is_seen(registered.misfit, registered.clear)
     for i in np.flatnonzero(carried):
         near = known[np.argmin(np.abs(registered.turn[known] - registered.turn[i]))]
         like = detections.regions[near]

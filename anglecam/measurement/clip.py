@@ -25,6 +25,7 @@ from anglecam.measurement.followed import Followed, follow_mark_or_body
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.measurement.trust import why_elsewhere, why_few, why_not_rigid
 from anglecam.video.film import Film
+from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.mark.outline_turn import outline_turn
 
 _HAND_HELD = "the camera moves and comes nearer; the clip is measured as seen from its place in the first frame"
@@ -98,7 +99,7 @@ def measure_clip(
     command: Command | None = None,
     *,
     progress: Callable[[int, int], None] | None = None,
-    mark_only: bool = False,
+    mark: FoundMark | None = None,
 ) -> Measurement:
     """Measure the angle in every frame of a clip.
 
@@ -112,8 +113,8 @@ def measure_clip(
         Its first change ends the rest that defines neutral. Where the rig declares a lamp, the lamp dates that change.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
-    mark_only : bool
-        Whether a body without a mark is not sought where there is no mark.
+    mark : FoundMark, optional
+        The mark, where it was found before (`anglecam.measurement.mark_pass.seek_mark`); then nothing else is followed.
 
     Returns
     -------
@@ -133,7 +134,7 @@ def measure_clip(
     camera = hold_camera(film)
     held = camera.film
     rig = as_seen_at_rest(rig, held)
-    followed = follow_mark_or_body(camera, rig, command, progress, mark_only=mark_only)
+    followed = follow_mark_or_body(camera, rig, command, progress, mark)
     detections = _as_filmed(followed.detections, held)
     series = _series(held, rig, followed, detections.status, lamp)
     zero = why_zero_is_elsewhere(rig, command, followed.time[followed.ok])

@@ -29,6 +29,7 @@ from anglecam.measurement.registration_pass import Registered, Start, register_c
 from anglecam.measurement.rigid_body_pass import detect_layer, detect_outline, detect_rigid_body
 from anglecam.measurement.trust import reaches_over_pivot, require_rotation, why_off_circle
 from anglecam.video.film import Film
+from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 
 _AGREE = 2.0
@@ -59,8 +60,7 @@ def follow_mark_or_body(
     rig: Rig,
     command: Command | None,
     progress: Callable[[int, int], None] | None = None,
-    *,
-    mark_only: bool = False,
+    known: FoundMark | None = None,
 ) -> Followed:
     """Measure the angle of the mark or, where none is declared and none is found, of a rigid body or its outline.
 
@@ -74,8 +74,8 @@ def follow_mark_or_body(
         Its first change ends the rest that defines neutral.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
-    mark_only : bool
-        Whether a body without a mark is not sought.
+    known : FoundMark, optional
+        The mark, where it was found before; then nothing else is followed.
 
     Returns
     -------
@@ -89,14 +89,14 @@ def follow_mark_or_body(
     """
     film = camera.film
     try:
-        mark = detect_mark(film, rig, camera, progress)
+        mark = detect_mark(film, rig, camera, progress, known)
         followed = _measured(film, rig, command, mark, progress)
         return _hinted(followed, film, rig, command) if _is_hinted(camera, rig) else followed
     except MarkNotFoundError as problem:
         causes, ways = [str(problem)], _without_mark(camera, rig)
     except InputError as problem:  # the mark moves otherwise; what turns about a hinted pivot may be another thing
         causes, ways = [str(problem)], [detect_layer] if _is_hinted(camera, rig) else []
-    for follow in () if mark_only else ways:
+    for follow in ways if known is None else ():
         try:
             body = follow(film, rig)
             if isinstance(body, Detections):

@@ -9,11 +9,14 @@ import numpy as np
 
 from anglecam.measurement.body_ahead import turn_ahead
 from anglecam.measurement.live_model import LiveAngle, LiveModel
+from anglecam.measurement.registration_pass import DOUBT_PX
 from anglecam.video.decode import Row
 from anglecam.video.film import Film
 from anglecam.video.picture import Picture
 from anglecam.vision.mark.mark_search import MarkSearch
 from anglecam.vision.registration.turn import NO_TURN
+
+_UNKNOWN = (np.nan, np.nan)
 
 
 class LiveMeter:
@@ -37,13 +40,14 @@ class LiveMeter:
         """Measure the next frames by what was learnt from more frames."""
         self._model = model
         self._search = MarkSearch(model.found, model.path.is_mark)
+        self._turns = _UNKNOWN
 
     def measure(self, number: int, row: Row) -> LiveAngle:
         """Measure the next frame; its direction counts the whole turns since the last one that was measured."""
         picture = Picture(number, *row, self._film.display, self._film.bottom_first)
         found = LiveAngle("undecodable") if picture.stored is None else self._angle(picture)
         if picture.stored is None:
-            self._search.lose()
+            self._lose()
         self._before = picture
         if np.isnan(found.line):
             return found
@@ -52,13 +56,22 @@ class LiveMeter:
 
     def skip(self) -> None:
         """Leave the next frame out."""
-        self._search.lose()
+        self._lose()
         self._before = None
 
+    def _lose(self) -> None:
+        self._search.lose()
+        self._turns = _UNKNOWN
+
     def _angle(self, picture: Picture) -> LiveAngle:
-        regions = self._search.regions(picture.index, self._film.size, picture.colours_in)
-        body = self._model.body
-        if body is None:
-            return self._model.angle(regions, NO_TURN)
-        turn = turn_ahead(body, self._film, picture, self._before, body.begin(regions))()
-        return self._model.angle(regions, turn)
+        model = self._model
+        mark = model.mark_in(self._search.regions(picture.index, self._film.size, picture.colours_in))
+        if model.body is None:
+            return model.angle(mark, NO_TURN)
+        if isinstance(mark, str):  # the motion of the last two frames goes on
+            begin, reach = 2.0 * self._turns[1] - self._turns[0], DOUBT_PX
+        else:
+            begin, reach = model.body.begin([mark]), 0.0
+        turn = turn_ahead(model.body, self._film, picture, self._before, begin, reach)()
+        self._turns = self._turns[1], turn.turn if model.shows(turn) else np.nan
+        return model.angle(mark, turn)

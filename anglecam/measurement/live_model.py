@@ -2,9 +2,10 @@
 
 The first frames are measured as a clip (`anglecam.measurement.clip`). This finds the mark, the pivot and the body, and
 refuses what is not a rotation. The angle in another frame is that of the whole body, where the body could be learnt and
-only among the angles at which it was learnt: light and perspective change with the angle. Otherwise it is that of the
-line from the pivot to the mark. Its uncertainty has the terms of `anglecam.measurement.fine_angles` and
-`anglecam.measurement.angles`. Their part that all frames share is that of the first frames.
+only among the angles at which it was learnt: light and perspective change with the angle. A body that fits worse than
+in the first frames is covered, or was sought at a wrong angle. Otherwise the angle is that of the line from the pivot
+to the mark. Its uncertainty has the terms of `anglecam.measurement.fine_angles` and `anglecam.measurement.angles`.
+Their part that all frames share is that of the first frames.
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ from anglecam.data.typing import Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.body_ahead import LESS_THAN_A_TURN, BodyAhead
+from anglecam.measurement.carried_marks import UncoveredBody, uncovered_body
 from anglecam.measurement.clip import Measurement
 from anglecam.measurement.mark_path import MarkPath
 from anglecam.measurement.sigma import angle_sigma
 from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.mark.segment import Region
+from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.registration.turn import TurnEstimate
 
 _WHOLE_AREA = (0.7, 1.4)
@@ -42,6 +45,27 @@ class LiveAngle:
 
 
 @dataclass(frozen=True)
+class MarkTerms:
+    """From the mark's place to the uncertainty of its line, see `anglecam.measurement.sigma.angle_sigma`."""
+
+    place_px: float
+    """Standard deviation of the place along the path, relative to the places in neutral, px."""
+    along: Floats
+    """(2,) mean unit vector along the path in neutral; zero where neutral is declared."""
+    pivot_covariance_px2: Floats
+    """(2, 2) px²."""
+    others: float
+    """Standard uncertainty by view and exposure, rad."""
+
+    def sigma(self, arm_px: Floats) -> float:
+        """Return the standard uncertainty of the line along an arm (2,), rad."""
+        lever = float(np.hypot(*arm_px))
+        along = np.array([-arm_px[1], arm_px[0]]) / lever - self.along
+        by_place = (self.place_px**2 + float(along @ self.pivot_covariance_px2 @ along)) / lever**2
+        return float(np.sqrt(by_place + self.others**2))
+
+
+@dataclass(frozen=True)
 class BodyTerms:
     """From the rotation of the body to the angle, and to its uncertainty."""
 
@@ -55,6 +79,8 @@ class BodyTerms:
     """(2, 2) px²."""
     shared: float
     """Standard uncertainty that all frames share, without the pivot's contribution, rad."""
+    uncovered: UncoveredBody
+    """How the body looks where nothing covers it."""
 
 
 @dataclass(frozen=True)
@@ -69,46 +95,55 @@ class LiveModel:
     """Direction that counts as zero, rad."""
     sign: float
     """1 for a rig that faces right, -1 for one that faces left."""
-    mark_sigma: float
-    """Standard uncertainty of an angle by the mark alone, rad."""
+    mark: MarkTerms
     body: BodyAhead | None
     """The body; ``None`` where the mark alone is measured."""
     terms: BodyTerms | None
     """Of the body."""
 
-    def angle(self, regions: Sequence[Region], turn: TurnEstimate) -> LiveAngle:
+    def mark_in(self, regions: Sequence[Region]) -> Region | str:
+        """Return the only region of a frame that may be the whole mark, or the status where there is none."""
+        marks = self.path.marks(regions)
+        if len(marks) != 1:
+            return "ambiguous" if marks else "no_mouth"
+        least, most = _WHOLE_AREA
+        whole = marks[0].whole and least < marks[0].area_px2 / self.path.area_px2 < most
+        return marks[0] if whole else "occluded"
+
+    def angle(self, mark: Region | str, turn: TurnEstimate) -> LiveAngle:
         """Return the angle in a frame.
 
         Parameters
         ----------
-        regions : sequence of Region
-            Regions of the mark's colour in the frame.
+        mark : Region or str
+            By `mark_in`.
         turn : TurnEstimate
-            The body's rotation, begun at the mark.
+            The body's rotation.
 
         Returns
         -------
         LiveAngle
-            With the status of `anglecam.data.series`.
+            By the body where all of it is seen, otherwise by the mark, otherwise with the status of
+            `anglecam.data.series`.
         """
-        marks = self.path.marks(regions)
-        if len(marks) != 1:
-            return LiveAngle("ambiguous" if marks else "no_mouth")
+        terms = self.terms
+        if terms is not None and self.shows(turn):
+            moved = turn.pivot_sensitivity - terms.sensitivity
+            by_pivot = float(moved @ terms.pivot_covariance_px2 @ moved)
+            sigma = float(np.sqrt(turn.noise**2 + turn.pose**2 + terms.shared**2 + by_pivot))
+            return LiveAngle(OK, terms.zero + self.sign * turn.turn, sigma)
+        if isinstance(mark, str):
+            return LiveAngle(mark)
+        ahead = 0.0 if self.sign > 0.0 else np.pi
+        line = ahead + self.sign * self.path.direction(mark, self.pivot_px)
+        return LiveAngle(OK, line, self.mark.sigma(self.path.lens.rectify(mark.centre_px) - self.pivot_px))
+
+    def shows(self, turn: TurnEstimate) -> bool:
+        """Return whether a rotation is that of the uncovered body, and among those at which it was learnt."""
         terms = self.terms
         if terms is None or not terms.turns[0] <= turn.turn <= terms.turns[1]:
-            return self._by_mark(marks[0])
-        moved = turn.pivot_sensitivity - terms.sensitivity
-        by_pivot = float(moved @ terms.pivot_covariance_px2 @ moved)
-        sigma = float(np.sqrt(turn.noise**2 + turn.pose**2 + terms.shared**2 + by_pivot))
-        return LiveAngle(OK, terms.zero + self.sign * turn.turn, sigma)
-
-    def _by_mark(self, mark: Region) -> LiveAngle:
-        """Return the angle of the line from the pivot to the mark."""
-        least, most = _WHOLE_AREA
-        if not (mark.whole and least < mark.area_px2 / self.path.area_px2 < most):
-            return LiveAngle("occluded")
-        ahead = 0.0 if self.sign > 0.0 else np.pi
-        return LiveAngle(OK, ahead + self.sign * self.path.direction(mark, self.pivot_px), self.mark_sigma)
+            return False
+        return bool(terms.uncovered.is_seen(turn.misfit, turn.clear))
 
 
 def live_model(first: Measurement, rig: Rig) -> LiveModel | str:
@@ -140,16 +175,18 @@ def live_model(first: Measurement, rig: Rig) -> LiveModel | str:
     coarse = angle_sigma(
         angles.mark_px, detections.pivot.centre_px, detections.pivot.covariance_px2, angles.errors, angles.resting
     )
-    body = _body(first, path, rig)
+    body, terms = _body(first, path, rig), None
+    if body is not None:
+        terms = _body_terms(angles, first, rig, coarse)
     return LiveModel(
         found=detections.found,
         path=path,
         pivot_px=detections.pivot.centre_px,
         neutral=angles.neutral,
         sign=1.0 if rig.facing == "right" else -1.0,
-        mark_sigma=float(np.sqrt(np.mean(coarse**2 + angles.view.sigma**2 + angles.within_exposure**2))),
-        body=body,
-        terms=None if body is None else _terms(angles, first, rig, coarse),
+        mark=_mark_terms(angles, detections.pivot, coarse),
+        body=None if terms is None else body,
+        terms=terms,
     )
 
 
@@ -174,10 +211,31 @@ def _body(first: Measurement, path: MarkPath, rig: Rig) -> BodyAhead | None:
     )
 
 
-def _terms(angles: Angles, first: Measurement, rig: Rig, coarse: Floats) -> BodyTerms:
-    """Return the terms that the first frames determine; see `anglecam.measurement.fine_angles.fine_angles`."""
+def _mark_terms(angles: Angles, pivot: PivotEstimate, coarse: Floats) -> MarkTerms:
+    """Return the terms of the mark's uncertainty, of which ``coarse`` (n,) rad is the result in each first frame."""
+    arm = angles.mark_px - pivot.centre_px
+    lever = np.hypot(*arm.T)
+    along = np.column_stack([-arm[:, 1], arm[:, 0]]) / lever[:, None]
+    in_neutral = np.zeros(2) if angles.resting is None else along[angles.resting].mean(axis=0)
+    by_pivot = np.einsum("ni,ij,nj->n", along - in_neutral, pivot.covariance_px2, along - in_neutral)
+    return MarkTerms(
+        place_px=float(np.sqrt(np.mean((coarse * lever) ** 2 - by_pivot))),
+        along=in_neutral,
+        pivot_covariance_px2=pivot.covariance_px2,
+        others=float(np.sqrt(np.mean(angles.view.sigma**2 + angles.within_exposure**2))),
+    )
+
+
+def _body_terms(angles: Angles, first: Measurement, rig: Rig, coarse: Floats) -> BodyTerms | None:
+    """Return the terms that the first frames determine; see `anglecam.measurement.fine_angles.fine_angles`.
+
+    There are none where no part of the body is at the mark: the mark could then be covered unnoticed.
+    """
     registered = angles.registered
     assert registered is not None
+    uncovered = uncovered_body(first.detections, first.ok, registered)
+    if uncovered is None:
+        return None
     turn, sensitivity = registered.turn[first.ok], registered.pivot_sensitivity[first.ok]
     seen = np.isfinite(turn)
     sign = 1.0 if rig.facing == "right" else -1.0
@@ -192,4 +250,5 @@ def _terms(angles: Angles, first: Measurement, rig: Rig, coarse: Floats) -> Body
         sensitivity=sensitivity[used].mean(axis=0),
         pivot_covariance_px2=registered.pivot_covariance_px2,
         shared=float(np.sqrt(shared)),
+        uncovered=uncovered,
     )

@@ -42,11 +42,39 @@ class MarkNotFoundError(InputError):
     """No thing of the clip can be followed as a mark, so that a body without one may be tried."""
 
 
+def seek_mark(film: Film, rig: Rig) -> FoundMark:
+    """Find the mark in evenly spaced frames of a film whose camera stands.
+
+    Parameters
+    ----------
+    film : Film
+        The clip.
+    rig : Rig
+        Declares mark, pivot and camera.
+
+    Returns
+    -------
+    FoundMark
+        Its colour and its rough path.
+
+    Raises
+    ------
+    MarkNotFoundError
+        Where there is none.
+    InputError
+        Where the file cannot be read.
+    """
+    lens = lens_from_rig(rig, film.size, film.path)
+    sample, samples = _sampled(film, rig, None, lens)
+    return _sought(film, rig, sample, samples, lens)
+
+
 def detect_mark(
     film: Film,
     rig: Rig,
     camera: HeldCamera | None = None,
     progress: Callable[[int, int], None] | None = None,
+    mark: FoundMark | None = None,
 ) -> Detections:
     """Find the mark in every frame of a clip, and the pivot.
 
@@ -60,6 +88,8 @@ def detect_mark(
         How the camera moves; without it the camera is at rest.
     progress : callable, optional
         Called with (frames done, frames in all) after each frame.
+    mark : FoundMark, optional
+        The mark, where it was found before; it is sought by default.
 
     Returns
     -------
@@ -75,15 +105,9 @@ def detect_mark(
     """
     path, steady = film.path, None if camera is None else camera.steady
     lens = lens_from_rig(rig, film.size, path)
-    sample = film.sample(frames_to_keep(film))
+    sample, samples = _sampled(film, rig, steady, lens)
     noise = pixel_noise([f.image for f in sample.frames if f.image is not None])
-    pointed = rig.pointed_mark
-    frames = [*([] if pointed is None else [frame_of_mark(film, pointed)]), *sample.frames]
-    samples = _samples(film, frames, pointed, steady, lens)
-    near = None if rig.pivot.expected is None else lens.rectify(rig.pivot.expected)
-    found = find_mark(samples, rig.mark_rgb, near) if samples.images else None
-    if found is None:
-        raise MarkNotFoundError(_no_mark(path, sample, rig))
+    found = _sought(film, rig, sample, samples, lens) if mark is None else mark
     if camera is not None and camera.unknown is not None:
         raise InputError(camera.unknown)
     body = _body_ahead(film, found, samples, rig, lens) if steady is None else None
@@ -133,6 +157,21 @@ def detect_mark(
         turns=reading.turns,
         found=found,
     )
+
+
+def _sampled(film: Film, rig: Rig, steady: BackgroundMotion | None, lens: Lens) -> tuple[Sample, Samples]:
+    """Return evenly spaced frames, as read and as the mark is sought in them."""
+    sample, pointed = film.sample(frames_to_keep(film)), rig.pointed_mark
+    frames = [*([] if pointed is None else [frame_of_mark(film, pointed)]), *sample.frames]
+    return sample, _samples(film, frames, pointed, steady, lens)
+
+
+def _sought(film: Film, rig: Rig, sample: Sample, samples: Samples, lens: Lens) -> FoundMark:
+    near = None if rig.pivot.expected is None else lens.rectify(rig.pivot.expected)
+    found = find_mark(samples, rig.mark_rgb, near) if samples.images else None
+    if found is None:
+        raise MarkNotFoundError(_no_mark(film.path, sample, rig))
+    return found
 
 
 def _body_ahead(film: Film, found: FoundMark, samples: Samples, rig: Rig, lens: Lens) -> BodyAhead | None:

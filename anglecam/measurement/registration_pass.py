@@ -24,7 +24,7 @@ from anglecam.vision.registration.turn import NO_TURN, BodyAppearance, TurnEstim
 _AS_MANY, _AS_WELL_KNOWN = 2.0, 2.0
 """Largest ratio of the poses that the whole film offers to those that a body was learnt from before, and of the
 uncertainty of that body's pivot to that of the pivot by the mark's whole path."""
-_DOUBT_PX = 10.0
+DOUBT_PX = 10.0
 """Largest error of a guessed rotation, px at the mark."""
 _AGREE = 4.0
 """Limit of the median difference between coarse and fine rotation, in standard uncertainties of the coarse one. Beyond
@@ -185,7 +185,7 @@ def _find_turns(
                 rows[i] = appearance.row_of_middle(one)
                 one = replace(one, turn=one.turn + one.turn_per_row * (rows[i] - one.row), row=rows[i])
             if np.isnan(start.sigma[i]):
-                one = refine_doubtful_turn(appearance, _going_on(one, found, i), _DOUBT_PX)
+                one = refine_doubtful_turn(appearance, _going_on(one, found, i), DOUBT_PX)
             found[i] = find_turn(appearance, one, before if frame.predicted else None)
         before = image
         if progress is not None:

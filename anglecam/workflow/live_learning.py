@@ -3,6 +3,9 @@
 What is learnt from two seconds holds for the angles that were seen in them. The body is therefore learnt again from
 evenly spaced frames of all that was filmed, at doubled durations: of an hour ten times. A failed attempt is repeated
 sooner: the mechanism may have rested.
+
+Most of the time goes into seeking the mark. The body is therefore learnt from all frames that came by the end of the
+search, and a failed attempt leaves the mark to the next one.
 """
 
 from __future__ import annotations
@@ -20,10 +23,12 @@ from anglecam.identification.running_ekf import RunningEkf
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.live_model import LiveModel, live_model
+from anglecam.measurement.mark_pass import seek_mark
 from anglecam.video.decode import Row
 from anglecam.video.film import Film
 from anglecam.video.film_rows import KeptRows
 from anglecam.video.live_source import LiveSource
+from anglecam.vision.mark.found_mark import FoundMark
 
 _FIRST_S, _FEWEST = 2.0, 24
 """Duration and number of the frames of the first attempt: less seldom shows a motion."""
@@ -64,7 +69,9 @@ class Learning:
         self._kept = KeptRows()
         self._count = 0
         self._first_s: float | None = None
+        self._learnt_s = 0.0
         self._due_s = _FIRST_S
+        self._mark: FoundMark | None = None
         self._thread: Thread | None = None
         self._lesson: Lesson | None = None
         self.cause: str | None = None
@@ -79,10 +86,9 @@ class Learning:
         lesson = None
         if self._thread is not None and not self._thread.is_alive():
             self._thread, lesson, self._lesson = None, self._lesson, None
-            self._due_s *= _SOONER if lesson is None else _LONGER
+            self._due_s = self._learnt_s * (_SOONER if lesson is None else _LONGER)
         if self._thread is None and lasted >= self._due_s and len(self._kept.rows) >= _FEWEST:
-            self._due_s = lasted
-            self._thread = Thread(target=self._learn, args=(list(self._kept.rows),), name="learning", daemon=True)
+            self._thread = Thread(target=self._learn, name="learning", daemon=True)
             self._thread.start()
         return lesson
 
@@ -92,21 +98,30 @@ class Learning:
             self._thread.join()
             self._thread = None
 
-    def _learn(self, numbered: list[tuple[int, Row]]) -> None:
+    def _learn(self) -> None:
         with suppress(AttributeError, OSError):  # where a thread has no niceness of its own
             os.setpriority(os.PRIO_PROCESS, get_native_id(), _NICENESS)
         try:
             with blame(self._source.path):
-                self._lesson = self._lesson_from(numbered)
-                self.cause = None
+                mark, self._mark = self._mark, None
+                if mark is None:
+                    film, rig = self._film_of(list(self._kept.rows))
+                    mark = self._mark = seek_mark(film, rig)
+                self._lesson = self._lesson_from(list(self._kept.rows), mark)
+                self.cause = self._mark = None
         except AnglecamError as problem:
             self.cause = str(problem)
 
-    def _lesson_from(self, numbered: list[tuple[int, Row]]) -> Lesson:
+    def _film_of(self, numbered: list[tuple[int, Row]]) -> tuple[Film, Rig]:
+        """Return the film of some frames, and its rig."""
+        assert self._first_s is not None
+        self._learnt_s = numbered[-1][1][0] - self._first_s
         film = self._source.film_of([row for _, row in numbered])
-        numbers = [number for number, _ in numbered]
-        rig = _rig_of_kept(self._rig, numbers)
-        first = measure_clip(film, rig, self._command, mark_only=True)
+        return film, _rig_of_kept(self._rig, [number for number, _ in numbered])
+
+    def _lesson_from(self, numbered: list[tuple[int, Row]], mark: FoundMark) -> Lesson:
+        film, rig = self._film_of(numbered)
+        first = measure_clip(film, rig, self._command, mark=mark)
         model = live_model(first, rig)
         if isinstance(model, str):
             raise InputError(f"{film.path}: {model}")
@@ -118,7 +133,7 @@ class Learning:
             record = None
         line = first.series.line
         assert line is not None  # only tracks may lack it
-        lines = {k: at for k, at in zip(numbers, line.tolist(), strict=True) if not isnan(at)}
+        lines = {k: at for (k, _), at in zip(numbered, line.tolist(), strict=True) if not isnan(at)}
         return Lesson(model, film, lines, None if record is None else RunningEkf(record))
 
 

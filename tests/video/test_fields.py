@@ -44,7 +44,7 @@ def test_an_interlaced_film_gives_the_angles_of_its_first_fields(tmp_path, monke
     fields = [frame.image for frame in open_film(drawn).frames()]
     pictures = [_woven(*pair, bottom_first) for pair in zip(fields[0::2], fields[1::2], strict=True)]
     order = "bff=1" if bottom_first else "tff=1"
-    options = {"crf": "10", "threads": "1", "x264-params": order}  # with more threads every file is another one
+    options = {"qp": "16", "threads": "1", "x264-params": order}  # with rate control every file is another one
     film = open_film(encode(tmp_path / "dv.mp4", pictures, options=options, interlaced=True))
     assert film.bottom_first == bottom_first
     assert film.interlaced == 40
@@ -54,8 +54,8 @@ def test_an_interlaced_film_gives_the_angles_of_its_first_fields(tmp_path, monke
     assert series.ok.all()
     np.testing.assert_allclose(series.time, np.arange(40) / 30.0, atol=1e-9)
     off = np.degrees(series.angle) - angles[0::2]
-    assert np.std(off) < (0.05 if rig is DECLARED else 0.2)  # half a frame later the angle is up to 2° different
-    assert np.std(off) < np.degrees(np.median(series.sigma))
+    sigma = np.degrees(np.median(series.sigma))  # where the pivot is not declared, it is most of it
+    assert np.std(off) < sigma < (0.1 if rig is DECLARED else 0.4)  # half a frame later the angle is up to 2° different
     assert np.std(np.degrees(series.angle) - angles[1::2]) > 1.0
 
 

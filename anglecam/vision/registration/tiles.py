@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from anglecam.camera.lens import Lens
 from anglecam.data.typing import Floats, Image
+from anglecam.threads import map_in_threads
 from anglecam.vision.image.median import median_picture
 from anglecam.vision.image.transforms import rotate_each, rotation
 from anglecam.vision.registration.appearance import TileViews
@@ -41,6 +42,8 @@ _MAX_HEIGHT = 0.3
 """Largest height of a part of the body, as a share of half the picture's diagonal."""
 _HEIGHT_STEP_PX = 1.0
 """Displacement between neighbouring heights that are tried, px."""
+_STRIP_ROWS = 16
+"""Rows of a strip of pictures that are superposed at a time."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,7 @@ def choose_tiles(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floa
     height, width = frames[0].image.shape[:2]
     heights = _find_heights(frames, plane, pivot_px)
     mean, spread, whole = _stack(frames, plane, pivot_px, _by_pixel(heights, (height, width)))
-    spread_as_filmed = _median_and_spread(np.stack([f.image for f in frames]).astype(np.float32))[1]
+    spread_as_filmed = _spread_as_filmed(frames)
     smooth = cv2.GaussianBlur(mean, (0, 0), 0.7)
     along_x, along_y = (
         cv2.Scharr(smooth, cv2.CV_32F, *axis, scale=1 / 32).reshape(mean.shape) for axis in ((1, 0), (0, 1))
@@ -222,21 +225,44 @@ def _stack(
     step : int
         Every ``step``-th pixel along both axes is computed.
     """
-    height, width = frames[0].image.shape[:2]
+    height, width, planes = frames[0].image.shape
     x, y = np.meshgrid(np.arange(0.0, width, step), np.arange(0.0, height, step))
-    parallax = np.reshape(heights, (-1, 1)) * plane.axis.parallax
-    arms = np.stack([x, y], axis=-1).reshape(-1, 2) - pivot_px - parallax
-    pile, whole = [], np.ones(x.shape, bool)
-    for f in frames:
-        places = plane.lens.distort(arms @ rotation(f.turn) + f.pivot_px + parallax)
-        if f.turn_per_row:
-            extra = f.turn_per_row * (places[:, 1] - f.row)
-            places = plane.lens.distort(rotate_each(arms, f.turn + extra) + f.pivot_px + parallax)
-        at = places.reshape(*x.shape, 2).astype(np.float32)
-        back = cv2.remap(f.image, at[..., 0], at[..., 1], cv2.INTER_LINEAR)
-        pile.append(back.reshape(*x.shape, -1).astype(np.float32))
-        whole &= (at >= 0).all(axis=2) & (at[..., 0] <= width - 1) & (at[..., 1] <= height - 1)
-    return *_median_and_spread(np.stack(pile)), whole
+    middle, spread = np.empty((2, *x.shape, planes), np.float32)
+    whole = np.ones(x.shape, bool)
+
+    def fill(rows: slice) -> None:
+        here = heights[rows] if isinstance(heights, np.ndarray) else heights
+        parallax = np.reshape(here, (-1, 1)) * plane.axis.parallax
+        arms = np.stack([x[rows], y[rows]], axis=-1).reshape(-1, 2) - pivot_px - parallax
+        pile = np.empty((len(frames), *middle[rows].shape), np.float32)
+        for f, back in zip(frames, pile, strict=True):
+            places = plane.lens.distort(arms @ rotation(f.turn) + f.pivot_px + parallax)
+            if f.turn_per_row:
+                extra = f.turn_per_row * (places[:, 1] - f.row)
+                places = plane.lens.distort(rotate_each(arms, f.turn + extra) + f.pivot_px + parallax)
+            at_x, at_y = places.astype(np.float32).T.reshape(2, *back.shape[:2])
+            back[:] = cv2.remap(f.image, at_x, at_y, cv2.INTER_LINEAR).reshape(back.shape)
+            whole[rows] &= (at_x >= 0) & (at_y >= 0) & (at_x <= width - 1) & (at_y <= height - 1)
+        middle[rows], spread[rows] = _median_and_spread(pile)
+
+    map_in_threads(fill, _strips(len(x)))
+    return middle, spread, whole
+
+
+def _spread_as_filmed(frames: Sequence[FrameView]) -> Image:
+    """Return the robust standard deviation of each pixel between frames as they were filmed."""
+    spread = np.empty(frames[0].image.shape, np.float32)
+
+    def fill(rows: slice) -> None:
+        spread[rows] = _median_and_spread(np.stack([f.image[rows] for f in frames]).astype(np.float32))[1]
+
+    map_in_threads(fill, _strips(len(spread)))
+    return spread
+
+
+def _strips(rows: int) -> list[slice]:
+    """Return strips of a picture in which a pile of pictures fits into the processor's cache."""
+    return [slice(top, top + _STRIP_ROWS) for top in range(0, rows, _STRIP_ROWS)]
 
 
 def _by_pixel(heights: Floats, shape: tuple[int, int]) -> float | Floats:
