@@ -6,8 +6,11 @@ derived from a frame's number. A packet that cannot be decoded keeps its row: a 
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator
+from itertools import islice
 from pathlib import Path
+from typing import Literal
 
 import av
 
@@ -21,10 +24,20 @@ Row = tuple[float, av.VideoFrame | None]
 """Time, s, and picture of a frame; ``None`` where it cannot be decoded."""
 
 
+PREDICTING_CODECS = ("h264", "hevc")
+"""Pictures of these are predicted from others. Several are decoded at once, each by a thread, since they are seldom cut
+into slices; those from which no other is predicted can be left out."""
+_PREDICTED_FROM = 16
+"""A picture is predicted from none that is shown more than so many places later: these codecs keep no more."""
 INTRA_CODECS = ("mjpeg", "prores", "dnxhd", "huffyuv", "ffvhuff", "utvideo", "rawvideo")
 """Every packet of these is a picture of its own, which is decoded without the others."""
+Skipped = Literal["NONKEY", "BIDIR"]
 Wants = Callable[[int], bool]
 """Whether the picture of the row with a given number is wanted; the first row has 0."""
+
+
+class _IrregularError(Exception):
+    """A film is not intact."""
 
 
 def decode(path: Path, wants: Wants | None = None) -> Iterator[Row]:
@@ -32,6 +45,9 @@ def decode(path: Path, wants: Wants | None = None) -> Iterator[Row]:
 
     A packet that the container marks to be discarded is no frame: an edit list leaves out the start of a film that was
     trimmed, but the decoder needs it as reference.
+
+    While a film is intact, several of its pictures may be decoded at once. From the first irregularity on it is decoded
+    again picture by picture, because a decoder with several threads does not say which packet it could not decode.
 
     Parameters
     ----------
@@ -51,8 +67,66 @@ def decode(path: Path, wants: Wants | None = None) -> Iterator[Row]:
         As `anglecam.video.container.open_container`, and where time stamps do not increase, pictures change their
         size, or the film has no frame, more frames than `MOST_FRAMES` or a longer duration than `LONGEST_S`.
     """
+    intact = 0
     with open_container(path) as container:
-        yield from decode_container(path, container, wants)
+        if native_threads() == 1 or not may_skip(container):
+            yield from decode_container(path, container, wants)
+            return
+        try:
+            for row in _decode_intact(path, container):
+                yield row
+                intact += 1
+            return
+        except (_IrregularError, InputError):
+            pass
+    with open_container(path) as container:
+        yield from islice(decode_container(path, container, wants), intact, None)
+
+
+def decode_some(path: Path, skipped: Skipped) -> Iterator[Row]:
+    """Yield a film's rows, some of them without a picture: those that the decoder skips or cannot decode.
+
+    Parameters
+    ----------
+    path : Path
+        The film; its container states when each packet is presented.
+    skipped : {'NONKEY', 'BIDIR'}
+        FFmpeg's name of the pictures to skip: ``NONKEY`` leaves those that need no other, ``BIDIR`` also those that
+        need only earlier ones.
+
+    Yields
+    ------
+    tuple of (float, VideoFrame or None)
+        Time, s, and picture.
+
+    Raises
+    ------
+    InputError
+        As `decode`.
+    """
+    with open_container(path) as container:
+        container.streams.video[0].codec_context.skip_frame = skipped
+        yield from decode_container(path, container, threads="FRAME")
+
+
+def may_skip(container: av.container.InputContainer) -> bool:
+    """Return whether `decode_some` can decode a film: AVI does not state which pictures are missing."""
+    return container.format.name != "avi" and container.streams.video[0].codec_context.name in PREDICTING_CODECS
+
+
+def _decode_intact(path: Path, container: av.container.InputContainer) -> Iterator[Row]:
+    """Yield the rows of an intact film, several of which are decoded at once; raise at the first irregularity.
+
+    A row waits until those are decoded from which it may have been predicted.
+    """
+    waiting: deque[Row] = deque()
+    for row in decode_container(path, container, threads="FRAME"):
+        if row[1] is None:
+            raise _IrregularError
+        waiting.append(row)
+        if len(waiting) > _PREDICTED_FROM:
+            yield waiting.popleft()
+    yield from waiting
 
 
 def decode_container(
@@ -60,15 +134,17 @@ def decode_container(
     container: av.container.InputContainer,
     wants: Wants | None = None,
     packets: Iterator[av.Packet] | None = None,
+    threads: str = "SLICE",
 ) -> Iterator[Row]:
     """Yield the rows of a film that is open, and of which nothing was decoded; see `decode`.
 
-    ``packets`` are those of its first video stream, where something else takes them from the container.
+    ``packets`` are those of its first video stream, where something else takes them from the container. ``threads`` is
+    what each of the decoder's threads decodes: a ``SLICE`` of a picture, or a ``FRAME``.
     """
     stream = container.streams.video[0]
     packets = container.demux(stream) if packets is None else packets
     decoder = stream.codec_context
-    decoder.thread_type = "SLICE"
+    decoder.thread_type = threads
     decoder.thread_count = native_threads()
     base = float(stream.time_base or 0.0)
     is_avi = container.format.name == "avi"

@@ -18,7 +18,7 @@ from anglecam.data.typing import Floats, Image
 from anglecam.threads import native_threads
 from anglecam.video.decode import Row
 from anglecam.video.display import Display
-from anglecam.video.film_rows import FilmRows
+from anglecam.video.film_rows import FilmRows, first_of_each
 from anglecam.video.picture import Picture
 from anglecam.video.read_ahead import read_ahead
 
@@ -182,9 +182,9 @@ class Film:
         if most not in self._samples:
             decoded = [(number, row) for number, row in self.rows.kept.rows if row[1] is not None]
             stride = 1
-            while sum(number % stride == 0 for number, _ in decoded) > most:
+            while len(first_of_each(stride, decoded)) > most:
                 stride *= 2
-            pictures = [self._picture(number, row) for number, row in decoded if number % stride == 0]
+            pictures = [self._picture(number, row) for number, row in first_of_each(stride, decoded)]
             frames = tuple(Frame(p.index, p.time, p.colours) for p in pictures)
             intact = self.rows.count - self.rows.undecodable if self.rows.is_read else len(decoded)
             self._samples[most] = Sample(frames, self.rows.count, intact)

@@ -6,7 +6,7 @@ of a short film are kept from its first reading on. Of a long film, what it show
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -15,7 +15,7 @@ import av
 
 from anglecam.errors import InputError
 from anglecam.io.rig import RigFrames
-from anglecam.video.decode import Row, Wants
+from anglecam.video.decode import Row, Skipped, Wants
 
 MOST_BYTES = 256 * 2**20
 """Of decoded pictures: 220 lossless ones of 640 × 480 px, 580 of an ordinary codec."""
@@ -23,6 +23,11 @@ MOST_SPREAD = 240
 """Evenly spaced rows of a film of which not all are kept: twice the number from which a body is learnt."""
 _FEWEST = 16
 """Rows of which none is dropped, however large their pictures are."""
+_LARGEST_GAP = 2.0
+"""Between rows that are decoded, relative to the spacing of half of `MOST_SPREAD` rows."""
+SKIPPED: tuple[Skipped, ...] = ("NONKEY", "BIDIR")
+"""Kinds of pictures that may be left out when evenly spaced rows are taken, those first that leave out most; see
+`anglecam.video.decode.decode_some`."""
 
 
 @dataclass
@@ -30,14 +35,14 @@ class KeptRows:
     """Keeps evenly spaced rows; when their pictures need too much memory, every second one is dropped."""
 
     stride: int = 1
-    """Every row whose number is a multiple of this is kept."""
+    """The first row of each so many rows is kept; 1 where all rows of the film are."""
     rows: list[tuple[int, Row]] = field(default_factory=list)
     """With their numbers."""
     _bytes: int = 0
 
     def wants(self, number: int) -> bool:
-        """Return whether the row of this number will be kept."""
-        return number % self.stride == 0
+        """Return whether a row that comes after those that are kept will be kept."""
+        return not self.rows or number // self.stride > self.rows[-1][0] // self.stride
 
     def add(self, number: int, row: Row) -> None:
         """Keep a row if it is wanted; rows come in their order."""
@@ -47,7 +52,7 @@ class KeptRows:
         self._bytes += picture_bytes(row[1])
         while self._too_many():
             self.stride *= 2
-            self.rows = [(kept, one) for kept, one in self.rows if self.wants(kept)]
+            self.rows = first_of_each(self.stride, self.rows)
             self._bytes = sum(picture_bytes(one[1]) for _, one in self.rows)
 
     def _too_many(self) -> bool:
@@ -71,6 +76,8 @@ class FilmRows:
         Whether each picture is decoded without the others, so that some can be left out.
     declared_bytes : int
         Memory of all pictures, as many as the container states; 0 where that is not to be relied on.
+    decode_some : callable, optional
+        Decodes the rows without the pictures of one of the kinds in `SKIPPED`.
     """
 
     def __init__(
@@ -80,10 +87,12 @@ class FilmRows:
         wanted: RigFrames | None = None,
         independent: bool = False,
         declared_bytes: int = 0,
+        decode_some: Callable[[Skipped], Iterator[Row]] | None = None,
     ) -> None:
         self.wanted = RigFrames() if wanted is None else wanted
         self.first = self.wanted.first or 0
         self._path, self._decode, self._independent, self._declared_bytes = path, decode, independent, declared_bytes
+        self._decode_some = decode_some
         self._times: list[float] | None = None
         self._undecodable = self._interlaced = self._count = 0
         self._kept: KeptRows | None = None
@@ -122,9 +131,9 @@ class FilmRows:
         """The rows that are kept."""
         if self._kept is None:
             # where they are more than are kept for sure, the others are not decoded
-            if self._independent and self._declared_bytes > MOST_BYTES:
+            if self._declared_bytes > MOST_BYTES:
                 self._keep_some()
-            else:
+            if self._kept is None:
                 self._read_once()
         assert self._kept is not None
         return self._kept
@@ -159,7 +168,8 @@ class FilmRows:
         undecodable = interlaced = 0
         kept = KeptRows()
         for row in self._decoded(None):
-            kept.add(len(times), row)
+            if self._kept is None:
+                kept.add(len(times), row)
             times.append(row[0])
             undecodable += row[1] is None
             interlaced += row[1] is not None and row[1].interlaced_frame
@@ -168,22 +178,60 @@ class FilmRows:
         self._kept = self._kept or kept
 
     def _keep_some(self) -> None:
-        kept, count = KeptRows(), 0
-        for row in self._decoded(kept.wants):
-            kept.add(count, row)
-            count += 1
-        self._kept, self._count = kept, count
+        """Keep evenly spaced rows without decoding all of them, where the codec allows it."""
+        if self._independent:
+            kept = KeptRows()
+            self._kept, (self._count, _) = kept, _keep(kept, self._decoded(kept.wants))
+        if self._decode_some is None:
+            return
+        for skipped in SKIPPED:
+            kept = KeptRows(stride=2)
+            try:
+                count, gap = _keep(kept, self._wanted(self._decode_some(skipped)), pictures_only=True)
+            except InputError:  # it is repeated where all pictures are decoded
+                return
+            if gap <= _LARGEST_GAP * count / (MOST_SPREAD / 2):
+                self._kept, self._count = kept, count
+                return
 
     def _decoded(self, wants: Wants | None) -> Iterator[Row]:
-        """Decode the wanted rows; raise an `InputError` where there are none."""
-        stop = None if self.wanted.last is None else self.wanted.last + 1
         some = None if wants is None or not self._independent else lambda number: wants(number - self.first)
+        return self._wanted(self._decode(some))
+
+    def _wanted(self, rows: Iterator[Row]) -> Iterator[Row]:
+        """Yield the rows that are wanted; raise an `InputError` where there are none."""
+        stop = None if self.wanted.last is None else self.wanted.last + 1
         empty = True
-        for row in islice(self._decode(some), self.first, stop):
+        for row in islice(rows, self.first, stop):
             empty = False
             yield row
         if empty:
             raise InputError(f"{self._path}: it ends before frame {self.first}, the first that is wanted")
+
+
+def first_of_each(stride: int, rows: Sequence[tuple[int, Row]]) -> list[tuple[int, Row]]:
+    """Return the first of the numbered rows in each range of ``stride`` numbers that begins at a multiple of it."""
+    starts = [k for k, (number, _) in enumerate(rows) if k == 0 or number // stride > rows[k - 1][0] // stride]
+    return [rows[k] for k in starts]
+
+
+def _keep(kept: KeptRows, rows: Iterator[Row], pictures_only: bool = False) -> tuple[int, int]:
+    """Offer all rows, or those with a picture, to be kept.
+
+    Returns
+    -------
+    count : int
+        Number of all rows.
+    gap : int
+        Largest distance between neighbouring rows that were offered, the film's ends included.
+    """
+    count, gap, last = 0, 0, -1
+    for row in rows:
+        if not pictures_only or row[1] is not None:
+            kept.add(count, row)
+            gap, last = max(gap, count - last), count
+        count += 1
+    return count, max(gap, count - last)
 
 
 def picture_bytes(picture: av.VideoFrame | None) -> int:

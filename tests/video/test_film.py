@@ -21,6 +21,7 @@ from anglecam.video.film import Film
 from anglecam.video.film_rows import FilmRows
 from anglecam.video.open_film import open_film
 from support.drawn import Look, draw_frames, write_clip
+from support.encoded import encode
 
 BYTES = 1000
 """Of one picture."""
@@ -124,6 +125,40 @@ def test_pictures_that_are_not_needed_are_not_decoded(monkeypatch, tmp_path):
     assert [frame.index for frame in film.frames(only={5, 17})] == [5, 17]
     assert len(decoded) == 2
     assert len(list(film.frames())) == 40
+
+
+def test_of_a_long_film_whose_pictures_are_predicted_evenly_spaced_ones_are_decoded(monkeypatch, tmp_path):
+    clip = tmp_path / "clip.mp4"
+    encode(clip, draw_frames(Look(), np.linspace(-8.0, 8.0, 300)), options={"bf": "3", "g": "50"})
+    whole = list(open_film(clip).frames())
+    monkeypatch.setattr(film_rows, "MOST_BYTES", 30 * whole[0].image.size)
+    film = open_film(clip)
+    sample = film.sample(60)
+    assert not film.rows.is_read
+    assert sample.count == 300
+    assert 20 <= len(sample.frames) <= 60
+    indices = [frame.index for frame in sample.frames]
+    assert np.diff([-1, *indices, 300]).max() <= 16
+    for frame in sample.frames:
+        assert frame.time == whole[frame.index].time
+        np.testing.assert_array_equal(frame.image, whole[frame.index].image)
+    assert [frame.time for frame in film.frames()] == [frame.time for frame in whole]
+
+
+@pytest.mark.parametrize("damage", range(4))
+def test_a_damaged_film_has_the_rows_that_one_thread_decodes(tmp_path, monkeypatch, damage):
+    clip = tmp_path / "clip.mp4"
+    encode(clip, draw_frames(Look(), np.linspace(-8.0, 8.0, 60)), options={"bf": "3", "g": "20"})
+    content, rng = bytearray(clip.read_bytes()), np.random.default_rng(damage)
+    for k in rng.integers(len(content) // 4, 3 * len(content) // 4, 3):
+        content[k] ^= 0x55
+    clip.write_bytes(content)
+
+    def rows(threads):
+        monkeypatch.setenv("OMP_NUM_THREADS", str(threads))
+        return [(time, None if p is None else p.to_ndarray().tobytes()) for time, p in decode_module.decode(clip)]
+
+    assert rows(2) == rows(1)
 
 
 def test_times_and_lost_frames_are_known_after_one_reading(decoder):
