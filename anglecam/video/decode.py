@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 import av
+from av.video.frame import PictureType
 
 from anglecam.errors import InputError
 from anglecam.threads import native_threads
@@ -31,7 +32,7 @@ _PREDICTED_FROM = 16
 """A picture is predicted from none that is shown more than so many places later: these codecs keep no more."""
 INTRA_CODECS = ("mjpeg", "prores", "dnxhd", "huffyuv", "ffvhuff", "utvideo", "rawvideo")
 """Every packet of these is a picture of its own, which is decoded without the others."""
-Skipped = Literal["NONKEY", "BIDIR"]
+Skipped = Literal["NONKEY", "NONREF"]
 Wants = Callable[[int], bool]
 """Whether the picture of the row with a given number is wanted; the first row has 0."""
 
@@ -90,9 +91,9 @@ def decode_some(path: Path, skipped: Skipped) -> Iterator[Row]:
     ----------
     path : Path
         The film; its container states when each packet is presented.
-    skipped : {'NONKEY', 'BIDIR'}
-        FFmpeg's name of the pictures to skip: ``NONKEY`` leaves those that need no other, ``BIDIR`` also those that
-        need only earlier ones.
+    skipped : {'NONKEY', 'NONREF'}
+        FFmpeg's name of the pictures to skip: ``NONKEY`` leaves those that need no other, ``NONREF`` all from which
+        others are predicted.
 
     Yields
     ------
@@ -106,7 +107,10 @@ def decode_some(path: Path, skipped: Skipped) -> Iterator[Row]:
     """
     with open_container(path) as container:
         container.streams.video[0].codec_context.skip_frame = skipped
-        yield from decode_container(path, container, threads="FRAME")
+        for time, picture in decode_container(path, container, threads="FRAME"):
+            # a stream that is refreshed in strips has key frames that need others
+            needs_others = skipped == "NONKEY" and picture is not None and picture.pict_type != PictureType.I
+            yield time, None if needs_others else picture
 
 
 def may_skip(container: av.container.InputContainer) -> bool:
@@ -145,7 +149,9 @@ def decode_container(
     packets = container.demux(stream) if packets is None else packets
     decoder = stream.codec_context
     decoder.thread_type = threads
-    decoder.thread_count = native_threads()
+    # with several threads for the slices of a picture, FFmpeg does not flag one that is damaged
+    alone = threads == "SLICE" and decoder.name in PREDICTING_CODECS
+    decoder.thread_count = 1 if alone else native_threads()
     base = float(stream.time_base or 0.0)
     is_avi = container.format.name == "avi"
     stamps = CountedStamps(decoder) if is_avi else PresentationStamps()

@@ -25,7 +25,7 @@ _FEWEST = 16
 """Rows of which none is dropped, however large their pictures are."""
 _LARGEST_GAP = 2.0
 """Between rows that are decoded, relative to the spacing of half of `MOST_SPREAD` rows."""
-SKIPPED: tuple[Skipped, ...] = ("NONKEY", "BIDIR")
+SKIPPED: tuple[Skipped, ...] = ("NONKEY", "NONREF")
 """Kinds of pictures that may be left out when evenly spaced rows are taken, those first that leave out most; see
 `anglecam.video.decode.decode_some`."""
 
