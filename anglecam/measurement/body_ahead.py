@@ -159,8 +159,7 @@ class TurnsAhead:
         both = np.isfinite(apart)
         reference = float(np.angle(np.exp(1j * apart[both]).sum())) if both.any() else 0.0
         reference += float(np.median(_wrapped(apart[both] - reference))) if both.any() else 0.0
-        appearance = self.body.appearance
-        lever = float(np.hypot(*(appearance.middle_px - appearance.pivot_px)))
+        lever = self.body.appearance.lever_px
         with np.errstate(invalid="ignore"):
             settled = np.abs(_wrapped(apart - reference)) * lever < _BASIN_PX
         whole = np.where(both, np.round((turn + reference - self.begun) / (2.0 * np.pi)), 0.0) * 2.0 * np.pi

@@ -165,13 +165,9 @@ def view_tiles(
     """
     offsets, values, counts, centres = [], [], [], []
     parallax = heights[:, None] * plane.axis.parallax
-    reach = (0.71 * TILE_SIDE_PX + 1.5) * plane.stretch
+    reach = tile_reach(plane)
     for f in frames:
-        arm = corners + TILE_SIDE_PX / 2 - pivot_px - parallax
-        middles = plane.lens.distort(arm @ rotation(f.turn) + f.pivot_px + parallax)
-        if f.turn_per_row:
-            extra = f.turn_per_row * (middles[:, 1] - f.row)
-            middles = plane.lens.distort(rotate_each(arm, f.turn + extra) + f.pivot_px + parallax)
+        middles = tile_middles(corners, parallax, f, plane, pivot_px)
         offset, value, count = _gather(
             f.image,
             plane.ground,
@@ -191,6 +187,40 @@ def view_tiles(
         centres.append(middles)
     starts = np.append(0, np.cumsum(np.concatenate(counts)))
     return TileViews(np.concatenate(offsets), np.concatenate(values), starts), np.concatenate(centres)
+
+
+def tile_middles(corners: Floats, parallax_px: Floats, view: FrameView, plane: MotionPlane, pivot_px: Floats) -> Floats:
+    """Return the places of the tiles' middles in the picture of a frame.
+
+    Parameters
+    ----------
+    corners : ndarray
+        (tiles, 2) in the reference frame, px.
+    parallax_px : ndarray
+        (tiles, 2) displacement of the tiles' centres of rotation from the pivot, px.
+    view : FrameView
+        The frame.
+    plane : MotionPlane
+        Place of each pixel.
+    pivot_px : ndarray
+        (2,) in the reference frame, px.
+
+    Returns
+    -------
+    ndarray
+        (tiles, 2) px.
+    """
+    arm = corners + TILE_SIDE_PX / 2 - pivot_px - parallax_px
+    middles = plane.lens.distort(arm @ rotation(view.turn) + view.pivot_px + parallax_px)
+    if view.turn_per_row:
+        extra = view.turn_per_row * (middles[:, 1] - view.row)
+        middles = plane.lens.distort(rotate_each(arm, view.turn + extra) + view.pivot_px + parallax_px)
+    return middles
+
+
+def tile_reach(plane: MotionPlane) -> float:
+    """Return the distance from a tile's middle along both axes of the picture within which its pixels are, px."""
+    return (0.71 * TILE_SIDE_PX + 1.5) * plane.stretch
 
 
 def _find_heights(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats) -> Floats:

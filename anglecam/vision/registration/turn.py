@@ -14,20 +14,26 @@ the frame before, the copy hides a rotation too small for its quantiser.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.transforms import rotation
-from anglecam.vision.registration.appearance import HIDDEN_MISFIT, TileAppearance, TileFit, compare_tiles
-from anglecam.vision.registration.tiles import TILE_SIDE_PX, FrameView, MotionPlane, view_tiles
+from anglecam.vision.registration.appearance import HIDDEN_MISFIT, TileAppearance, TileFit
+from anglecam.vision.registration.tiles import TILE_SIDE_PX, FrameView, MotionPlane, tile_middles, tile_reach
+from anglecam.vision.registration.turn_kernel import frame_equations
 
 _MAX_STEPS = 3
 """Gauss-Newton steps."""
 _SETTLED = 5.0
 """Step below which the iteration ends, in standard uncertainties. A step leaves about a hundredth of itself (0.6 % in
 the median over a film's frames), so 0.05 of an uncertainty at most."""
+_SOME = 3
+"""The first step is made by every so many-th tile: it needs no accuracy."""
+_APPROACH_PX = 1.0
+"""Largest first step that is trusted, px at the tiles' middle: hidden tiles can cause any."""
 _CLIP_FREEDOM = 3.0
 """Weight of the whole clip's scatter between groups against a single frame's, in degrees of freedom."""
 _MAX_LIGHT_CHANGE = 0.5
@@ -70,6 +76,82 @@ class BodyAppearance:
     """(2,) mean place of the tiles, weighted by their information, in the reference frame, px."""
     extent_px: float
     """Root mean square distance of the tiles from that place, weighted likewise, px."""
+
+    @cached_property
+    def parallax_px(self) -> Floats:
+        """(tiles, 2) displacement of the tiles' centres of rotation from the pivot, px."""
+        return self.heights[:, None] * self.plane.axis.parallax
+
+    @cached_property
+    def splines(self) -> NDArray[np.float32]:
+        """(tiles, planes, n, n) the tiles' coefficients in single precision."""
+        return self.tiles.coefficients.astype(np.float32)
+
+    @cached_property
+    def some_tiles(self) -> BodyAppearance:
+        """The body by every `_SOME`-th tile."""
+        tiles = self.tiles
+        some = replace(
+            tiles,
+            corners=tiles.corners[::_SOME],
+            coefficients=tiles.coefficients[::_SOME],
+            gains=tiles.gains[::_SOME],
+            leans=tiles.leans[::_SOME],
+        )
+        return replace(
+            self,
+            tiles=some,
+            heights=self.heights[::_SOME],
+            variance=self.variance[::_SOME],
+            excess=self.excess[::_SOME],
+            groups=self.groups[::_SOME],
+        )
+
+    @property
+    def lever_px(self) -> float:
+        """Distance of the tiles' middle from the pivot, px."""
+        return float(np.hypot(*(self.middle_px - self.pivot_px)))
+
+    def middles_in(self, view: FrameView) -> Floats:
+        """Return (tiles, 2) places of the tiles' middles in the picture of a frame, px."""
+        return tile_middles(self.tiles.corners, self.parallax_px, view, self.plane, self.pivot_px)
+
+    def compare(self, view: FrameView, turn: float, middles_px: Floats) -> TileFit:
+        """Compare the tiles with a frame at an assumed angle.
+
+        Parameters
+        ----------
+        view : FrameView
+            The frame.
+        turn : float
+            rad.
+        middles_px : ndarray
+            (tiles, 2) from `middles_in`, for about that angle.
+
+        Returns
+        -------
+        TileFit
+            For turn and place; a row for each tile.
+        """
+        return TileFit(
+            *frame_equations(
+                view.image,
+                self.plane.ground,
+                middles_px,
+                tile_reach(self.plane),
+                turn,
+                view.turn_per_row,
+                view.row,
+                view.pivot_px + self.parallax_px,
+                self.pivot_px + self.parallax_px,
+                self.tiles.corners,
+                self.tiles.side,
+                self.splines,
+                self.tiles.gains,
+                self.tiles.parallax,
+                self.tiles.leans,
+            )
+        ).rigid()
 
     def row_of_middle(self, view: FrameView) -> float:
         """Return the row of the picture in which a frame shows the middle."""
@@ -117,43 +199,73 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
     TurnEstimate
         With the uncertainty caused by noise, scatter between tiles, and copies.
     """
-    views, places = view_tiles(body.tiles.corners, body.heights, [view], body.plane, body.pivot_px)
-    centres = body.pivot_px + body.heights[:, None] * body.plane.axis.parallax
     turn = view.turn
+    middles = body.middles_in(view)
+    approach = _step(body.some_tiles, view, turn, middles[::_SOME])
+    if approach is not None and abs(approach.step) * body.lever_px < _APPROACH_PX:
+        turn += approach.step
     for _ in range(_MAX_STEPS):
-        fit = compare_tiles(body.tiles, views, np.full(len(body.tiles), turn), centres).rigid()
-        mean_square = np.where(fit.count > 0, fit.squares / np.maximum(fit.count, 1), np.inf)
-        # Motion blur and the like affect all tiles alike, a hand or a hair only some.
-        usual = float(np.median(mean_square / body.variance))
-        clear = (mean_square < HIDDEN_MISFIT * max(usual, 1.0) * body.variance) & ~covered_views(fit)
-        if not clear.any() or not np.isfinite(usual):
+        last = _step(body, view, turn, middles)
+        if last is None:
             return NO_TURN
-        variance = np.where(clear, body.variance * max(usual, 1.0), np.inf)
-        each = fit.weighted(variance * body.excess)
-        normal, gradient = each[0].sum(axis=0), each[1].sum(axis=0)
-        noise_share = 1.0
-        if view.pivot_covariance_px2 is not None:
-            normal, gradient, noise_share = _eliminate_pivot(normal, gradient, view.pivot_covariance_px2)
-        if not normal[0, 0] > 0.0:  # the visible tiles do not determine the angle: the body has left the picture
-            return NO_TURN
-        step = gradient[0] / normal[0, 0]
-        turn += step
-        if abs(step) < _SETTLED / np.sqrt(normal[0, 0]):
+        turn += last.step
+        if abs(last.step) < _SETTLED / np.sqrt(last.normal[0, 0]):
             break
+    assert last is not None
+    normal, each, clear, noise_share = last.normal, last.each, last.clear, last.noise_share
     pivot_sensitivity = -normal[0, 1:] @ (np.eye(2) - rotation(turn)) / normal[0, 0]
     whole = 1 / float(np.sqrt(normal[0, 0]))
     # of this, the part of the pixels' noise: the tiles are weighted by more than their noise
     noise = whole * float(np.sqrt((each[0][:, 0, 0] / body.excess).sum() / each[0][:, 0, 0].sum()))
     # A frame that a codec distorts more than others scatters more between its tiles. So few tiles estimate this only
     # roughly, hence the weighted mean.
-    left = each[1] - step * each[0][:, 0]  # of the gradients, after the last step
+    left = each[1] - last.step * each[0][:, 0]  # of the gradients, after the last step
     total, freedom = group_scatter(each[0][:, None], left[:, None], body.groups)
     birge2 = (_CLIP_FREEDOM * body.birge**2 + total) / (_CLIP_FREEDOM + max(freedom - 1, 0))
     pose2 = noise_share * max(birge2 * whole**2 - noise**2, 0.0)
     if before is not None:
-        misfit = noise * np.sqrt(noise_share * fit.count[clear].sum())
-        pose2 += (_COPY * _copied_share(view.image, before, places[clear]) * misfit) ** 2
-    return TurnEstimate(float(turn), noise, float(np.sqrt(pose2)), pivot_sensitivity, usual, clear)
+        misfit = noise * np.sqrt(noise_share * last.fit.count[clear].sum())
+        pose2 += (_COPY * _copied_share(view.image, before, middles[clear]) * misfit) ** 2
+    return TurnEstimate(float(turn), noise, float(np.sqrt(pose2)), pivot_sensitivity, last.usual, clear)
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A Gauss-Newton step."""
+
+    step: float
+    """rad."""
+    fit: TileFit
+    """Of the tiles before it."""
+    usual: float
+    """Median misfit of the tiles."""
+    clear: NDArray[np.bool_]
+    """(tiles,) which are visible."""
+    each: tuple[Floats, Floats]
+    """(tiles, 3, 3) and (tiles, 3) normal equations of the tiles, divided by the variances."""
+    normal: Floats
+    """(3, 3) of all tiles."""
+    noise_share: float
+    """Share of the angle's variance that is caused by the pixels' noise and not by the pivot."""
+
+
+def _step(body: BodyAppearance, view: FrameView, turn: float, middles_px: Floats) -> _Step | None:
+    """Return the Gauss-Newton step from an angle, ``None`` where the visible tiles do not determine it."""
+    fit = body.compare(view, turn, middles_px)
+    mean_square = np.where(fit.count > 0, fit.squares / np.maximum(fit.count, 1), np.inf)
+    # Motion blur and the like affect all tiles alike, a hand or a hair only some.
+    usual = float(np.median(mean_square / body.variance))
+    clear = (mean_square < HIDDEN_MISFIT * max(usual, 1.0) * body.variance) & ~covered_views(fit)
+    if not clear.any() or not np.isfinite(usual):
+        return None
+    each = fit.weighted(np.where(clear, body.variance * max(usual, 1.0), np.inf) * body.excess)
+    normal, gradient = each[0].sum(axis=0), each[1].sum(axis=0)
+    noise_share = 1.0
+    if view.pivot_covariance_px2 is not None:
+        normal, gradient, noise_share = _eliminate_pivot(normal, gradient, view.pivot_covariance_px2)
+    if not normal[0, 0] > 0.0:  # the body has left the picture
+        return None
+    return _Step(float(gradient[0] / normal[0, 0]), fit, usual, clear, each, normal, noise_share)
 
 
 def _eliminate_pivot(normal: Floats, gradient: Floats, covariance_px2: Floats) -> tuple[Floats, Floats, float]:
@@ -197,13 +309,11 @@ def refine_doubtful_turn(body: BodyAppearance, view: FrameView, reach_px: float)
     FrameView
         With the angle that fits best, or unchanged where no other fits distinctly better.
     """
-    centres = body.pivot_px + body.heights[:, None] * body.plane.axis.parallax
-    step = 1.0 / float(np.hypot(*(body.middle_px - body.pivot_px)))
+    step = 1.0 / body.lever_px
     tries = [replace(view, turn=view.turn + k * step) for k in range(-int(reach_px), int(reach_px) + 1)]
 
     def misfit(tried: FrameView) -> float:
-        views, _ = view_tiles(body.tiles.corners, body.heights, [tried], body.plane, body.pivot_px)
-        fit = compare_tiles(body.tiles, views, np.full(len(body.tiles), tried.turn), centres)
+        fit = body.compare(tried, tried.turn, body.middles_in(tried))
         seen = fit.count > 0
         return float(np.median(fit.squares[seen] / fit.count[seen] / body.variance[seen])) if seen.any() else np.inf
 

@@ -127,6 +127,52 @@ def _eliminate_light(product, light):  # type: ignore[no-untyped-def]
         light[p - 5] = rest / product[p, p]
 
 
+@njit(cache=True)
+def _new_block():  # type: ignore[no-untyped-def]
+    block = np.zeros(_ROWS * _BLOCK, np.float32)
+    block[(_DESIGN + 6) * _BLOCK : (_DESIGN + 7) * _BLOCK] = 1.0
+    return block
+
+
+@njit(cache=True, inline="always")
+def _put(block, which, base, pixels, m, x, y, scale, side, n, gain, away_x, away_y):  # type: ignore[no-untyped-def]
+    """Write the pixel with the number m, at (x, y) on its tile, into a block."""
+    ix, iy = int(x * scale), int(y * scale)
+    which[pixels], base[pixels] = m, iy * n + ix
+    block[_U * _BLOCK + pixels], block[_V * _BLOCK + pixels] = x * scale - ix, y * scale - iy
+    block[_GAIN * _BLOCK + pixels] = gain
+    block[_AWAY_X * _BLOCK + pixels], block[_AWAY_Y * _BLOCK + pixels] = away_x, away_y
+    block[_RIGHT * _BLOCK + pixels], block[_DOWN * _BLOCK + pixels] = x - side / 2, y - side / 2
+
+
+@njit(cache=True, fastmath=_FAST)
+def _add_products(flat, first, base, n, block, which, values, channel, rise, scale, products, pixels):  # type: ignore[no-untyped-def]
+    """Add one plane of a block of pixels to the products of derivatives and residuals."""
+    design = block[_DESIGN * _BLOCK :].reshape(9, _BLOCK)
+    _evaluate(flat, first, base, n, block, pixels)
+    for q in range(pixels):
+        design[8, q] = values[which[q], channel]
+    _differentiate(block, np.float32(rise[0]), np.float32(rise[1]), np.float32(scale), pixels)
+    leans = rise[0] != 0.0 or rise[1] != 0.0  # else all derivatives by them are zero
+    for a in range(9):
+        for b in range(a, 9):
+            if leans or not (3 <= a < 5 or 3 <= b < 5):
+                products[channel, a, b] += _product(design[a], design[b], pixels)
+
+
+@njit(cache=True, nogil=True)
+def _sum_planes(products, normal, gradient, lights):  # type: ignore[no-untyped-def]
+    """Eliminate the light of each plane, add the planes' normal equations, and return the sum of squares."""
+    squares = 0.0
+    for channel in range(len(products)):
+        product = products[channel]
+        _eliminate_light(product, lights[channel])
+        normal += product[:5, :5]
+        gradient += product[:5, 8]
+        squares += product[8, 8]
+    return squares
+
+
 @njit(cache=True, nogil=True, fastmath=_FAST)
 def turn_equations(values, starts, places, away, gains, rises, side, splines):  # type: ignore[no-untyped-def]
     """Accumulate each view's normal equations for its turn, its centre's place and its lean, given the appearance.
@@ -154,15 +200,12 @@ def turn_equations(values, starts, places, away, gains, rises, side, splines):  
     views, planes, n = len(starts) - 1, splines.shape[1], splines.shape[2]
     normals, gradients = np.zeros((views, 5, 5)), np.zeros((views, 5))
     squares, counts, lights = np.zeros(views), np.zeros(views, dtype=np.int64), np.zeros((views, planes, 3))
-    block = np.zeros(_ROWS * _BLOCK, np.float32)
-    design = block[_DESIGN * _BLOCK :].reshape(9, _BLOCK)
-    design[6] = 1.0
+    block = _new_block()
     base, which, products = np.zeros(_BLOCK, np.int64), np.zeros(_BLOCK, np.int64), np.zeros((planes, 9, 9))
     flat, scale = splines.reshape(-1).astype(np.float32), (n - 3) / side
     for k in range(views):
         p = k if len(splines) > 1 else 0
         products[:] = 0.0
-        leans = rises[k, 0] != 0.0 or rises[k, 1] != 0.0  # else all derivatives by them are zero
         count, m = 0, starts[k]
         while m < starts[k + 1]:
             pixels = 0
@@ -170,31 +213,129 @@ def turn_equations(values, starts, places, away, gains, rises, side, splines):  
                 x, y = places[m, 0], places[m, 1]
                 # Half a pixel inside the tile, where data on all sides determine the spline.
                 if x >= 0.5 and y >= 0.5 and x < side - 0.5 and y < side - 0.5:
-                    ix, iy = int(x * scale), int(y * scale)
-                    which[pixels], base[pixels] = m, iy * n + ix
-                    block[_U * _BLOCK + pixels], block[_V * _BLOCK + pixels] = x * scale - ix, y * scale - iy
-                    block[_GAIN * _BLOCK + pixels] = gains[m]
-                    block[_AWAY_X * _BLOCK + pixels], block[_AWAY_Y * _BLOCK + pixels] = away[m, 0], away[m, 1]
-                    block[_RIGHT * _BLOCK + pixels], block[_DOWN * _BLOCK + pixels] = x - side / 2, y - side / 2
+                    _put(block, which, base, pixels, m, x, y, scale, side, n, gains[m], away[m, 0], away[m, 1])
                     pixels += 1
                 m += 1
             count += pixels
             for channel in range(planes):
-                _evaluate(flat, (p * planes + channel) * n * n, base, n, block, pixels)
-                for q in range(pixels):
-                    design[8, q] = values[which[q], channel]
-                _differentiate(block, np.float32(rises[k, 0]), np.float32(rises[k, 1]), np.float32(scale), pixels)
-                for a in range(9):
-                    for b in range(a, 9):
-                        if leans or not (3 <= a < 5 or 3 <= b < 5):
-                            products[channel, a, b] += _product(design[a], design[b], pixels)
+                first = (p * planes + channel) * n * n
+                _add_products(flat, first, base, n, block, which, values, channel, rises[k], scale, products, pixels)
         if count * planes < _FEWEST:
             continue
         counts[k] = count * planes
+        squares[k] = _sum_planes(products, normals[k], gradients[k], lights[k])
+    return normals, gradients, squares, counts, lights
+
+
+@njit(cache=True, nogil=True, fastmath=_FAST)
+def frame_equations(  # type: ignore[no-untyped-def]
+    image,
+    ground,
+    middles,
+    reach,
+    turn,
+    late,
+    row,
+    from_pivots,
+    pivots,
+    corners,
+    side,
+    splines,
+    all_gains,
+    parallax,
+    leans,
+):
+    """Accumulate the normal equations of tiles in one frame, straight from its pixels.
+
+    Parameters
+    ----------
+    image : ndarray
+        (h, w, planes) bytes.
+    ground : ndarray
+        (h, w, 2) place of each pixel in the plane of motion, px.
+    middles : ndarray
+        (tiles, 2) about where the tiles are in the picture, px.
+    reach : float
+        Distance along both axes from there within which a tile's pixels are, px.
+    turn : float
+        Of the body from the reference frame, rad.
+    late : float
+        Rotation of the body while the rolling shutter advances by one row, rad.
+    row : float
+        Row whose exposure ``turn`` refers to.
+    from_pivots, pivots : ndarray
+        (tiles, 2) the tiles' centres of rotation in this frame and in the reference frame, px.
+    corners : ndarray
+        (tiles, 2) upper left corners in the reference frame, px.
+    side : int
+        Side of a tile, px.
+    splines : ndarray
+        (tiles, planes, n, n) coefficients in single precision, y first.
+    all_gains : ndarray
+        (tiles, powers, 3) coefficients of the gain.
+    parallax : ndarray
+        (2,) displacement of the centre for each px of height.
+    leans : ndarray
+        (tiles, 2) gradient of the height over the tile.
+
+    Returns
+    -------
+    tuple of ndarray
+        As from `turn_equations`, a view for each tile.
+    """
+    tiles, planes, n = len(corners), splines.shape[1], splines.shape[2]
+    height, width = image.shape[:2]
+    normals, gradients = np.zeros((tiles, 5, 5)), np.zeros((tiles, 5))
+    squares, counts, lights = np.zeros(tiles), np.zeros(tiles, dtype=np.int64), np.zeros((tiles, planes, 3))
+    block = _new_block()
+    base, which, products = np.zeros(_BLOCK, np.int64), np.zeros(_BLOCK, np.int64), np.zeros((planes, 9, 9))
+    values, flat, scale, half = image.reshape(height * width, planes), splines.reshape(-1), (n - 3) / side, side / 2
+    rise = np.zeros(2)
+    for t in range(tiles):
+        products[:] = 0.0
+        # a point that is higher than its tile by δ is displaced by (1 − R)·p·δ, and δ = lean·(point − middle)
+        c, s = np.cos(turn), np.sin(turn)
+        rise[0] = (1 - c) * parallax[0] + s * parallax[1]
+        rise[1] = (1 - c) * parallax[1] - s * parallax[0]
+        rest = 1 - leans[t, 0] * rise[0] - leans[t, 1] * rise[1]
+        lean_x, lean_y = leans[t, 0] / rest, leans[t, 1] / rest
+        top, bottom = max(0, int(middles[t, 1] - reach)), min(height, int(middles[t, 1] + reach) + 2)
+        left, right = max(0, int(middles[t, 0] - reach)), min(width, int(middles[t, 0] + reach) + 2)
+        count, pixels = 0, 0
+        for y in range(top, bottom):
+            cl, sl = c, s
+            if late != 0.0:  # a row exposed later shows the body rotated further
+                cl, sl = np.cos(turn + late * (y - row)), np.sin(turn + late * (y - row))
+            for x in range(left, right):
+                gx, gy = ground[y, x, 0] - from_pivots[t, 0], ground[y, x, 1] - from_pivots[t, 1]
+                away_x, away_y = cl * gx - sl * gy, sl * gx + cl * gy
+                at_x, at_y = pivots[t, 0] + away_x - corners[t, 0], pivots[t, 1] + away_y - corners[t, 1]
+                higher = lean_x * (at_x - half) + lean_y * (at_y - half)
+                at_x, at_y = at_x + rise[0] * higher, at_y + rise[1] * higher
+                # Half a pixel inside the tile, where data on all sides determine the spline.
+                if not (at_x >= 0.5 and at_y >= 0.5 and at_x < side - 0.5 and at_y < side - 0.5):
+                    continue
+                gain, power = 1.0, 1.0
+                for k in range(all_gains.shape[1]):
+                    power *= turn
+                    along_x, along_y = all_gains[t, k, 1] * (at_x / half - 1), all_gains[t, k, 2] * (at_y / half - 1)
+                    gain += power * (all_gains[t, k, 0] + along_x + along_y)
+                m = y * width + x
+                _put(block, which, base, pixels, m, at_x, at_y, scale, side, n, gain, away_x, away_y)
+                pixels += 1
+                if pixels == _BLOCK:
+                    for channel in range(planes):
+                        first = (t * planes + channel) * n * n
+                        _add_products(
+                            flat, first, base, n, block, which, values, channel, rise, scale, products, pixels
+                        )
+                    count, pixels = count + pixels, 0
         for channel in range(planes):
-            product = products[channel]
-            _eliminate_light(product, lights[k, channel])
-            normals[k] += product[:5, :5]
-            gradients[k] += product[:5, 8]
-            squares[k] += product[8, 8]
+            first = (t * planes + channel) * n * n
+            _add_products(flat, first, base, n, block, which, values, channel, rise, scale, products, pixels)
+        count += pixels
+        if count * planes < _FEWEST:
+            continue
+        counts[t] = count * planes
+        squares[t] = _sum_planes(products, normals[t], gradients[t], lights[t])
     return normals, gradients, squares, counts, lights
