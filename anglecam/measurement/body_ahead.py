@@ -10,7 +10,7 @@ rotation in a frame depends on what only the whole film shows.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -172,8 +172,8 @@ class TurnsAhead:
 
 def turn_ahead(
     body: BodyAhead, film: Film, picture: Picture, before: Picture | None, begin: float, reach_px: float = 0.0
-) -> Callable[[], TurnEstimate]:
-    """Return the work of finding the rotation in a frame.
+) -> TurnEstimate:
+    """Find the rotation in a frame.
 
     Parameters
     ----------
@@ -192,24 +192,24 @@ def turn_ahead(
 
     Returns
     -------
-    callable
-        Its result has a rotation of NaN where the body is not seen.
+    TurnEstimate
+        With a rotation of NaN where the body is not seen.
     """
-    image = None if np.isnan(begin) else _registered(film, picture)
+    image = None if np.isnan(begin) else registered_planes(film, picture)
     if image is None:
-        return lambda: NO_TURN
+        return NO_TURN
     view = FrameView(image, begin, body.appearance.pivot_px, 0.0, 0.0)
-    copied = None if before is None or not picture.predicted else _registered(film, before)
-    if not reach_px:
-        return partial(find_turn, body.appearance, view, copied)
-    return lambda: find_turn(body.appearance, refine_doubtful_turn(body.appearance, view, reach_px), copied)
+    copied = None if before is None or not picture.predicted else registered_planes(film, before)
+    if reach_px:
+        view = refine_doubtful_turn(body.appearance, view, reach_px)
+    return find_turn(body.appearance, view, copied)
+
+
+def registered_planes(film: Film, picture: Picture) -> Image | None:
+    """Return the planes by which a body is registered, (h, w, planes); ``None`` where a frame cannot be decoded."""
+    return picture.brightness if film.coarse_colour else picture.colours
 
 
 def _wrapped(angle: Floats) -> Floats:
     """Return angles in [-π, π), rad."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi
-
-
-def _registered(film: Film, picture: Picture) -> Image | None:
-    """Return the planes by which a body is registered."""
-    return picture.brightness if film.coarse_colour else picture.colours

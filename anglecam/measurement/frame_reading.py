@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from anglecam.data.typing import Flags, Floats
-from anglecam.measurement.body_ahead import BodyAhead, TurnsAhead, turn_ahead
-from anglecam.threads import Backlog, one_opencv_thread
+from anglecam.measurement.body_ahead import BodyAhead, TurnsAhead, registered_planes, turn_ahead
+from anglecam.threads import one_opencv_thread
 from anglecam.video.film import Film
 from anglecam.video.picture import Picture
 from anglecam.vision.mark.found_mark import FoundMark
@@ -77,36 +77,44 @@ def read_frames(
     repeated: list[bool] = []
     moves: list[CameraMove] = []
     begun: list[float] = []
-    turns: Backlog[TurnEstimate] = Backlog()
-    # a body that was learnt shows where a thing that is alike was taken for the mark; else all such things are found
-    search = MarkSearch(found, None if body is None else body.path.is_mark)
+    turns: list[TurnEstimate] = []
     before: Picture | None = None
     with one_opencv_thread():
-        for picture in film.pictures(_ready(film, body, steady)):
+        for picture, of_mark in film.pictures(_search(film, found, steady, body)):
             time.append(picture.time)
             decoded.append(picture.stored is not None)
-            if picture.stored is None:
-                search.lose()
-                regions.append([])
-            else:
-                regions.append(search.regions(picture.index, film.size, picture.colours_in))
+            regions.append(of_mark)
             repeated.append(before is not None and picture.is_same_as(before))
             if steady is not None:
                 image = picture.colours
                 moves.append(UNKNOWN_MOVE if image is None else steady.at(image, picture.predicted))
             if body is not None:
-                begun.append(body.begin(regions[-1]))
-                turns.add(turn_ahead(body, film, picture, before, begun[-1]))
+                begun.append(body.begin(of_mark))
+                turns.append(turn_ahead(body, film, picture, before, begun[-1]))
             before = picture
             if progress is not None:
                 progress(picture.index + 1, count)
     shakes = None if steady is None else tuple(moves)
-    ahead = None if body is None else TurnsAhead(body, begun, turns.results())
+    ahead = None if body is None else TurnsAhead(body, begun, turns)
     return Reading(np.array(time), tuple(regions), np.array(decoded), np.array(repeated), shakes, ahead)
 
 
-def _ready(film: Film, body: BodyAhead | None, steady: BackgroundMotion | None) -> Callable[[Picture], object] | None:
-    """Return the conversion that every picture needs, which is made while the picture before it is measured."""
-    if body is None and steady is None:
-        return None
-    return (lambda picture: picture.brightness) if film.coarse_colour and steady is None else lambda p: p.colours
+def _search(
+    film: Film, found: FoundMark, steady: BackgroundMotion | None, body: BodyAhead | None
+) -> Callable[[Picture], list[Region]]:
+    """Return the search for the mark in one picture after another, which also makes the conversions that follow."""
+    # a body that was learnt shows where a thing that is alike was taken for the mark; else all such things are found
+    search = MarkSearch(found, None if body is None else body.path.is_mark)
+
+    def regions(picture: Picture) -> list[Region]:
+        # converted once, here, where a thread has time for it
+        if steady is not None:
+            _ = picture.colours
+        elif body is not None:
+            registered_planes(film, picture)
+        if picture.stored is None:
+            search.lose()
+            return []
+        return search.regions(picture.index, film.size, picture.colours_in)
+
+    return regions

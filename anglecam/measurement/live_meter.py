@@ -72,6 +72,6 @@ class LiveMeter:
             begin, reach = 2.0 * self._turns[1] - self._turns[0], DOUBT_PX
         else:
             begin, reach = model.body.begin([mark]), 0.0
-        turn = turn_ahead(model.body, self._film, picture, self._before, begin, reach)()
+        turn = turn_ahead(model.body, self._film, picture, self._before, begin, reach)
         self._turns = self._turns[1], turn.turn if model.shows(turn) else np.nan
         return model.angle(mark, turn)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Set
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from anglecam.video.display import Display
 from anglecam.video.film_rows import FilmRows, first_of_each
 from anglecam.video.picture import Picture
 from anglecam.video.read_ahead import read_ahead
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -132,27 +135,23 @@ class Film:
         frames = (Frame(p.index, p.time, p.brightness if brightness else p.colours, p.predicted) for p in pictures)
         yield from read_ahead(frames) if native_threads() > 1 else frames
 
-    def pictures(self, convert: Callable[[Picture], object] | None = None) -> Iterator[Picture]:
-        """Yield the frames as `frames` does, each with a picture that is converted when it is needed.
+    def pictures(self, prepare: Callable[[Picture], T]) -> Iterator[tuple[Picture, T]]:
+        """Yield the frames as `frames` does, each as a picture that is converted when it is needed.
 
         Parameters
         ----------
-        convert : callable, optional
-            A conversion that every picture needs: it is made ahead, as the decoding.
+        prepare : callable
+            What is done with every picture, in their order. A thread does it ahead, as the decoding.
 
         Yields
         ------
-        Picture
+        picture : Picture
             Of every frame.
+        prepared : object
+            What ``prepare`` returned for it.
         """
-
-        def converted() -> Iterator[Picture]:
-            for picture in self._pictures(None):
-                if convert is not None:
-                    convert(picture)
-                yield picture
-
-        yield from read_ahead(converted()) if native_threads() > 1 else converted()
+        prepared = ((picture, prepare(picture)) for picture in self._pictures(None))
+        yield from read_ahead(prepared) if native_threads() > 1 else prepared
 
     def _pictures(self, only: Set[int] | None) -> Iterator[Picture]:
         for index, row in enumerate(self.rows.read(None if only is None else only.__contains__)):

@@ -30,6 +30,8 @@ _MAX_STEPS = 3
 _SETTLED = 5.0
 """Step below which the iteration ends, in standard uncertainties. A step leaves about a hundredth of itself (0.6 % in
 the median over a film's frames), so 0.05 of an uncertainty at most."""
+_NO_GROUND = np.zeros((0, 0, 2))
+"""For pictures whose pixels need not be mapped to the plane of motion."""
 _SOME = 3
 """The first step is made by every so many-th tile: it needs no accuracy."""
 _APPROACH_PX = 1.0
@@ -136,7 +138,7 @@ class BodyAppearance:
         return TileFit(
             *frame_equations(
                 view.image,
-                self.plane.ground,
+                _NO_GROUND if self.plane.lens.is_identity else self.plane.ground,
                 middles_px,
                 tile_reach(self.plane),
                 turn,

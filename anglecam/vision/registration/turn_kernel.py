@@ -145,6 +145,16 @@ def _put(block, which, base, pixels, m, x, y, scale, side, n, gain, away_x, away
     block[_RIGHT * _BLOCK + pixels], block[_DOWN * _BLOCK + pixels] = x - side / 2, y - side / 2
 
 
+@njit(cache=True, inline="always")
+def _columns(start, stop, first, slope, side):  # type: ignore[no-untyped-def]
+    """Narrow a range of columns to those, and one more on each side, whose place first + slope·x is on a tile."""
+    if abs(slope) < 1e-9:
+        return start, stop if -1.0 < first < side + 1.0 else start
+    one, other = -first / slope, (side - first) / slope
+    low, high = min(one, other), max(one, other)
+    return max(start, int(max(low, 0.0)) - 1), min(stop, int(max(high, 0.0)) + 2)
+
+
 @njit(cache=True, fastmath=_FAST)
 def _add_products(flat, first, base, n, block, which, values, channel, rise, scale, products, pixels):  # type: ignore[no-untyped-def]
     """Add one plane of a block of pixels to the products of derivatives and residuals."""
@@ -252,7 +262,8 @@ def frame_equations(  # type: ignore[no-untyped-def]
     image : ndarray
         (h, w, planes) bytes.
     ground : ndarray
-        (h, w, 2) place of each pixel in the plane of motion, px.
+        (h, w, 2) place of each pixel in the plane of motion, px; of another shape where that is the pixel's place in
+        the picture.
     middles : ndarray
         (tiles, 2) about where the tiles are in the picture, px.
     reach : float
@@ -290,7 +301,7 @@ def frame_equations(  # type: ignore[no-untyped-def]
     block = _new_block()
     base, which, products = np.zeros(_BLOCK, np.int64), np.zeros(_BLOCK, np.int64), np.zeros((planes, 9, 9))
     values, flat, scale, half = image.reshape(height * width, planes), splines.reshape(-1), (n - 3) / side, side / 2
-    rise = np.zeros(2)
+    rise, as_filmed = np.zeros(2), ground.shape[0] == height
     for t in range(tiles):
         products[:] = 0.0
         # a point that is higher than its tile by δ is displaced by (1 − R)·p·δ, and δ = lean·(point − middle)
@@ -299,6 +310,7 @@ def frame_equations(  # type: ignore[no-untyped-def]
         rise[1] = (1 - c) * parallax[1] - s * parallax[0]
         rest = 1 - leans[t, 0] * rise[0] - leans[t, 1] * rise[1]
         lean_x, lean_y = leans[t, 0] / rest, leans[t, 1] / rest
+        square = not as_filmed and rise[0] == 0.0 and rise[1] == 0.0
         top, bottom = max(0, int(middles[t, 1] - reach)), min(height, int(middles[t, 1] + reach) + 2)
         left, right = max(0, int(middles[t, 0] - reach)), min(width, int(middles[t, 0] + reach) + 2)
         count, pixels = 0, 0
@@ -306,8 +318,17 @@ def frame_equations(  # type: ignore[no-untyped-def]
             cl, sl = c, s
             if late != 0.0:  # a row exposed later shows the body rotated further
                 cl, sl = np.cos(turn + late * (y - row)), np.sin(turn + late * (y - row))
-            for x in range(left, right):
-                gx, gy = ground[y, x, 0] - from_pivots[t, 0], ground[y, x, 1] - from_pivots[t, 1]
+            start, stop = left, right
+            if square:
+                at_x = pivots[t, 0] - corners[t, 0] - cl * from_pivots[t, 0] - sl * (y - from_pivots[t, 1])
+                at_y = pivots[t, 1] - corners[t, 1] - sl * from_pivots[t, 0] + cl * (y - from_pivots[t, 1])
+                start, stop = _columns(start, stop, at_x, cl, side)
+                start, stop = _columns(start, stop, at_y, sl, side)
+            for x in range(start, stop):
+                gx, gy = float(x), float(y)
+                if as_filmed:
+                    gx, gy = ground[y, x, 0], ground[y, x, 1]
+                gx, gy = gx - from_pivots[t, 0], gy - from_pivots[t, 1]
                 away_x, away_y = cl * gx - sl * gy, sl * gx + cl * gy
                 at_x, at_y = pivots[t, 0] + away_x - corners[t, 0], pivots[t, 1] + away_y - corners[t, 1]
                 higher = lean_x * (at_x - half) + lean_y * (at_y - half)
