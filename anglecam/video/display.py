@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,7 @@ class Display:
         width, height = (round(side * factor) for side, factor in zip(self.stored_size, self.stretch, strict=True))
         return (height, width) if self.transposed else (width, height)
 
-    @property
+    @cached_property
     def is_as_stored(self) -> bool:
         """Whether the shown picture is the stored one."""
         return self.pixel_aspect == SQUARE and not (self.transposed or self.mirrored or self.upside_down)
@@ -74,6 +75,8 @@ class Display:
         ndarray
             (height, width, planes) bytes.
         """
+        if self.is_as_stored:
+            return image
         planes = image.shape[2]
         if self.pixel_aspect != SQUARE:
             across, down = self.stretch

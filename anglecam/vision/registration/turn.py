@@ -23,7 +23,7 @@ from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.transforms import rotation
 from anglecam.vision.registration.appearance import HIDDEN_MISFIT, TileAppearance, TileFit
 from anglecam.vision.registration.tiles import TILE_SIDE_PX, FrameView, MotionPlane, tile_middles, tile_reach
-from anglecam.vision.registration.turn_kernel import frame_equations
+from anglecam.vision.registration.turn_kernel import frame_equations, weigh_tiles
 
 _MAX_STEPS = 3
 """Gauss-Newton steps."""
@@ -133,7 +133,7 @@ class BodyAppearance:
         Returns
         -------
         TileFit
-            For turn and place; a row for each tile.
+            A row for each tile.
         """
         return TileFit(
             *frame_equations(
@@ -153,7 +153,7 @@ class BodyAppearance:
                 self.tiles.parallax,
                 self.tiles.leans,
             )
-        ).rigid()
+        )
 
     def row_of_middle(self, view: FrameView) -> float:
         """Return the row of the picture in which a frame shows the middle."""
@@ -214,19 +214,20 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
         if abs(last.step) < _SETTLED / np.sqrt(last.normal[0, 0]):
             break
     assert last is not None
-    normal, each, clear, noise_share = last.normal, last.each, last.clear, last.noise_share
+    normal, clear, noise_share = last.normal, last.clear, last.noise_share
+    information = last.normals[:, 0, 0]
     pivot_sensitivity = -normal[0, 1:] @ (np.eye(2) - rotation(turn)) / normal[0, 0]
     whole = 1 / float(np.sqrt(normal[0, 0]))
     # of this, the part of the pixels' noise: the tiles are weighted by more than their noise
-    noise = whole * float(np.sqrt((each[0][:, 0, 0] / body.excess).sum() / each[0][:, 0, 0].sum()))
+    noise = whole * float(np.sqrt((information / body.excess).sum() / information.sum()))
     # A frame that a codec distorts more than others scatters more between its tiles. So few tiles estimate this only
     # roughly, hence the weighted mean.
-    left = each[1] - last.step * each[0][:, 0]  # of the gradients, after the last step
-    total, freedom = group_scatter(each[0][:, None], left[:, None], body.groups)
+    left = last.gradients - last.step * last.normals[:, 0]  # after the last step
+    total, freedom = group_scatter(last.normals[:, None], left[:, None], body.groups)
     birge2 = (_CLIP_FREEDOM * body.birge**2 + total) / (_CLIP_FREEDOM + max(freedom - 1, 0))
     pose2 = noise_share * max(birge2 * whole**2 - noise**2, 0.0)
     if before is not None:
-        misfit = noise * np.sqrt(noise_share * last.fit.count[clear].sum())
+        misfit = noise * np.sqrt(noise_share * last.count)
         pose2 += (_COPY * _copied_share(view.image, before, middles[clear]) * misfit) ** 2
     return TurnEstimate(float(turn), noise, float(np.sqrt(pose2)), pivot_sensitivity, last.usual, clear)
 
@@ -237,14 +238,16 @@ class _Step:
 
     step: float
     """rad."""
-    fit: TileFit
-    """Of the tiles before it."""
     usual: float
     """Median misfit of the tiles."""
+    count: int
+    """Values in the visible tiles."""
     clear: NDArray[np.bool_]
     """(tiles,) which are visible."""
-    each: tuple[Floats, Floats]
-    """(tiles, 3, 3) and (tiles, 3) normal equations of the tiles, divided by the variances."""
+    normals: Floats
+    """(tiles, 3, 3) normal matrices for turn and place, divided by the variances; zero where a tile is not visible."""
+    gradients: Floats
+    """(tiles, 3) of the same."""
     normal: Floats
     """(3, 3) of all tiles."""
     noise_share: float
@@ -254,20 +257,27 @@ class _Step:
 def _step(body: BodyAppearance, view: FrameView, turn: float, middles_px: Floats) -> _Step | None:
     """Return the Gauss-Newton step from an angle, ``None`` where the visible tiles do not determine it."""
     fit = body.compare(view, turn, middles_px)
-    mean_square = np.where(fit.count > 0, fit.squares / np.maximum(fit.count, 1), np.inf)
-    # Motion blur and the like affect all tiles alike, a hand or a hair only some.
-    usual = float(np.median(mean_square / body.variance))
-    clear = (mean_square < HIDDEN_MISFIT * max(usual, 1.0) * body.variance) & ~covered_views(fit)
+    usual, clear, normals, gradients = weigh_tiles(
+        fit.normal,
+        fit.gradient,
+        fit.squares,
+        fit.count,
+        fit.light,
+        body.variance,
+        body.excess,
+        HIDDEN_MISFIT,
+        _MAX_LIGHT_CHANGE,
+    )
     if not clear.any() or not np.isfinite(usual):
         return None
-    each = fit.weighted(np.where(clear, body.variance * max(usual, 1.0), np.inf) * body.excess)
-    normal, gradient = each[0].sum(axis=0), each[1].sum(axis=0)
+    normal, gradient = normals.sum(axis=0), gradients.sum(axis=0)
     noise_share = 1.0
     if view.pivot_covariance_px2 is not None:
         normal, gradient, noise_share = _eliminate_pivot(normal, gradient, view.pivot_covariance_px2)
     if not normal[0, 0] > 0.0:  # the body has left the picture
         return None
-    return _Step(float(gradient[0] / normal[0, 0]), fit, usual, clear, each, normal, noise_share)
+    step = float(gradient[0] / normal[0, 0])
+    return _Step(step, usual, int(fit.count[clear].sum()), clear, normals, gradients, normal, noise_share)
 
 
 def _eliminate_pivot(normal: Floats, gradient: Floats, covariance_px2: Floats) -> tuple[Floats, Floats, float]:

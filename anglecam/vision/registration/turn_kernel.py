@@ -360,3 +360,49 @@ def frame_equations(  # type: ignore[no-untyped-def]
         counts[t] = count * planes
         squares[t] = _sum_planes(products, normals[t], gradients[t], lights[t])
     return normals, gradients, squares, counts, lights
+
+
+@njit(cache=True, nogil=True)
+def weigh_tiles(normal, gradient, squares, count, light, variance, excess, hidden, most_light):  # type: ignore[no-untyped-def]
+    """Weigh the tiles of a frame, and find those that are visible.
+
+    Motion blur and the like affect all tiles alike, a hand or a hair only some: a tile is visible where its misfit is
+    not far beyond the median, and its light not changed too much.
+
+    Parameters
+    ----------
+    normal, gradient, squares, count, light : ndarray
+        From `frame_equations`.
+    variance : ndarray
+        (tiles,) usual mean squared residual.
+    excess : ndarray
+        (tiles,) factor of the variance that a tile's displacements show.
+    hidden : float
+        Misfit relative to the median beyond which a tile is hidden.
+    most_light : float
+        Relative change of contrast beyond which it is.
+
+    Returns
+    -------
+    usual : float
+        Median misfit relative to the usual one.
+    clear : ndarray
+        (tiles,) which are visible.
+    normals, gradients : ndarray
+        (tiles, 3, 3) and (tiles, 3) for turn and place, divided by the variances; zero where a tile is not visible.
+    """
+    tiles = len(count)
+    misfit, clear = np.full(tiles, np.inf), np.zeros(tiles, np.bool_)
+    normals, gradients = np.zeros((tiles, 3, 3)), np.zeros((tiles, 3))
+    for t in range(tiles):
+        if count[t] > 0:
+            misfit[t] = squares[t] / count[t] / variance[t]
+    ordered = np.sort(misfit)
+    usual = (ordered[(tiles - 1) // 2] + ordered[tiles // 2]) / 2
+    scale = max(usual, 1.0)
+    for t in range(tiles):
+        clear[t] = misfit[t] < hidden * scale and np.abs(light[t, :, 0]).max() <= most_light
+        if clear[t]:
+            normals[t] = normal[t, :3, :3] / (variance[t] * scale * excess[t])
+            gradients[t] = gradient[t, :3] / (variance[t] * scale * excess[t])
+    return usual, clear, normals, gradients
