@@ -25,7 +25,7 @@ from anglecam.vision.mark.blobs import Blobs, blobs_of_regions, find_blobs
 from anglecam.vision.mark.cues import RED, Cue, declared_cue, moving_cues, pointed_cues
 from anglecam.vision.mark.found_mark import FoundMark, Samples
 from anglecam.vision.mark.learn_colour import MIN_CONTRAST, is_same_colour, learn_colour
-from anglecam.vision.mark.segment import SMALLEST_SHARE, Patch, Region, disc, find_patches, measure
+from anglecam.vision.mark.segment import LARGEST_SHARE, SMALLEST_SHARE, Patch, Region, disc, find_patches, measure
 from anglecam.vision.mark.track import MarkTrack, follow_mark
 
 _LEVEL_SHARES = (0.3, 0.4, 0.5, 0.6, 0.7)
@@ -98,11 +98,9 @@ def _mark_of_cue(
     usual, top = _contrast_range(maps, at_rest)
     if top - usual < MIN_CONTRAST:
         return None
-    thresholded = []
-    for share in _LEVEL_SHARES:
-        level = usual + share * (top - usual)
-        if level - usual >= MIN_CONTRAST / 2.0:
-            thresholded.append((level, find_blobs(maps, level, usual, samples.to_plane)))
+    levels = [usual + share * (top - usual) for share in _LEVEL_SHARES]
+    levels = [level for level in levels if level - usual >= MIN_CONTRAST / 2.0]
+    thresholded = list(zip(levels, find_blobs(maps, levels, usual, samples.to_plane), strict=True))
     # The hint misleads where a slanted view shows the marker on the shaft far from the centre of rotation.
     for hint in (near_px,) if near_px is None else (near_px, None):
         tracks: list[BlobTrack | None] = []
@@ -170,7 +168,8 @@ def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hi
         region = measure(patch, mark.model)
         return None if region is None else samples.in_plane(i, region)
 
-    # A cut patch is never the mark, and the whole wall may be one: it is measured only where a mark goes on a circle.
+    # A cut patch is never the mark, and the whole wall may be one: it is measured only where a mark goes on a circle, and
+    # only if it is not too large to be taken for that mark.
     inner = [[None if patch.cut else region_of(i, patch) for patch in some] for i, some in enumerate(patches)]
     blobs = blobs_of_regions([[region for region in some if region is not None] for some in inner])
     through = None
@@ -187,8 +186,12 @@ def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hi
         if area > _LARGEST_SHARE * samples.images[0].shape[0] * samples.images[0].shape[1]:
             continue
         if not regions:
+            most = LARGEST_SHARE * area
             every = [
-                [region_of(i, patch) if patch.cut else region for patch, region in zip(*both, strict=True)]
+                [
+                    region_of(i, patch) if patch.cut and cv2.contourArea(patch.contour_px) <= most else region
+                    for patch, region in zip(*both, strict=True)
+                ]
                 for i, both in enumerate(zip(patches, inner, strict=True))
             ]
             regions = [[region for region in some if region is not None] for some in every]
