@@ -40,15 +40,17 @@ class Blobs:
     pixel_px: NDArray[np.int64]
     """(n, 2) column and row of one of its pixels."""
 
-    def mask(self, k: int, above: Image, margin_px: int) -> tuple[Image, tuple[slice, slice]]:
+    def mask(self, k: int, hue: NDArray[Any], level: float, margin_px: int) -> tuple[Image, tuple[slice, slice]]:
         """Return the pixels of a blob, and the part of the picture that they are given for.
 
         Parameters
         ----------
         k : int
             Index of the blob.
-        above : ndarray
-            (h, w) bytes: 1 where its picture is above the level at which the blobs were found.
+        hue : ndarray
+            (h, w) hue contrast of its picture.
+        level : float
+            At which the blobs were found.
         margin_px : int
             Around the blob's box.
 
@@ -60,10 +62,11 @@ class Blobs:
             Rows and columns.
         """
         left, top, width, height = self.box_px[k]
-        _, labels = cv2.connectedComponents(above[top : top + height, left : left + width], connectivity=8)
+        above = (hue[top : top + height, left : left + width] > level).astype(np.uint8)
+        _, labels = cv2.connectedComponents(above, connectivity=8)
         x, y = self.pixel_px[k]
         low = np.maximum([top - margin_px, left - margin_px], 0)
-        high = np.minimum([top + height + margin_px, left + width + margin_px], above.shape)
+        high = np.minimum([top + height + margin_px, left + width + margin_px], hue.shape)
         mask = np.zeros(high - low, np.uint8)
         mask[top - low[0] :, left - low[1] :][:height, :width] = labels == labels[y - top, x - left]
         return mask, (slice(low[0], high[0]), slice(low[1], high[1]))

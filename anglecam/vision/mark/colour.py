@@ -13,6 +13,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
@@ -103,11 +104,12 @@ def fit_discriminant(inside: Image, around: Image, elsewhere: Image) -> ColourMo
     ColourModel
         Scaled so that the mean of the surroundings maps to 0 and that of the mark to 1.
     """
-    mean_in, mean_around = _mean(inside), _mean(around)
+    of_inside, of_around, of_elsewhere = (_Sums.of(pixels) for pixels in (inside, around, elsewhere))
+    mean_in, mean_around = of_inside.mean, of_around.mean
     # The scatter is taken around the neighbours' mean, so that colours far from it (dark hair) are suppressed too.
-    off = elsewhere - mean_around
-    spread = (1.0 - _ELSEWHERE_SHARE) * _covariance(around, mean_around) + _ELSEWHERE_SHARE * off.T @ off / len(off)
-    within = _covariance(inside, mean_in) + spread + _NOISE_FLOOR**2 * np.eye(3)
+    spread = (1.0 - _ELSEWHERE_SHARE) * of_around.covariance
+    spread += _ELSEWHERE_SHARE * of_elsewhere.mean_square_about(mean_around)
+    within = of_inside.covariance + spread + _NOISE_FLOOR**2 * np.eye(3)
     w = np.asarray(np.linalg.solve(within, mean_in - mean_around), float)
     w /= w @ (mean_in - mean_around)
     offset = -float(w @ mean_around)
@@ -116,13 +118,43 @@ def fit_discriminant(inside: Image, around: Image, elsewhere: Image) -> ColourMo
     return ColourModel(w, offset, noise, mean_in)
 
 
-def _mean(pixels: Image) -> Floats:
-    """Return the mean colour (3,) of pixels (n, 3)."""
-    sums = [int(pixels[:, k].sum(dtype=np.int64)) for k in range(3)]  # a sum of bytes is exact, and faster by column
-    return np.array(sums, float) / len(pixels)
+@dataclass(frozen=True)
+class _Sums:
+    """Sums over pixels of bytes, which are exact."""
+
+    count: int
+    first: NDArray[np.int64]
+    """(3,) of blue, green, red."""
+    products: NDArray[np.int64]
+    """(3, 3) of the products of two of them."""
+
+    @classmethod
+    def of(cls, pixels: Image) -> _Sums:
+        """Return those of pixels (n, 3)."""
+        return cls(len(pixels), *_sums(np.ascontiguousarray(pixels)))
+
+    @property
+    def mean(self) -> Floats:
+        """(3,) mean colour."""
+        return self.first / self.count
+
+    @property
+    def covariance(self) -> Floats:
+        """(3, 3) around the mean."""
+        return self.mean_square_about(self.mean) * (self.count / (self.count - 1))
+
+    def mean_square_about(self, colour: Floats) -> Floats:
+        """Return the mean (3, 3) of the products of the deviations from a colour (3,)."""
+        off = self.mean - colour
+        return (self.products - np.outer(self.first, self.mean)) / self.count + np.outer(off, off)
 
 
-def _covariance(pixels: Image, mean: Floats) -> Floats:
-    """Return the covariance (3, 3) of pixels (n, 3) around their mean (3,)."""
-    off = pixels - mean
-    return np.asarray(off.T @ off * (1.0 / (len(pixels) - 1)))
+@njit(cache=True, nogil=True)
+def _sums(pixels):  # type: ignore[no-untyped-def]
+    b = g = r = bb = bg = br = gg = gr = rr = np.int64(0)
+    for k in range(len(pixels)):
+        blue, green, red = np.int64(pixels[k, 0]), np.int64(pixels[k, 1]), np.int64(pixels[k, 2])
+        b, g, r = b + blue, g + green, r + red
+        bb, bg, br = bb + blue * blue, bg + blue * green, br + blue * red
+        gg, gr, rr = gg + green * green, gr + green * red, rr + red * red
+    return np.array([b, g, r]), np.array([[bb, bg, br], [bg, gg, gr], [br, gr, rr]])

@@ -146,8 +146,8 @@ def _opening(track: BlobTrack, maps: Sequence[NDArray[Any]]) -> int:
     """Return half the radius of the largest disc in a track's blobs, px, if thinner parts are attached, else 0."""
     radii, shares = [], []
     for m in track.members:
-        above = (maps[int(track.blobs.frame[m])] > track.level).astype(np.uint8)
-        blob, _ = track.blobs.mask(m, above, int(track.blobs.box_px[m, 2:].max()))
+        hue, margin_px = maps[int(track.blobs.frame[m])], int(track.blobs.box_px[m, 2:].max())
+        blob, _ = track.blobs.mask(m, hue, track.level, margin_px)
         radius = int(cv2.distanceTransform(np.pad(blob, 1), cv2.DIST_L2, 5).max() / 2.0)
         opened = cv2.morphologyEx(blob, cv2.MORPH_OPEN, disc(radius))
         radii.append(radius)

@@ -23,11 +23,11 @@ def test_a_blobs_mask_is_its_connected_component():
     assert len(blobs.area) == 3
     for k, (x, y) in enumerate(blobs.pixel_px):
         whole = np.zeros(picture.shape, np.uint8)
-        mask, part = blobs.mask(k, above, 7)
+        mask, part = blobs.mask(k, picture, 20.0, 7)
         whole[part] = mask
         np.testing.assert_array_equal(whole, labels == labels[y, x])
         assert mask.sum() == blobs.area[k]
-    rows, columns = blobs.mask(int(np.argmax(blobs.picture_px[:, 0])), above, 7)[1]
+    rows, columns = blobs.mask(int(np.argmax(blobs.picture_px[:, 0])), picture, 20.0, 7)[1]
     assert (rows.start, rows.stop, columns.start, columns.stop) == (53, 73, 213, 240)
 
 
