@@ -168,8 +168,8 @@ def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hi
         region = measure(patch, mark.model)
         return None if region is None else samples.in_plane(i, region)
 
-    # A cut patch is never the mark, and the whole wall may be one: it is measured only where a mark goes on a circle, and
-    # only if it is not too large to be taken for that mark.
+    # A cut patch is never the mark, and the whole wall may be one: it is measured only where a mark goes on a circle,
+    # and only if it is not too large to be taken for that mark.
     inner = [[None if patch.cut else region_of(i, patch) for patch in some] for i, some in enumerate(patches)]
     blobs = blobs_of_regions([[region for region in some if region is not None] for some in inner])
     through = None
