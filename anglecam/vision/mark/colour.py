@@ -73,14 +73,24 @@ def hue_contrast(lab: Image, rgb: tuple[int, int, int] | None) -> NDArray[Any]:
         minus the magnitude of the component across it.
     """
     if rgb is None:
-        row = np.array([[0.0, 1.0, -_SKIN_SLOPE, -128.0 * (1.0 - _SKIN_SLOPE)]])
-        return cv2.transform(lab.astype(np.float32), row)
+        return _less(lab[..., 1], lab[..., 2], np.float32(_SKIN_SLOPE), np.float32(128.0 * (1.0 - _SKIN_SLOPE)))
     along = lab_of(rgb)[1:]
     along = along / max(float(np.hypot(*along)), 1.0)
     across = np.array([-along[1], along[0]])
     rows = np.array([[0.0, *v, -128.0 * v.sum()] for v in (along, across)])
-    parts = cv2.transform(lab.astype(np.float32), rows)
+    parts = cv2.transform(np.ascontiguousarray(lab, np.float32), rows)
     return parts[..., 0] - np.abs(parts[..., 1])
+
+
+@njit(cache=True, nogil=True)
+def _less(first, second, slope, offset):  # type: ignore[no-untyped-def]
+    """Return first − slope·second − offset of two planes of bytes."""
+    found = np.empty(first.shape, np.float32)
+    for y in range(found.shape[0]):
+        to, one, other = found[y], first[y], second[y]
+        for x in range(found.shape[1]):
+            to[x] = np.float32(one[x]) - slope * np.float32(other[x]) - offset
+    return found
 
 
 def lab_of(rgb: tuple[int, int, int]) -> Floats:
