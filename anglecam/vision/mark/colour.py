@@ -73,7 +73,10 @@ def hue_contrast(lab: Image, rgb: tuple[int, int, int] | None) -> NDArray[Any]:
         minus the magnitude of the component across it.
     """
     if rgb is None:
-        return _less(lab[..., 1], lab[..., 2], np.float32(_SKIN_SLOPE), np.float32(128.0 * (1.0 - _SKIN_SLOPE)))
+        contrast = np.empty(lab.shape[:2], np.float32)
+        slope, offset = np.float32(_SKIN_SLOPE), np.float32(128.0 * (1.0 - _SKIN_SLOPE))
+        _less(lab[..., 1], lab[..., 2], slope, offset, contrast)
+        return contrast
     along = lab_of(rgb)[1:]
     along = along / max(float(np.hypot(*along)), 1.0)
     across = np.array([-along[1], along[0]])
@@ -83,14 +86,12 @@ def hue_contrast(lab: Image, rgb: tuple[int, int, int] | None) -> NDArray[Any]:
 
 
 @njit(cache=True, nogil=True)
-def _less(first, second, slope, offset):  # type: ignore[no-untyped-def]
-    """Return first − slope·second − offset of two planes of bytes."""
-    found = np.empty(first.shape, np.float32)
+def _less(first, second, slope, offset, found):  # type: ignore[no-untyped-def]
+    """Fill in first − slope·second − offset of two planes of bytes."""
     for y in range(found.shape[0]):
         to, one, other = found[y], first[y], second[y]
         for x in range(found.shape[1]):
             to[x] = np.float32(one[x]) - slope * np.float32(other[x]) - offset
-    return found
 
 
 def lab_of(rgb: tuple[int, int, int]) -> Floats:

@@ -77,13 +77,13 @@ def closeness(lab: Image, rgb: tuple[int, int, int]) -> NDArray[Any]:
     ``lab`` is a picture in CIE Lab (h, w, 3), as OpenCV stores it in bytes.
     """
     colour = (lab_of(rgb) / _SCALE + _OFFSET).astype(np.float32)
-    planes = lab[..., 0], lab[..., 1], lab[..., 2]
-    return _minus_distance(*planes, colour, _SCALE.astype(np.float32))  # type: ignore[no-any-return]
+    found = np.empty(lab.shape[:2], np.float32)  # NumPy asks for large pages, compiled code for one small page at a time
+    _minus_distance(lab[..., 0], lab[..., 1], lab[..., 2], colour, _SCALE.astype(np.float32), found)
+    return found
 
 
 @njit(cache=True, nogil=True)
-def _minus_distance(lightness, a, b, colour, scale):  # type: ignore[no-untyped-def]
-    found = np.empty(lightness.shape, np.float32)
+def _minus_distance(lightness, a, b, colour, scale, found):  # type: ignore[no-untyped-def]
     for y in range(found.shape[0]):
         to, here, green_red, blue_yellow = found[y], lightness[y], a[y], b[y]
         for x in range(found.shape[1]):
@@ -91,7 +91,6 @@ def _minus_distance(lightness, a, b, colour, scale):  # type: ignore[no-untyped-
             off_a = (np.float32(green_red[x]) - colour[1]) * scale[1]
             off_b = (np.float32(blue_yellow[x]) - colour[2]) * scale[2]
             to[x] = -np.sqrt(off_l * off_l + off_a * off_a + off_b * off_b)
-    return found
 
 
 def pointed_cues(image: Image, box_px: Floats) -> list[Cue]:

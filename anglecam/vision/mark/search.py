@@ -89,7 +89,11 @@ def find_mark(samples: Samples, rgb: tuple[int, int, int] | None, near_px: Float
 
 def _lab_in_planes(image: Image) -> Image:
     """Return an image in CIE Lab, (h, w, 3), bytes, each of the three stored by itself: they are faster to compare."""
-    return np.moveaxis(np.stack(cv2.split(cv2.cvtColor(image, cv2.COLOR_BGR2LAB))), 0, -1)
+    lab = cv2.cvtColor(image, cv2.COLOR_BGR2LAB, dst=np.empty_like(image))
+    planes = np.empty((3, *image.shape[:2]), np.uint8)
+    for k, plane in enumerate(planes):
+        cv2.extractChannel(lab, k, dst=plane)
+    return np.moveaxis(planes, 0, -1)
 
 
 def _mark_of_cue(
