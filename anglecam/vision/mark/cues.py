@@ -77,7 +77,7 @@ def closeness(lab: Image, rgb: tuple[int, int, int]) -> NDArray[Any]:
     ``lab`` is a picture in CIE Lab (h, w, 3), as OpenCV stores it in bytes.
     """
     colour = (lab_of(rgb) / _SCALE + _OFFSET).astype(np.float32)
-    found = np.empty(lab.shape[:2], np.float32)  # NumPy asks for large pages, compiled code for one small page at a time
+    found = np.empty(lab.shape[:2], np.float32)  # of NumPy, which asks for large pages of memory
     _minus_distance(lab[..., 0], lab[..., 1], lab[..., 2], colour, _SCALE.astype(np.float32), found)
     return found
 
