@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import combinations
+from math import dist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,8 +107,7 @@ def circle_of(places_px: Floats, hint: Floats | None, longest_px: float) -> tupl
         Centre and radius, px; ``None`` where two places are one, or no circle agrees with the hint.
     """
     p = places_px
-    chord = p[:, None, :] - p[None, :, :]
-    if np.hypot(chord[..., 0], chord[..., 1])[~np.eye(len(p), dtype=bool)].min() < MOVED_PX / 2.0:
+    if min(dist(*ends) for ends in combinations(p.tolist(), 2)) < MOVED_PX / 2.0:
         return None
     if len(p) == 3:
         centre, radius = circle_through(p)

@@ -1,36 +1,26 @@
 """Track of one blob through sampled frames: on a circle, or at rest in a clip where nothing moves.
 
-A track is scored by the share of frames in which the blob is seen, by how constant its size is, by its contrast,
-and by whether its surroundings move with it.
+A track is scored by what its blobs are like (`anglecam.vision.mark.blob_scores`), and by whether their surroundings
+move with them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from statistics import median  # of few values it is faster than NumPy's
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
-from anglecam.vision.mark.blob_circles import MOVED_PX, TOLERANCE_PX, circle_of, draw_blobs
+from anglecam.vision.mark.blob_circles import MOVED_PX, circle_of, draw_blobs
+from anglecam.vision.mark.blob_scores import score_blobs, score_circles
 from anglecam.vision.mark.blobs import Blobs
 from anglecam.vision.mark.co_motion import co_motion_share
 
-_UNLIKE = 0.6
-"""Largest difference of a blob from the drawn ones: the logarithms of the ratios of areas and of contrasts, added."""
-_LEAST_CONTRAST = 1e-3
-_FEWEST = 3
-"""A track has at least as many blobs."""
 _SKIN_A = (4.0, 24.0)
 """Range of a* of skin of every complexion; its b* is one to three times its a*."""
-_BENT_PX = 0.5
-"""RMS distance from the best straight line, px, that makes a path distinctly curved."""
-_STRAIGHT_WEIGHT = 0.1
-"""Score of a straight path relative to a curved one. It is not zero, because a mark that hardly moves has no curved
-path."""
 _CO_MOTION_POWER = 2
 """Exponent of the co-motion share in the score."""
 
@@ -49,27 +39,6 @@ class BlobTrack:
     """All blobs."""
     circle: tuple[Floats, float] | None
     """Centre and radius of its path, px; ``None`` at rest."""
-
-
-@dataclass(frozen=True)
-class _PathScore:
-    """The part of a track's score that does not depend on its circle."""
-
-    score: float
-    """Score of a curved path on which all blobs lie exactly."""
-    bent: float
-    """How distinctly the path is curved, 0 to 1."""
-
-
-@dataclass(frozen=True)
-class _Close:
-    """The blobs that lie on one circle and are like those through which it was drawn; arrays of length n."""
-
-    index: NDArray[np.int64]
-    off_px: Floats
-    """Distance from the circle."""
-    unlike: Floats
-    """Difference from the drawn blobs in size and contrast."""
 
 
 def moving_track(
@@ -107,14 +76,18 @@ def moving_track(
     if frames < 2:
         return None
     longest = 1.5 * float(np.hypot(*images[0].shape[:2]))
+    drawn = [(circle_of(blobs.plane_px[draw], hint, longest), draw) for draw in draw_blobs(blobs, through)]
+    circles = [(circle, [*draw, -1][:3]) for circle, draw in drawn if circle is not None]
+    if not circles:
+        return None
+    centres, radii = np.array([centre for (centre, _), _ in circles]), np.array([radius for (_, radius), _ in circles])
+    scores, members = score_circles(blobs, np.array([draw for _, draw in circles]), centres, radii, frames)
     best: BlobTrack | None = None
     co_motion: dict[tuple[int, int], float] = {}
-    path_scores: dict[bytes, _PathScore | None] = {}
-    for circle, close in _blobs_on_circles(blobs, draw_blobs(blobs, through), hint, longest):
-        least = 0.0 if best is None else best.score
-        track = _collect(blobs, frames, level, circle, close, least, path_scores)
-        if track is None or (best is not None and track.score <= best.score):
+    for (circle, _), score, some in zip(circles, scores.tolist(), members, strict=True):
+        if score < 0.0 or (best is not None and score <= best.score):  # the factor below is at most 1
             continue
+        track = BlobTrack(score, level, some[some >= 0], blobs, circle)
         if through is not None and not np.isin(track.members, through).any():
             continue
         if on_body:
@@ -145,99 +118,6 @@ def _co_motion(track: BlobTrack, ends: tuple[int, int], images: Sequence[Image])
     return co_motion_share(first, second, here, there, here + camera_shift, turn, area)
 
 
-def _blobs_on_circles(
-    blobs: Blobs, draws: Sequence[NDArray[np.int64]], hint: Floats | None, longest_px: float
-) -> Iterator[tuple[tuple[Floats, float], _Close]]:
-    """Yield the circles through drawn blobs, and the blobs on each that are like the drawn ones."""
-    found = [(circle_of(blobs.plane_px[draw], hint, longest_px), draw) for draw in draws]
-    circles = [circle for circle, _ in found if circle is not None]
-    if not circles:
-        return
-    some = [draw for circle, draw in found if circle is not None]
-    sizes = np.array([median(blobs.area[draw]) for draw in some])[:, None]
-    contrasts = np.array([median(blobs.contrast[draw]) for draw in some])[:, None]
-    centres, radii = np.array([centre for centre, _ in circles]), np.array([radius for _, radius in circles])
-    away = blobs.plane_px[None, :, :] - centres[:, None, :]
-    off = np.abs(np.hypot(away[..., 0], away[..., 1]) - radii[:, None])
-    unlike = np.abs(np.log(blobs.area / sizes))
-    unlike += np.abs(np.log(np.maximum(blobs.contrast, _LEAST_CONTRAST) / contrasts))
-    near = (off < TOLERANCE_PX) & (unlike < _UNLIKE)
-    for k in np.flatnonzero(near.sum(axis=1) >= _FEWEST).tolist():
-        close = np.flatnonzero(near[k])
-        yield circles[k], _Close(close, off[k, close], unlike[k, close])
-
-
-def _collect(
-    blobs: Blobs,
-    frames: int,
-    level: float,
-    circle: tuple[Floats, float],
-    close: _Close,
-    least: float,
-    path_scores: dict[bytes, _PathScore | None],
-) -> BlobTrack | None:
-    """Take from each frame the blob on the circle that is most like the typical one; score the track.
-
-    Parameters
-    ----------
-    close : _Close
-        The blobs on the circle.
-    least : float
-        Score that the track must exceed.
-    path_scores : dict
-        Cache of `_path_score` for each choice of blobs; many circles lead to the same choice.
-
-    Returns
-    -------
-    BlobTrack or None
-        ``None`` where the score cannot exceed the least one.
-    """
-    # The most similar blob of each frame: from the least similar to the most, the last of each frame remains.
-    order = np.argsort(close.unlike + close.off_px / TOLERANCE_PX)[::-1]
-    which = np.full(frames, -1)
-    which[blobs.frame[close.index[order]]] = order
-    taken = which[which >= 0]
-    members = close.index[taken]
-    key = members.tobytes()
-    if key not in path_scores:
-        path_scores[key] = _path_score(blobs, members, frames)
-    path = path_scores[key]
-    if path is None or path.score < least:  # the factors below are at most 1
-        return None
-    off_px = close.off_px[taken]
-    score = (
-        path.score
-        * np.exp(-np.mean((off_px / TOLERANCE_PX) ** 2))
-        * (_STRAIGHT_WEIGHT + (1.0 - _STRAIGHT_WEIGHT) * path.bent)
-    )
-    return BlobTrack(score, level, members, blobs, circle)
-
-
-def _path_score(blobs: Blobs, members: NDArray[np.int64], frames: int) -> _PathScore | None:
-    """Score a choice of blobs, whatever circle they lie on; ``None`` where they are few or do not move."""
-    place = blobs.plane_px[members]
-    extent = float(np.hypot(*np.ptp(place, axis=0)))
-    if extent < MOVED_PX or len(members) < _FEWEST:
-        return None
-    # Motion to and fro on a straight line shows no centre of rotation.
-    bent = 1.0 - np.exp(-((_rms_off_line(place) / _BENT_PX) ** 2))
-    return _PathScore(_score(blobs, members, frames, extent), float(bent))
-
-
-def _rms_off_line(place: Floats) -> float:
-    """Return the RMS distance of places from the straight line that fits them best, px."""
-    return float(np.sqrt(max(np.linalg.eigvalsh(np.cov(place.T))[0], 0.0)))
-
-
-def _score(blobs: Blobs, members: NDArray[np.int64], frames: int, extent: float) -> float:
-    """Score blobs by the share of frames that show them, contrast, constancy of size, size and travel."""
-    size = blobs.area[members]
-    constancy = np.exp(-4.0 * float(np.std(np.log(size))))
-    seen = len(set(blobs.frame[members])) / frames
-    travel = 1.0 - np.exp(-extent / 10.0)
-    return float(seen**2 * median(blobs.contrast[members]) * constancy * median(size) ** 0.25 * (0.1 + travel))
-
-
 def resting_track(
     blobs: Blobs, images: Sequence[Image], level: float, through: NDArray[np.intp] | None = None
 ) -> BlobTrack | None:
@@ -266,7 +146,9 @@ def resting_track(
         near = np.hypot(*(blobs.plane_px - blobs.plane_px[seed]).T) < MOVED_PX
         alike = np.abs(np.log(blobs.area / blobs.area[seed])) < 0.4
         members = np.flatnonzero(near & alike)
-        score = _score(blobs, members, len(images), 0.0) * (0.2 + _skin_share(images[0], blobs, int(seed)))
+        share = len(set(blobs.frame[members])) / len(images)
+        score = score_blobs(blobs.area[members], blobs.contrast[members], share, 0.0)
+        score *= 0.2 + _skin_share(images[0], blobs, int(seed))
         if best is None or score > best.score:
             best = BlobTrack(score, level, members, blobs, None)
     return best

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
-from anglecam.vision.mark.patches import find_patches
+from anglecam.vision.mark.patches import Patches, find_patches
 from anglecam.vision.mark.segment import Region
 
 _MIN_AREA_PX2 = 12.0
@@ -40,15 +40,17 @@ class Blobs:
     pixel_px: NDArray[np.int64]
     """(n, 2) column and row of one of its pixels."""
 
-    def mask(self, k: int, above: Image, margin_px: int) -> tuple[Image, tuple[slice, slice]]:
+    def mask(self, k: int, hue: NDArray[Any], level: float, margin_px: int) -> tuple[Image, tuple[slice, slice]]:
         """Return the pixels of a blob, and the part of the picture that they are given for.
 
         Parameters
         ----------
         k : int
             Index of the blob.
-        above : ndarray
-            (h, w) bytes: 1 where its picture is above the level at which the blobs were found.
+        hue : ndarray
+            (h, w) hue contrast of its picture.
+        level : float
+            At which the blobs were found.
         margin_px : int
             Around the blob's box.
 
@@ -60,26 +62,27 @@ class Blobs:
             Rows and columns.
         """
         left, top, width, height = self.box_px[k]
-        _, labels = cv2.connectedComponents(above[top : top + height, left : left + width], connectivity=8)
+        above = (hue[top : top + height, left : left + width] > level).astype(np.uint8)
+        _, labels = cv2.connectedComponents(above, connectivity=8)
         x, y = self.pixel_px[k]
         low = np.maximum([top - margin_px, left - margin_px], 0)
-        high = np.minimum([top + height + margin_px, left + width + margin_px], above.shape)
+        high = np.minimum([top + height + margin_px, left + width + margin_px], hue.shape)
         mask = np.zeros(high - low, np.uint8)
         mask[top - low[0] :, left - low[1] :][:height, :width] = labels == labels[y - top, x - left]
         return mask, (slice(low[0], high[0]), slice(low[1], high[1]))
 
 
 def find_blobs(
-    maps: Sequence[NDArray[Any]], level: float, usual: float, to_plane: Callable[[int, Floats], Floats]
-) -> Blobs:
-    """Find the largest blobs of every picture by thresholding its hue contrast.
+    maps: Sequence[NDArray[Any]], levels: Sequence[float], usual: float, to_plane: Callable[[int, Floats], Floats]
+) -> list[Blobs]:
+    """Find the largest blobs of every picture by thresholding its hue contrast at several levels.
 
     Parameters
     ----------
     maps : sequence of ndarray
         (h, w) hue contrast of each picture.
-    level : float
-        Threshold: contrast above which a pixel belongs to a blob.
+    levels : sequence of float
+        Thresholds: contrast above which a pixel belongs to a blob.
     usual : float
         The picture's usual contrast.
     to_plane : callable
@@ -87,26 +90,40 @@ def find_blobs(
 
     Returns
     -------
-    Blobs
-        At most twelve for each picture, without those that are too small or too large for a mark.
+    list of Blobs
+        For each level at most twelve for each picture, without those that are too small or too large for a mark.
     """
+    patches = [find_patches(hue, levels) for hue in maps]
+    return [
+        _largest(maps, [of_picture[k] for of_picture in patches], level, usual, to_plane)
+        for k, level in enumerate(levels)
+    ]
+
+
+def _largest(
+    maps: Sequence[NDArray[Any]],
+    patches: Sequence[Patches],
+    level: float,
+    usual: float,
+    to_plane: Callable[[int, Floats], Floats],
+) -> Blobs:
     frame, picture_px, plane_px, area, contrast, box, pixel = [], [], [], [], [], [], []
-    for t, hue in enumerate(maps):
-        patches = find_patches(hue, level)
-        background = np.int32(hue.size - patches.area.sum())
-        sizes = np.concatenate([[background], patches.area])
+    for t, (hue, found) in enumerate(zip(maps, patches, strict=True)):
+        background = np.int32(hue.size - found.area.sum())
+        sizes = np.concatenate([[background], found.area])
         largest = _MAX_AREA_SHARE * hue.size
-        chosen = [k - 1 for k in np.argsort(-sizes) if k and _MIN_AREA_PX2 <= sizes[k] <= largest][:_MAX_PER_PICTURE]
-        for k in chosen:
-            x, y, w, h = patches.box_px[k]
+        order = np.argsort(-sizes)
+        fits = (order > 0) & (sizes[order] >= _MIN_AREA_PX2) & (sizes[order] <= largest)
+        for k in order[fits][:_MAX_PER_PICTURE] - 1:
+            x, y, w, h = found.box_px[k]
             part = hue[y : y + h, x : x + w]
             frame.append(t)
-            picture_px.append(patches.centre_px[k])
-            plane_px.append(to_plane(t, patches.centre_px[k]))
-            area.append(patches.area[k])
+            picture_px.append(found.centre_px[k])
+            plane_px.append(to_plane(t, found.centre_px[k]))
+            area.append(found.area[k])
             contrast.append(_upper_quartile(part[part > level]) - usual)
-            box.append(patches.box_px[k])
-            pixel.append(patches.first_px[k])
+            box.append(found.box_px[k])
+            pixel.append(found.first_px[k])
     return Blobs(
         np.array(frame, np.int64),
         np.array(picture_px, float).reshape(-1, 2),

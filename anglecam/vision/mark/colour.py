@@ -74,14 +74,25 @@ def hue_contrast(lab: Image, rgb: tuple[int, int, int] | None) -> NDArray[Any]:
         minus the magnitude of the component across it.
     """
     if rgb is None:
-        row = np.array([[0.0, 1.0, -_SKIN_SLOPE, -128.0 * (1.0 - _SKIN_SLOPE)]])
-        return cv2.transform(lab.astype(np.float32), row)
+        contrast = np.empty(lab.shape[:2], np.float32)
+        slope, offset = np.float32(_SKIN_SLOPE), np.float32(128.0 * (1.0 - _SKIN_SLOPE))
+        _less(lab[..., 1], lab[..., 2], slope, offset, contrast)
+        return contrast
     along = lab_of(rgb)[1:]
     along = along / max(float(np.hypot(*along)), 1.0)
     across = np.array([-along[1], along[0]])
     rows = np.array([[0.0, *v, -128.0 * v.sum()] for v in (along, across)])
-    parts = cv2.transform(lab.astype(np.float32), rows)
+    parts = cv2.transform(np.ascontiguousarray(lab, np.float32), rows)
     return parts[..., 0] - np.abs(parts[..., 1])
+
+
+@njit(cache=True, nogil=True)
+def _less(first, second, slope, offset, found):  # type: ignore[no-untyped-def]
+    """Fill in first − slope·second − offset of two planes of bytes."""
+    for y in range(found.shape[0]):
+        to, one, other = found[y], first[y], second[y]
+        for x in range(found.shape[1]):
+            to[x] = np.float32(one[x]) - slope * np.float32(other[x]) - offset
 
 
 def lab_of(rgb: tuple[int, int, int]) -> Floats:
@@ -105,11 +116,12 @@ def fit_discriminant(inside: Image, around: Image, elsewhere: Image) -> ColourMo
     ColourModel
         Scaled so that the mean of the surroundings maps to 0 and that of the mark to 1.
     """
-    mean_in, mean_around = _mean(inside), _mean(around)
+    of_inside, of_around, of_elsewhere = (_Sums.of(pixels) for pixels in (inside, around, elsewhere))
+    mean_in, mean_around = of_inside.mean, of_around.mean
     # The scatter is taken around the neighbours' mean, so that colours far from it (dark hair) are suppressed too.
-    off = elsewhere - mean_around
-    spread = (1.0 - _ELSEWHERE_SHARE) * _covariance(around, mean_around) + _ELSEWHERE_SHARE * off.T @ off / len(off)
-    within = _covariance(inside, mean_in) + spread + _NOISE_FLOOR**2 * np.eye(3)
+    spread = (1.0 - _ELSEWHERE_SHARE) * of_around.covariance
+    spread += _ELSEWHERE_SHARE * of_elsewhere.mean_square_about(mean_around)
+    within = of_inside.covariance + spread + _NOISE_FLOOR**2 * np.eye(3)
     w = np.asarray(np.linalg.solve(within, mean_in - mean_around), float)
     w /= w @ (mean_in - mean_around)
     offset = -float(w @ mean_around)
@@ -118,16 +130,35 @@ def fit_discriminant(inside: Image, around: Image, elsewhere: Image) -> ColourMo
     return ColourModel(w, offset, noise, mean_in)
 
 
-def _mean(pixels: Image) -> Floats:
-    """Return the mean colour (3,) of pixels (n, 3)."""
-    sums = [int(pixels[:, k].sum(dtype=np.int64)) for k in range(3)]  # a sum of bytes is exact, and faster by column
-    return np.array(sums, float) / len(pixels)
+@dataclass(frozen=True)
+class _Sums:
+    """Sums over pixels of bytes, which are exact."""
 
+    count: int
+    first: NDArray[np.int64]
+    """(3,) of blue, green, red."""
+    products: NDArray[np.int64]
+    """(3, 3) of the products of two of them."""
 
-def _covariance(pixels: Image, mean: Floats) -> Floats:
-    """Return the covariance (3, 3) of pixels (n, 3) around their mean (3,)."""
-    off = pixels - mean
-    return np.asarray(off.T @ off * (1.0 / (len(pixels) - 1)))
+    @classmethod
+    def of(cls, pixels: Image) -> _Sums:
+        """Return those of pixels (n, 3)."""
+        return cls(len(pixels), *_sums(np.ascontiguousarray(pixels)))
+
+    @property
+    def mean(self) -> Floats:
+        """(3,) mean colour."""
+        return self.first / self.count
+
+    @property
+    def covariance(self) -> Floats:
+        """(3, 3) around the mean."""
+        return self.mean_square_about(self.mean) * (self.count / (self.count - 1))
+
+    def mean_square_about(self, colour: Floats) -> Floats:
+        """Return the mean (3, 3) of the products of the deviations from a colour (3,)."""
+        off = self.mean - colour
+        return (self.products - np.outer(self.first, self.mean)) / self.count + np.outer(off, off)
 
 
 @njit(cache=True, nogil=True)
@@ -141,3 +172,14 @@ def _weighted(bytes_, blue, green, red, offset):  # type: ignore[no-untyped-def]
         level = min(max(level, np.float32(0.0)), np.float32(255.0))
         levels[k] = np.uint8(np.rint(level))
     return levels
+
+
+@njit(cache=True, nogil=True)
+def _sums(pixels):  # type: ignore[no-untyped-def]
+    b = g = r = bb = bg = br = gg = gr = rr = np.int64(0)
+    for k in range(len(pixels)):
+        blue, green, red = np.int64(pixels[k, 0]), np.int64(pixels[k, 1]), np.int64(pixels[k, 2])
+        b, g, r = b + blue, g + green, r + red
+        bb, bg, br = bb + blue * blue, bg + blue * green, br + blue * red
+        gg, gr, rr = gg + green * green, gr + green * red, rr + red * red
+    return np.array([b, g, r]), np.array([[bb, bg, br], [bg, gg, gr], [br, gr, rr]])

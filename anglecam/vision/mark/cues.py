@@ -76,20 +76,21 @@ def closeness(lab: Image, rgb: tuple[int, int, int]) -> NDArray[Any]:
 
     ``lab`` is a picture in CIE Lab (h, w, 3), as OpenCV stores it in bytes.
     """
-    return _minus_distance(lab, (lab_of(rgb) / _SCALE + _OFFSET).astype(np.float32), _SCALE.astype(np.float32))
+    colour = (lab_of(rgb) / _SCALE + _OFFSET).astype(np.float32)
+    found = np.empty(lab.shape[:2], np.float32)  # of NumPy, which asks for large pages of memory
+    _minus_distance(lab[..., 0], lab[..., 1], lab[..., 2], colour, _SCALE.astype(np.float32), found)
+    return found
 
 
 @njit(cache=True, nogil=True)
-def _minus_distance(lab, colour, scale):  # type: ignore[no-untyped-def]
-    found = np.empty(lab.shape[:2], np.float32)
-    for y in range(lab.shape[0]):
-        for x in range(lab.shape[1]):
-            square = np.float32(0.0)
-            for k in range(3):
-                off = (np.float32(lab[y, x, k]) - colour[k]) * scale[k]
-                square += off * off
-            found[y, x] = -np.sqrt(square)
-    return found
+def _minus_distance(lightness, a, b, colour, scale, found):  # type: ignore[no-untyped-def]
+    for y in range(found.shape[0]):
+        to, here, green_red, blue_yellow = found[y], lightness[y], a[y], b[y]
+        for x in range(found.shape[1]):
+            off_l = (np.float32(here[x]) - colour[0]) * scale[0]
+            off_a = (np.float32(green_red[x]) - colour[1]) * scale[1]
+            off_b = (np.float32(blue_yellow[x]) - colour[2]) * scale[2]
+            to[x] = -np.sqrt(off_l * off_l + off_a * off_a + off_b * off_b)
 
 
 def pointed_cues(image: Image, box_px: Floats) -> list[Cue]:
@@ -140,9 +141,9 @@ def moving_cues(images: Sequence[Image]) -> list[Cue]:
     """
     scale = min(1.0, _LONG_SIDE_PX / max(images[0].shape[:2]))
     small = np.stack([cv2.resize(i, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) for i in images])
-    level = np.median(small, axis=(1, 2), keepdims=True).astype(np.float32) + 1.0
-    even = small * (level.mean(axis=0) / level)  # flicker of the light changes every pixel
-    changing = (even.max(axis=0) - even.min(axis=0)).max(axis=2) > _CHANGES
+    level = np.array([[_median(i[..., k]) for k in range(3)] for i in small], np.float32) + np.float32(1.0)
+    gain = level.mean(axis=0) / level  # flicker of the light changes every pixel
+    changing = _change(small, gain) > _CHANGES
     if changing.sum() < _FEWEST_PIXELS:
         return []
     colours = _lab(small[:, changing])
@@ -151,6 +152,29 @@ def moving_cues(images: Sequence[Image]) -> list[Cue]:
         _of_colour("moving", centre)
         for centre in _colours_of(colours.reshape(-1, 3)[rng.permutation(colours.shape[0] * colours.shape[1])[:_DRAWN]])
     ]
+
+
+def _median(values: Image) -> float:
+    """Return the median of bytes."""
+    upto = np.cumsum(np.bincount(values.ravel(), minlength=256))
+    middle = (values.size - 1) // 2, values.size // 2
+    return float(np.searchsorted(upto, middle, side="right").mean())
+
+
+@njit(cache=True, nogil=True)
+def _change(images, gain):  # type: ignore[no-untyped-def]
+    """Return by how much each pixel of images (n, h, w, 3) changes, where a gain (n, 3) evens out their light."""
+    count, height, width, planes = images.shape
+    change = np.zeros((height, width), np.float32)
+    for y in range(height):
+        for x in range(width):
+            for k in range(planes):
+                low = high = np.float32(images[0, y, x, k]) * gain[0, k]
+                for t in range(1, count):
+                    value = np.float32(images[t, y, x, k]) * gain[t, k]
+                    low, high = min(value, low), max(value, high)
+                change[y, x] = max(change[y, x], high - low)
+    return change
 
 
 def _colours_of(lab: Floats) -> list[Floats]:

@@ -2,11 +2,12 @@
 
 They are those of OpenCV's ``connectedComponentsWithStats``, in its order. OpenCV visits every pixel of the background
 several times, which takes most of the time of a search. Here each row is divided into runs of pixels above the level,
-and runs of neighbouring rows are joined.
+and runs of neighbouring rows are joined. Most strips of a row have no pixel above any level and are passed over.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +17,8 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
 
+_STRIP_PX = 32
+"""Length of a strip, a part of a row."""
 _LEFT, _TOP, _RIGHT, _BOTTOM, _AREA, _FIRST_X, _FIRST_Y, _BLOCK = range(8)
 """Columns of a patch: its box, the ends excluded, its area, its first pixel, and its first block of 2 × 2 pixels."""
 
@@ -34,59 +37,86 @@ class Patches:
     """(n, 2) column and row of the leftmost pixel of the highest row."""
 
 
-def find_patches(values: NDArray[Any], level: float) -> Patches:
-    """Find the patches of pixels above a level; pixels that touch at a corner are connected.
+def find_patches(values: NDArray[Any], levels: Sequence[float]) -> list[Patches]:
+    """Find the patches of pixels above each of several levels; pixels that touch at a corner are connected.
 
     Parameters
     ----------
     values : ndarray
         (h, w) float32.
-    level : float
+    levels : sequence of float
         A pixel belongs to a patch if its value is larger.
 
     Returns
     -------
-    Patches
-        All of them, also single pixels.
+    list of Patches
+        For each level all of them, also single pixels.
     """
-    table, sums = _joined_runs(values, np.float32(level))
-    order = np.argsort(table[:, _BLOCK])  # no two patches begin in one block
-    table, sums = table[order], sums[order]
-    box = np.column_stack([table[:, :_RIGHT], table[:, _RIGHT:_AREA] - table[:, :_RIGHT]])
-    area = table[:, _AREA]
-    return Patches(box, area.astype(np.int32), sums / area[:, None], table[:, _FIRST_X : _FIRST_Y + 1])
+    highest = _highest_of_strips(values)
+    found = []
+    for level in levels:
+        table, sums = _joined_runs(values, highest, np.float32(level))
+        order = np.argsort(table[:, _BLOCK])  # no two patches begin in one block
+        table, sums = table[order], sums[order]
+        box = np.column_stack([table[:, :_RIGHT], table[:, _RIGHT:_AREA] - table[:, :_RIGHT]])
+        area = table[:, _AREA]
+        found.append(Patches(box, area.astype(np.int32), sums / area[:, None], table[:, _FIRST_X : _FIRST_Y + 1]))
+    return found
+
+
+@njit(cache=True, nogil=True, fastmath={"nnan", "nsz"})  # so that several pixels are compared at once
+def _highest_of_strips(values):  # type: ignore[no-untyped-def]
+    """Return the highest value of each strip of each row."""
+    height, width = values.shape
+    strips = (width + _STRIP_PX - 1) // _STRIP_PX
+    highest = np.empty((height, strips), values.dtype)
+    for y in range(height):
+        for k in range(strips):
+            strip = values[y, k * _STRIP_PX : min((k + 1) * _STRIP_PX, width)]
+            most = strip[0]
+            for x in range(len(strip)):
+                most = max(strip[x], most)
+            highest[y, k] = most
+    return highest
 
 
 @njit(cache=True, nogil=True)
-def _joined_runs(values, level):  # type: ignore[no-untyped-def]
+def _joined_runs(values, highest, level):  # type: ignore[no-untyped-def]
     """Return a row for each patch, in the order of their first pixels, and the sums of its columns and rows."""
     height, width = values.shape
     most = height * ((width + 1) // 2)
     start, stop, parent = np.empty(most, np.int32), np.empty(most, np.int32), np.empty(most, np.int32)
     row_begins = np.empty(height + 1, np.int64)
-    runs = above = 0
+    runs = 0
     for y in range(height):
         row_begins[y] = runs
         row = values[y]
-        above, begins = (row_begins[y - 1] if y else 0), runs
-        x = 0
-        while x < width:
-            if not row[x] > level:
-                x += 1
-                continue
-            start[runs] = x
-            while x < width and row[x] > level:
-                x += 1
-            stop[runs] = x
-            parent[runs] = runs
+        inside = False
+        for k in range(highest.shape[1]):
+            left, right = k * _STRIP_PX, min((k + 1) * _STRIP_PX, width)
+            if not highest[y, k] > level:
+                right = left + 1 if inside else left  # a run ends at the strip's first pixel
+            for x in range(left, right):
+                if (row[x] > level) != inside:
+                    if inside:
+                        stop[runs] = x
+                        runs += 1
+                    else:
+                        start[runs] = x
+                    inside = not inside
+        if inside:
+            stop[runs] = width
+            runs += 1
+        above, begins = (row_begins[y - 1] if y else 0), row_begins[y]
+        for run in range(begins, runs):
+            parent[run] = run
             # runs of the row above that end before this one begins touch no later one
-            while above < begins and stop[above] < start[runs]:
+            while above < begins and stop[above] < start[run]:
                 above += 1
             other = above
-            while other < begins and start[other] <= x:
-                _join(parent, other, runs)
+            while other < begins and start[other] <= stop[run]:
+                _join(parent, other, run)
                 other += 1
-            runs += 1
     row_begins[height] = runs
     which = np.empty(runs, np.int32)
     patches = 0

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.threads import map_in_threads
+from anglecam.vision.image.median import median_picture
 from anglecam.vision.mark.blob_tracks import BlobTrack, moving_track, resting_track
 from anglecam.vision.mark.blobs import Blobs, blobs_of_regions, find_blobs
 from anglecam.vision.mark.cues import RED, Cue, declared_cue, moving_cues, pointed_cues
 from anglecam.vision.mark.found_mark import FoundMark, Samples
 from anglecam.vision.mark.learn_colour import MIN_CONTRAST, is_same_colour, learn_colour
-from anglecam.vision.mark.segment import SMALLEST_SHARE, Patch, Region, disc, find_patches, measure
+from anglecam.vision.mark.segment import LARGEST_SHARE, SMALLEST_SHARE, Patch, Region, disc, find_patches, measure
 from anglecam.vision.mark.track import MarkTrack, follow_mark
 
 _LEVEL_SHARES = (0.3, 0.4, 0.5, 0.6, 0.7)
@@ -75,7 +76,7 @@ def find_mark(samples: Samples, rgb: tuple[int, int, int] | None, near_px: Float
         cues = pointed_cues(samples.images[0], samples.pointed_px)
     else:
         cues = [RED, *([] if at_rest else moving_cues(samples.stabilised))]
-    labs = [cv2.cvtColor(image, cv2.COLOR_BGR2LAB) for image in samples.images]
+    labs = map_in_threads(_lab_in_planes, samples.images)
     marks = map_in_threads(lambda cue: _mark_of_cue(cue, samples, labs, near_px, at_rest), cues)
     found = [mark for mark in marks if mark is not None]
     ranked = sorted(found, key=lambda mark: -mark.score)
@@ -86,6 +87,15 @@ def find_mark(samples: Samples, rgb: tuple[int, int, int] | None, near_px: Float
     return replace(best, margin=best.score / rivals[0]) if rivals else best
 
 
+def _lab_in_planes(image: Image) -> Image:
+    """Return an image in CIE Lab, (h, w, 3), bytes, each of the three stored by itself: they are faster to compare."""
+    lab = cv2.cvtColor(image, cv2.COLOR_BGR2LAB, dst=np.empty_like(image))
+    planes = np.empty((3, *image.shape[:2]), np.uint8)
+    for k, plane in enumerate(planes):
+        cv2.extractChannel(lab, k, dst=plane)
+    return np.moveaxis(planes, 0, -1)
+
+
 def _mark_of_cue(
     cue: Cue, samples: Samples, labs: Sequence[Image], near_px: Floats | None, at_rest: bool
 ) -> FoundMark | None:
@@ -94,15 +104,15 @@ def _mark_of_cue(
     ``labs`` are the samples in CIE Lab.
     """
     images = samples.images
-    maps = [cv2.GaussianBlur(cue.contrast(lab), (0, 0), 1.0) for lab in labs]
+    maps = [cue.contrast(lab) for lab in labs]
+    for contrast in maps:
+        cv2.GaussianBlur(contrast, (0, 0), 1.0, dst=contrast)
     usual, top = _contrast_range(maps, at_rest)
     if top - usual < MIN_CONTRAST:
         return None
-    thresholded = []
-    for share in _LEVEL_SHARES:
-        level = usual + share * (top - usual)
-        if level - usual >= MIN_CONTRAST / 2.0:
-            thresholded.append((level, find_blobs(maps, level, usual, samples.to_plane)))
+    levels = [usual + share * (top - usual) for share in _LEVEL_SHARES]
+    levels = [level for level in levels if level - usual >= MIN_CONTRAST / 2.0]
+    thresholded = list(zip(levels, find_blobs(maps, levels, usual, samples.to_plane), strict=True))
     # The hint misleads where a slanted view shows the marker on the shaft far from the centre of rotation.
     for hint in (near_px,) if near_px is None else (near_px, None):
         tracks: list[BlobTrack | None] = []
@@ -148,8 +158,8 @@ def _opening(track: BlobTrack, maps: Sequence[NDArray[Any]]) -> int:
     """Return half the radius of the largest disc in a track's blobs, px, if thinner parts are attached, else 0."""
     radii, shares = [], []
     for m in track.members:
-        above = (maps[int(track.blobs.frame[m])] > track.level).astype(np.uint8)
-        blob, _ = track.blobs.mask(m, above, int(track.blobs.box_px[m, 2:].max()))
+        hue, margin_px = maps[int(track.blobs.frame[m])], int(track.blobs.box_px[m, 2:].max())
+        blob, _ = track.blobs.mask(m, hue, track.level, margin_px)
         radius = int(cv2.distanceTransform(np.pad(blob, 1), cv2.DIST_L2, 5).max() / 2.0)
         opened = cv2.morphologyEx(blob, cv2.MORPH_OPEN, disc(radius))
         radii.append(radius)
@@ -170,7 +180,8 @@ def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hi
         region = measure(patch, mark.model)
         return None if region is None else samples.in_plane(i, region)
 
-    # A cut patch is never the mark, and the whole wall may be one: it is measured only where a mark goes on a circle.
+    # A cut patch is never the mark, and the whole wall may be one: it is measured only where a mark goes on a circle,
+    # and only if it is not too large to be taken for that mark.
     inner = [[None if patch.cut else region_of(i, patch) for patch in some] for i, some in enumerate(patches)]
     blobs = blobs_of_regions([[region for region in some if region is not None] for some in inner])
     through = None
@@ -187,8 +198,12 @@ def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hi
         if area > _LARGEST_SHARE * samples.images[0].shape[0] * samples.images[0].shape[1]:
             continue
         if not regions:
+            most = LARGEST_SHARE * area
             every = [
-                [region_of(i, patch) if patch.cut else region for patch, region in zip(*both, strict=True)]
+                [
+                    region_of(i, patch) if patch.cut and cv2.contourArea(patch.contour_px) <= most else region
+                    for patch, region in zip(*both, strict=True)
+                ]
                 for i, both in enumerate(zip(patches, inner, strict=True))
             ]
             regions = [[region for region in some if region is not None] for some in every]
@@ -231,8 +246,9 @@ def _contrast_range(maps: Sequence[NDArray[Any]], at_rest: bool) -> tuple[float,
 
 def something_moves(images: Sequence[Image]) -> bool:
     """Return whether more pixels change than a mark covers, apart from flicker of the light."""
-    small = [cv2.GaussianBlur(cv2.cvtColor(i, cv2.COLOR_BGR2GRAY), (0, 0), 2.0)[::2, ::2].astype(float) for i in images]
-    median = np.median(small, axis=0)
+    greys = (cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) for image in images)
+    small = np.stack([cv2.GaussianBlur(grey, (0, 0), 2.0)[::2, ::2] for grey in greys])
+    median = median_picture(small)
     for picture in small:
         gain = np.median((picture + 1.0) / (median + 1.0))
         if (np.abs(picture - gain * median) > 12.0).mean() > 1e-3:

@@ -46,7 +46,7 @@ def _track_of_a_square(colour: np.ndarray) -> tuple[list[np.ndarray], list[np.nd
     labs = [cv2.cvtColor(image, cv2.COLOR_BGR2LAB) for image in images]
     maps = [cv2.GaussianBlur(RED.contrast(lab), (0, 0), 1.0) for lab in labs]
     level = float(np.median(maps[0]) + maps[0].max()) / 2.0
-    blobs = find_blobs(maps, level, float(np.median(maps[0])), lambda _, point: point)
+    (blobs,) = find_blobs(maps, [level], float(np.median(maps[0])), lambda _, point: point)
     return images, maps, BlobTrack(1.0, level, np.flatnonzero(blobs.area > 300), blobs, None)
 
 

@@ -21,7 +21,8 @@ def test_patches_are_opencv_s(seed):
     values = _map(seed)
     level = float(np.random.default_rng(1000 + seed).uniform(-1.0, 2.0) * values.std())
     _, labels, stats, centres = cv2.connectedComponentsWithStats((values > level).astype(np.uint8), connectivity=8)
-    found = find_patches(values, level)
+    below, found = find_patches(values, [-9.0 * values.std(), level])
+    assert below.area.sum() == values.size
     np.testing.assert_array_equal(found.box_px, stats[1:, : cv2.CC_STAT_AREA])
     np.testing.assert_array_equal(found.area, stats[1:, cv2.CC_STAT_AREA])
     np.testing.assert_array_equal(found.centre_px, centres[1:])
@@ -32,6 +33,6 @@ def test_patches_are_opencv_s(seed):
 
 @pytest.mark.parametrize("value", [0.0, 1.0])
 def test_a_map_without_and_one_full_of_patches(value):
-    found = find_patches(np.full((7, 9), value, np.float32), 0.5)
+    (found,) = find_patches(np.full((7, 9), value, np.float32), [0.5])
     assert found.area.tolist() == ([63] if value else [])
     assert found.centre_px.tolist() == ([[4.0, 3.0]] if value else [])
