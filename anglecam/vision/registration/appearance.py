@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from anglecam.data.typing import Floats, Integers
-from anglecam.vision.registration.kernels import place_on_tiles
-from anglecam.vision.registration.learn_kernel import gain_equations, place_on_tile, sort_by_cell, spline_equations
+from anglecam.vision.registration.kernels import place_on_tile, place_on_tiles, sort_by_cell
+from anglecam.vision.registration.learn_kernel import gain_equations, spline_equations
 from anglecam.vision.registration.turn_kernel import turn_equations
 
 KNOT_SPACING_PX = 0.5

@@ -34,12 +34,12 @@ from anglecam.vision.registration.centre_equations import (
     excess_displacement,
 )
 from anglecam.vision.registration.own_centres import have_own_centres
+from anglecam.vision.registration.tile_choice import choose_tiles
 from anglecam.vision.registration.tiles import (
     TILE_SIDE_PX,
     FrameView,
     MotionPlane,
     Tiles,
-    choose_tiles,
     view_tiles,
 )
 from anglecam.vision.registration.turn import BodyAppearance, group_scatter
