@@ -133,7 +133,8 @@ def _stack(
                 extra = f.turn_per_row * (places[:, 1] - f.row)
                 places = plane.lens.distort(rotate_each(arms, f.turn + extra) + f.pivot_px + parallax)
             at = places.astype(np.float32).reshape(*back.shape[:2], 2)
-            back[:] = cv2.remap(f.image, at, np.empty(0, np.float32), cv2.INTER_LINEAR).reshape(back.shape)
+            seen = cv2.remap(f.image, at, None, cv2.INTER_LINEAR)  # type: ignore[call-overload]
+            back[:] = seen.reshape(back.shape)
             _exclude_outside(at, width, height, whole[rows])
         middle[rows], spread[rows] = median_and_spread(pile)
 
