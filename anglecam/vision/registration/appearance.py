@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
 from anglecam.data.typing import Floats, Integers
-from anglecam.vision.registration.kernels import place_on_tile, place_on_tiles, sort_by_cell
+from anglecam.vision.registration.kernels import place_on_tile, place_on_tiles, relight, sort_by_cell
 from anglecam.vision.registration.learn_kernel import gain_equations, spline_equations
 from anglecam.vision.registration.turn_kernel import turn_equations
 
@@ -193,8 +193,7 @@ def equalise_brightness(views: TileViews, light: Floats) -> TileViews:
         With values as if all had been lit alike.
     """
     difference = light - light.mean(axis=0)
-    each = np.repeat(difference, np.diff(views.starts), axis=0)
-    return replace(views, values=((views.values - each[..., 1]) / (1.0 + each[..., 0])).astype(np.float32))
+    return replace(views, values=relight(views.values, views.starts, difference[..., 0], difference[..., 1]))
 
 
 def compare_tiles(tiles: TileAppearance, views: TileViews, turns: Floats, pivots: Floats) -> TileFit:

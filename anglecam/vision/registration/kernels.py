@@ -1,4 +1,4 @@
-"""Compiled rotation of pixels onto tiles.
+"""Compiled work on the pixels of tiles: their rotation onto the tiles, their order, their brightness.
 
 No compiled function here calls one of another file, so that the compiler's cache is never out of date.
 """
@@ -153,3 +153,29 @@ def sort_by_cell(placed, side, cells):  # type: ignore[no-untyped-def]
             order[filled[cell[m]]] = m
             filled[cell[m]] += 1
     return order, begins
+
+
+@njit(cache=True, nogil=True)
+def relight(values, starts, gains, offsets):  # type: ignore[no-untyped-def]
+    """Remove from each view a relative gain and an offset of brightness.
+
+    Parameters
+    ----------
+    values : ndarray
+        (m, planes) single precision, grey levels.
+    starts : ndarray
+        (views + 1,) index at which each view's pixels begin.
+    gains, offsets : ndarray
+        (views, planes) gain less 1, and offset in grey levels.
+
+    Returns
+    -------
+    ndarray
+        (m, planes) single precision.
+    """
+    lit = np.empty_like(values)
+    for k in range(len(starts) - 1):
+        for m in range(starts[k], starts[k + 1]):
+            for channel in range(values.shape[1]):
+                lit[m, channel] = (values[m, channel] - offsets[k, channel]) / (1.0 + gains[k, channel])
+    return lit

@@ -15,6 +15,7 @@ from numba import njit
 
 from anglecam.camera.lens import Lens
 from anglecam.data.typing import Floats, Image
+from anglecam.threads import map_in_threads
 from anglecam.vision.image.transforms import rotate_each, rotation
 from anglecam.vision.registration.appearance import TileViews
 from anglecam.vision.registration.axis_view import AxisView
@@ -124,6 +125,34 @@ def view_tiles(
         centres.append(middles)
     starts = np.append(0, np.cumsum(np.concatenate(counts)))
     return TileViews(np.concatenate(offsets), np.concatenate(values), starts), np.concatenate(centres)
+
+
+def collect_tiles(
+    corners: Floats, heights: Floats, frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats
+) -> list[TileViews]:
+    """Collect the pixels of each tile from all frames.
+
+    Parameters
+    ----------
+    corners, heights, frames, plane, pivot_px
+        As in `view_tiles`.
+
+    Returns
+    -------
+    list of TileViews
+        One for each tile, with a view of every frame.
+    """
+    of_frames = map_in_threads(lambda f: view_tiles(corners, heights, [f], plane, pivot_px)[0], frames)
+
+    def of_tile(t: int) -> TileViews:
+        parts = [slice(v.starts[t], v.starts[t + 1]) for v in of_frames]
+        return TileViews(
+            np.concatenate([v.offsets[part] for v, part in zip(of_frames, parts, strict=True)]),
+            np.concatenate([v.values[part] for v, part in zip(of_frames, parts, strict=True)]),
+            np.append(0, np.cumsum([part.stop - part.start for part in parts])),
+        )
+
+    return [of_tile(t) for t in range(len(corners))]
 
 
 @njit(cache=True, nogil=True)
