@@ -37,8 +37,12 @@ _MAX_HEIGHT = 0.3
 """Largest height of a part of the body, as a share of half the picture's diagonal."""
 _HEIGHT_STEP_PX = 1.0
 """Displacement between neighbouring heights that are tried, px."""
-_STRIP_ROWS = 16
-"""Rows of a strip of pictures that are superposed at a time."""
+_PILE_ROWS = 16
+"""Rows of pictures that are superposed at a time: they fit into the processor's cache."""
+_INFORMATION_ROWS = 4 * TILE_SIDE_PX
+"""Rows of the picture whose gradients are computed at a time."""
+_MARGIN = 8
+"""Rows beyond them on which their gradients depend, at most."""
 
 
 def choose_tiles(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats, noise: float) -> Tiles:
@@ -64,16 +68,12 @@ def choose_tiles(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floa
     heights = _find_heights(frames, plane, pivot_px)
     mean, spread, whole = _stack(frames, plane, pivot_px, _by_pixel(heights, (height, width)))
     spread_as_filmed = _spread_as_filmed(frames)
-    smooth = cv2.GaussianBlur(mean, (0, 0), 0.7)
-    along_x, along_y = (
-        cv2.Scharr(smooth, cv2.CV_32F, *axis, scale=1 / 32).reshape(mean.shape) for axis in ((1, 0), (0, 1))
-    )
-    y, x = np.mgrid[0:height, 0:width].astype(np.float32)
-    arm_x, arm_y = (x - pivot_px[0])[..., None], (y - pivot_px[1])[..., None]
-    weight = whole[..., None] / (noise**2 + spread**2)
-    information = _by_tile(((along_y * arm_x - along_x * arm_y) ** 2 * weight).sum(axis=2)).sum(axis=(1, 3))
     noise_gradient = _NOISE_GRADIENT * (np.pi / 2.0) / len(frames) * noise**2  # the median's variance is π/2 the mean's
-    apparent = _by_tile((noise_gradient * (arm_x**2 + arm_y**2) * weight).sum(axis=2)).sum(axis=(1, 3))
+    weight = whole[..., None] / (noise**2 + spread**2)
+    parts = map_in_threads(
+        lambda rows: _information(mean, weight, pivot_px, noise_gradient, rows), _strips(height, _INFORMATION_ROWS)
+    )
+    information, apparent = (np.concatenate(part) for part in zip(*parts, strict=True))
     loose = _by_tile(((spread.max(axis=2) > _LOOSE * noise) | ~whole).astype(np.float32))
     rigid = loose.mean(axis=(1, 3)) < _MAX_LOOSE_SHARE
     # Scenery does not rotate: it varies less as filmed than rotated back.
@@ -138,7 +138,7 @@ def _stack(
             _exclude_outside(at, width, height, whole[rows])
         middle[rows], spread[rows] = median_and_spread(pile)
 
-    map_in_threads(fill, _strips(len(x)))
+    map_in_threads(fill, _strips(len(x), _PILE_ROWS))
     return middle, spread, whole
 
 
@@ -149,13 +149,30 @@ def _spread_as_filmed(frames: Sequence[FrameView]) -> Image:
     def fill(rows: slice) -> None:
         spread[rows] = median_and_spread(np.stack([f.image[rows] for f in frames]))[1]
 
-    map_in_threads(fill, _strips(len(spread)))
+    map_in_threads(fill, _strips(len(spread), _PILE_ROWS))
     return spread
 
 
-def _strips(rows: int) -> list[slice]:
-    """Return strips of a picture in which a pile of pictures fits into the processor's cache."""
-    return [slice(top, top + _STRIP_ROWS) for top in range(0, rows, _STRIP_ROWS)]
+def _information(
+    mean: Image, weight: Image, pivot_px: Floats, noise_gradient: float, rows: slice
+) -> tuple[Image, Image]:
+    """Return the information on the angle by tiles in rows of the picture, and what noise alone appears to have."""
+    wide = slice(max(rows.start - _MARGIN, 0), rows.stop + _MARGIN)
+    smooth = cv2.GaussianBlur(mean[wide], (0, 0), 0.7)
+    weight, top = weight[rows], rows.start - wide.start
+    along_x, along_y = (
+        cv2.Scharr(smooth, cv2.CV_32F, *axis, scale=1 / 32).reshape(mean[wide].shape)[top : top + len(weight)]
+        for axis in ((1, 0), (0, 1))
+    )
+    arm_x = (np.arange(weight.shape[1], dtype=np.float32) - pivot_px[0])[:, None]
+    arm_y = (np.arange(rows.start, rows.start + len(weight), dtype=np.float32) - pivot_px[1])[:, None, None]
+    of_tile = _by_tile(((along_y * arm_x - along_x * arm_y) ** 2 * weight).sum(axis=2)).sum(axis=(1, 3))
+    return of_tile, _by_tile((noise_gradient * (arm_x**2 + arm_y**2) * weight).sum(axis=2)).sum(axis=(1, 3))
+
+
+def _strips(rows: int, each: int) -> list[slice]:
+    """Return strips of so many rows of a picture."""
+    return [slice(top, top + each) for top in range(0, rows, each)]
 
 
 def _by_pixel(heights: Floats, shape: tuple[int, int]) -> float | Floats:
