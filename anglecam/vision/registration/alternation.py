@@ -7,7 +7,7 @@ by the share of it that the appearance absorbs. After the first rounds the steps
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -160,7 +160,7 @@ class Round:
 
 def alternate(data: Data, state: State) -> Round:
     """Alternate between appearance and state until the centres of rotation settle; return the last round."""
-    appearance = _learn_all(data, data.views, state)
+    appearance = _learn_all(data, data.views.__getitem__, state)
     now = one_round(data, state, appearance, None, np.ones(len(appearance)))
     accelerated, origin = _acceleration(data.axis), state
     for done in range(1, _MAX_ROUNDS):
@@ -210,7 +210,10 @@ def one_round(
     views, centres = data.seen(state), data.centres(state)
     before = compare_all(appearance, views, state.turns, centres) if before is None else before
     out = _hidden(before) if hidden is None else hidden
-    kept = [equalise_brightness(v, light).without(o) for v, light, o in zip(views, before.light, out, strict=True)]
+
+    def kept(t: int) -> TileViews:
+        return equalise_brightness(views[t], before.light[t]).without(out[t])
+
     appearance = _learn_all(data, kept, state, [t.gains[0] for t in appearance])
     all_fits = compare_all(appearance, views, state.turns, centres)
     fits = all_fits.without(out)
@@ -253,17 +256,17 @@ def _variance(values: Floats, error: Floats, before: float, least: float) -> flo
 
 
 def _learn_all(
-    data: Data, views: Sequence[TileViews], state: State, gains: Sequence[Floats | None] | None = None
+    data: Data, views: Callable[[int], TileViews], state: State, gains: Sequence[Floats | None] | None = None
 ) -> list[TileAppearance]:
-    """Learn every tile in a state from views with offsets from its centres."""
-    parallax, gains = data.axis_in(state).parallax, [None] * len(views) if gains is None else gains
-    centres, leans = data.centres(state), state.centres.leans
+    """Learn every tile in a state from its views, by its number, with offsets from its centre."""
+    parallax, centres, leans = data.axis_in(state).parallax, data.centres(state), state.centres.leans
+    gains = [None] * len(data.views) if gains is None else gains
 
     def learnt(t: int) -> TileAppearance:
         corner = data.tiles.corners[t]
-        return learn_tile(corner, TILE_SIDE_PX, views[t], state.turns, centres[t], parallax, leans[t], gains[t])
+        return learn_tile(corner, TILE_SIDE_PX, views(t), state.turns, centres[t], parallax, leans[t], gains[t])
 
-    return map_in_threads(learnt, range(len(views)))
+    return map_in_threads(learnt, range(len(data.views)))
 
 
 def compare_all(

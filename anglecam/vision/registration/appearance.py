@@ -16,10 +16,11 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.linalg import solveh_banded
 
 from anglecam.data.typing import Floats, Integers
-from anglecam.vision.registration.kernels import gain_equations, normal_equations, place_on_tiles
+from anglecam.vision.registration.kernels import place_on_tile, place_on_tiles, relight, sort_by_cell
+from anglecam.vision.registration.learn_kernel import gain_equations, spline_equations
 from anglecam.vision.registration.turn_kernel import turn_equations
 
 KNOT_SPACING_PX = 0.5
@@ -127,13 +128,13 @@ def learn_tile(
     """
     n = round(side / KNOT_SPACING_PX) + 3
     start = np.zeros((GAIN_POWERS, 3)) if gains is None else gains
-    seen, place = (views.offsets, views.values, views.starts, turns, pivot, corner, side), (parallax, lean)
-    band, right = normal_equations(*seen, n, start, *place)
-    lower = _as_lower_band(band, n) + _SMOOTHNESS * _roughness(n)
-    lower[0] += _RIDGE
-    factor = cholesky_banded(lower, lower=True, overwrite_ab=True)
-    coefficients = cho_solve_banded((factor, True), right.T).T.reshape(-1, n, n)
-    normal, gradient = gain_equations(*seen, coefficients, *place)
+    placed = place_on_tile(views.offsets, views.starts, turns, pivot, corner, side, start, parallax, lean)
+    order, begins = sort_by_cell(placed, side, n - 3)
+    band, right = spline_equations(views.values, placed, order, begins, side, n)
+    band += _regularisation(n)
+    options = {"overwrite_ab": True, "overwrite_b": True, "lower": True, "check_finite": False}
+    coefficients = np.ascontiguousarray(solveh_banded(band.T, right.T, **options).T).reshape(-1, n, n)
+    normal, gradient = gain_equations(views.values, placed, order, begins, views.starts, turns, side, coefficients)
     fitted = np.linalg.lstsq(normal, gradient, rcond=1e-9)[0].reshape(1, GAIN_POWERS, 3)
     return TileAppearance(corner[None], side, coefficients[None], fitted, lean[None], parallax)
 
@@ -192,8 +193,7 @@ def equalise_brightness(views: TileViews, light: Floats) -> TileViews:
         With values as if all had been lit alike.
     """
     difference = light - light.mean(axis=0)
-    each = np.repeat(difference, np.diff(views.starts), axis=0)
-    return replace(views, values=((views.values - each[..., 1]) / (1.0 + each[..., 0])).astype(np.float32))
+    return replace(views, values=relight(views.values, views.starts, difference[..., 0], difference[..., 1]))
 
 
 def compare_tiles(tiles: TileAppearance, views: TileViews, turns: Floats, pivots: Floats) -> TileFit:
@@ -235,23 +235,17 @@ def compare_tiles(tiles: TileAppearance, views: TileViews, turns: Floats, pivots
     )
 
 
-def _as_lower_band(near: Floats, n: int) -> Floats:
-    """Arrange the products of neighbouring splines as LAPACK's lower band, column by column."""
-    lower = np.zeros((3 * n + 4, n * n))
-    for k in range(25):  # rows of seven neighbours, starting with the coefficient itself
-        down, across = (k + 3) // 7, (k + 3) % 7 - 3
-        shift = down * n + across
-        lower[shift, : n * n - shift] = near[: n * n - shift, k]
-    return lower
-
-
 @lru_cache
-def _roughness(n: int) -> Floats:
-    """Return the quadratic form of the coefficients' second differences along both axes, as a lower band."""
+def _regularisation(n: int) -> Floats:
+    """Return the quadratic form of the coefficients' second differences along both axes, and a small ridge.
+
+    It is a band (n², 3·n + 4) as from `anglecam.vision.registration.learn_kernel.spline_equations`.
+    """
     second = np.diff(np.eye(n), 2, axis=0)
     once = second.T @ second
     whole = np.kron(np.eye(n), once) + np.kron(once, np.eye(n))
-    lower = np.zeros((3 * n + 4, n * n))
+    band = np.zeros((n * n, 3 * n + 4))
     for shift in (0, 1, 2, n, 2 * n):
-        lower[shift, : n * n - shift] = np.diagonal(whole, -shift)
-    return lower
+        band[: n * n - shift, shift] = _SMOOTHNESS * np.diagonal(whole, -shift)
+    band[:, 0] += _RIDGE
+    return band

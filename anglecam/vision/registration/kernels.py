@@ -1,7 +1,4 @@
-"""Compiled sums over pixels for the appearance of tiles, which are cubic B-splines.
-
-A pixel at an offset from the centre of rotation is rotated onto the tile, where its value is a weighted sum of the
-4 × 4 coefficients around it.
+"""Compiled work on the pixels of tiles: their rotation onto the tiles, their order, their brightness.
 
 No compiled function here calls one of another file, so that the compiler's cache is never out of date.
 """
@@ -10,12 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-
-
-@njit(cache=True, inline="always")
-def _weights(u):  # type: ignore[no-untyped-def]
-    v = 1 - u
-    return v**3 / 6, (3 * u**3 - 6 * u**2 + 4) / 6, (3 * v**3 - 6 * v**2 + 4) / 6, u**3 / 6
 
 
 @njit(cache=True, inline="always")
@@ -40,132 +31,19 @@ def _leaning(c, s, parallax, lean, across):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def normal_equations(offsets, values, starts, turns, pivot, corner, side, n, gains, parallax, lean):  # type: ignore[no-untyped-def]
-    """Accumulate the normal equations for a tile's coefficients from views at known turns and gains.
-
-    Parameters
-    ----------
-    offsets, values, starts : ndarray
-        Of the views, see `anglecam.vision.registration.appearance.TileViews`.
-    turns : ndarray
-        (views,) rad.
-    pivot, corner : ndarray
-        (2,) centre of rotation and upper left corner of the tile, px.
-    side : int
-        Side of the tile, px.
-    n : int
-        Number of coefficients along a side.
-    gains : ndarray
-        (powers, 3) coefficients of the gain.
-    parallax, lean : ndarray
-        (2,) displacement of the centre for each px of height, and gradient of the height over the tile.
-
-    Returns
-    -------
-    tuple of ndarray
-        (n², 25) products of each coefficient's spline with itself and with the splines of those of its 7 × 7
-        neighbours that come after it (the matrix is symmetric), and (planes, n²) right sides.
-    """
-    band = np.zeros((n * n, 25))
-    planes = values.shape[1]
-    right = np.zeros((planes, n * n))
-    wx, wy, across = np.zeros(4), np.zeros(4), np.zeros(4)
-    scale = (n - 3) / side
-    for k in range(len(turns)):
-        c, s = np.cos(turns[k]), np.sin(turns[k])
-        _leaning(c, s, parallax, lean, across)
-        for m in range(starts[k], starts[k + 1]):
-            x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1] - corner[0]
-            y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1] - corner[1]
-            rise = across[2] * (x - side / 2) + across[3] * (y - side / 2)
-            x, y = x + across[0] * rise, y + across[1] * rise
-            if x < 0 or y < 0 or x >= side or y >= side:
-                continue
-            g = _gain(gains, turns[k], 2 * x / side - 1, 2 * y / side - 1)
-            ux, uy = x * scale, y * scale
-            ix, iy = int(ux), int(uy)
-            wx[0], wx[1], wx[2], wx[3] = _weights(ux - ix)
-            wy[0], wy[1], wy[2], wy[3] = _weights(uy - iy)
-            for j in range(4):
-                for i in range(4):
-                    w = g * wx[i] * wy[j]
-                    p = (iy + j) * n + ix + i
-                    for channel in range(planes):
-                        right[channel, p] += w * values[m, channel]
-                    for ii in range(i, 4):
-                        band[p, ii - i] += w * g * wx[ii] * wy[j]
-                    for jj in range(j + 1, 4):
-                        for ii in range(4):
-                            band[p, (jj - j) * 7 + ii - i] += w * g * wx[ii] * wy[jj]
-    return band, right
-
-
-@njit(cache=True, nogil=True)
-def gain_equations(offsets, values, starts, turns, pivot, corner, side, coefficients, parallax, lean):  # type: ignore[no-untyped-def]
-    """Accumulate the normal equations for a tile's gain, with the coefficients given.
-
-    Parameters
-    ----------
-    offsets, values, starts, turns, pivot, corner, side, parallax, lean
-        As in `normal_equations`.
-    coefficients : ndarray
-        (planes, n, n), y first.
-
-    Returns
-    -------
-    tuple of ndarray
-        Normal matrix (9, 9) and right side (9,), for constant, x and y of the first power of the turn, and so on.
-    """
-    n = coefficients.shape[1]
-    terms = 3 * 3
-    normal, gradient, basis, across = np.zeros((terms, terms)), np.zeros(terms), np.zeros(terms), np.zeros(4)
-    scale = (n - 3) / side
-    for k in range(len(turns)):
-        c, s = np.cos(turns[k]), np.sin(turns[k])
-        _leaning(c, s, parallax, lean, across)
-        for m in range(starts[k], starts[k + 1]):
-            x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1] - corner[0]
-            y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1] - corner[1]
-            rise = across[2] * (x - side / 2) + across[3] * (y - side / 2)
-            x, y = x + across[0] * rise, y + across[1] * rise
-            if x < 0 or y < 0 or x >= side or y >= side:
-                continue
-            ux, uy = x * scale, y * scale
-            ix, iy = int(ux), int(uy)
-            wx, wy = _weights(ux - ix), _weights(uy - iy)
-            square, product = 0.0, 0.0
-            for channel in range(coefficients.shape[0]):
-                level = 0.0
-                for j in range(4):
-                    for i in range(4):
-                        level += wx[i] * wy[j] * coefficients[channel, iy + j, ix + i]
-                square += level * level
-                product += level * (values[m, channel] - level)
-            power = 1.0
-            for p in range(3):
-                power *= turns[k]
-                basis[3 * p] = power
-                basis[3 * p + 1] = power * (2 * x / side - 1)
-                basis[3 * p + 2] = power * (2 * y / side - 1)
-            for a in range(terms):
-                gradient[a] += basis[a] * product
-                weighted = basis[a] * square
-                for b in range(a, terms):
-                    normal[a, b] += weighted * basis[b]
-    for a in range(terms):
-        for b in range(a):
-            normal[a, b] = normal[b, a]
-    return normal, gradient
-
-
-@njit(cache=True, nogil=True)
 def place_on_tiles(offsets, starts, turns, pivots, corners, side, all_gains, parallax, leans):  # type: ignore[no-untyped-def]
     """Rotate the pixels of views onto their tiles.
 
     Parameters
     ----------
-    offsets, starts, turns, side, parallax
-        As in `normal_equations`.
+    offsets, starts : ndarray
+        Of the views, see `anglecam.vision.registration.appearance.TileViews`.
+    turns : ndarray
+        (views,) rad.
+    side : int
+        Side of a tile, px.
+    parallax : ndarray
+        (2,) displacement of the centre for each px of height.
     pivots, corners, all_gains, leans : ndarray
         (tiles, …) of one tile, or of one tile for each view.
 
@@ -190,3 +68,114 @@ def place_on_tiles(offsets, starts, turns, pivots, corners, side, all_gains, par
             places[m, 0], places[m, 1] = x + across[0] * rise, y + across[1] * rise
             gains[m] = _gain(all_gains[p], turns[k], 2 * places[m, 0] / side - 1, 2 * places[m, 1] / side - 1)
     return places, away, gains, rises
+
+
+@njit(cache=True, nogil=True, fastmath={"contract"})
+def place_on_tile(offsets, starts, turns, pivot, corner, side, gains, parallax, lean):  # type: ignore[no-untyped-def]
+    """Rotate the pixels of views onto one tile.
+
+    Parameters
+    ----------
+    offsets, starts : ndarray
+        Of the views, see `anglecam.vision.registration.appearance.TileViews`.
+    turns : ndarray
+        (views,) rad.
+    pivot, corner : ndarray
+        (2,) centre of rotation and upper left corner of the tile, px.
+    side : int
+        Side of the tile, px.
+    gains : ndarray
+        (powers, 3) coefficients of the gain.
+    parallax, lean : ndarray
+        (2,) displacement of the centre for each px of height, and gradient of the height over the tile.
+
+    Returns
+    -------
+    ndarray
+        (3, m) x and y from the tile's corner, px, and the gain.
+    """
+    placed = np.empty((3, len(offsets)))
+    left, top, half = pivot[0] - corner[0], pivot[1] - corner[1], side / 2
+    for k in range(len(turns)):
+        c, s = np.cos(turns[k]), np.sin(turns[k])
+        # A point whose height exceeds the tile's by δ is displaced by (1 − R)·p·δ, and δ = lean·(point − middle).
+        across, down = (1 - c) * parallax[0] + s * parallax[1], (1 - c) * parallax[1] - s * parallax[0]
+        rest = 1 - lean[0] * across - lean[1] * down
+        constant, by_x, by_y, power = 1.0, 0.0, 0.0, 1.0
+        for p in range(gains.shape[0]):
+            power *= turns[k]
+            constant, by_x, by_y = (
+                constant + power * gains[p, 0],
+                by_x + power * gains[p, 1],
+                by_y + power * gains[p, 2],
+            )
+        for m in range(starts[k], starts[k + 1]):
+            x = left + c * offsets[m, 0] - s * offsets[m, 1]
+            y = top + s * offsets[m, 0] + c * offsets[m, 1]
+            rise = (lean[0] * (x - half) + lean[1] * (y - half)) / rest
+            x, y = x + across * rise, y + down * rise
+            placed[0, m], placed[1, m] = x, y
+            placed[2, m] = constant + by_x * (x / half - 1) + by_y * (y / half - 1)
+    return placed
+
+
+@njit(cache=True, nogil=True)
+def sort_by_cell(placed, side, cells):  # type: ignore[no-untyped-def]
+    """Sort the pixels on a tile by the knots between which they lie.
+
+    Parameters
+    ----------
+    placed : ndarray
+        (3, m) from `place_on_tile`.
+    side : int
+        Side of the tile, px.
+    cells : int
+        Intervals between the knots along a side.
+
+    Returns
+    -------
+    tuple of ndarray
+        Numbers of the pixels that are on the tile, by rows of cells, and (cells² + 1,) where each cell's begin.
+    """
+    cell, begins = np.empty(placed.shape[1], np.int32), np.zeros(cells * cells + 1, np.int64)
+    scale = cells / side
+    for m in range(placed.shape[1]):
+        x, y = placed[0, m], placed[1, m]
+        inside = x >= 0 and y >= 0 and x < side and y < side
+        cell[m] = int(y * scale) * cells + int(x * scale) if inside else -1
+        if inside:
+            begins[cell[m] + 1] += 1
+    for k in range(cells * cells):
+        begins[k + 1] += begins[k]
+    order, filled = np.empty(begins[-1], np.int64), begins[:-1].copy()
+    for m in range(placed.shape[1]):
+        if cell[m] >= 0:
+            order[filled[cell[m]]] = m
+            filled[cell[m]] += 1
+    return order, begins
+
+
+@njit(cache=True, nogil=True)
+def relight(values, starts, gains, offsets):  # type: ignore[no-untyped-def]
+    """Remove from each view a relative gain and an offset of brightness.
+
+    Parameters
+    ----------
+    values : ndarray
+        (m, planes) single precision, grey levels.
+    starts : ndarray
+        (views + 1,) index at which each view's pixels begin.
+    gains, offsets : ndarray
+        (views, planes) gain less 1, and offset in grey levels.
+
+    Returns
+    -------
+    ndarray
+        (m, planes) single precision.
+    """
+    lit = np.empty_like(values)
+    for k in range(len(starts) - 1):
+        for m in range(starts[k], starts[k + 1]):
+            for channel in range(values.shape[1]):
+                lit[m, channel] = (values[m, channel] - offsets[k, channel]) / (1.0 + gains[k, channel])
+    return lit

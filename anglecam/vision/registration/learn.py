@@ -34,13 +34,13 @@ from anglecam.vision.registration.centre_equations import (
     excess_displacement,
 )
 from anglecam.vision.registration.own_centres import have_own_centres
+from anglecam.vision.registration.tile_choice import choose_tiles
 from anglecam.vision.registration.tiles import (
     TILE_SIDE_PX,
     FrameView,
     MotionPlane,
     Tiles,
-    choose_tiles,
-    view_tiles,
+    collect_tiles,
 )
 from anglecam.vision.registration.turn import BodyAppearance, group_scatter
 
@@ -86,16 +86,17 @@ def learn_body(
     if len(tiles.corners) < _FEWEST_TILES:
         return None
     data, last = _learn(frames, tiles, plane, pivot)
+    end = _at_the_end(data, last)
     if not plane.axis.parallax.any():
         height, width = frames[0].image.shape[:2]
         deep = replace(plane, axis=axis_in_perspective(plane.lens, (width, height), pivot.centre_px))
-        normal, gradient = _at_the_end(data, last)
         arms = tiles.corners + TILE_SIDE_PX / 2 - data.centres(last.state)
-        if have_own_centres(normal, gradient, last.state.turns, arms, deep.axis.parallax):
+        if have_own_centres(*end, last.state.turns, arms, deep.axis.parallax):
             tiles = choose_tiles(stack, deep, pivot.centre_px, noise)
             if len(tiles.corners) >= _FEWEST_TILES:
                 plane, (data, last) = deep, _learn(frames, tiles, deep, pivot)
-    return _body(data, last, plane, moving=frames[0].pivot_covariance_px2 is not None)
+                end = _at_the_end(data, last)
+    return _body(data, last, end, plane, moving=frames[0].pivot_covariance_px2 is not None)
 
 
 def _learn(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot: PivotEstimate) -> tuple[Data, Round]:
@@ -105,9 +106,7 @@ def _learn(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot:
     prior[PIVOT, PIVOT] = np.linalg.inv(pivot.covariance_px2)
     if plane.axis.estimated:
         prior[DIRECTION, DIRECTION] = plane.axis.direction_sigma**-2
-    views = [
-        view_tiles(c[None], h[None], frames, plane, start)[0] for c, h in zip(tiles.corners, tiles.heights, strict=True)
-    ]
+    views = collect_tiles(tiles.corners, tiles.heights, frames, plane, start)
     data = Data(tiles, views, start, plane.axis, prior)
     return data, alternate(data, _first_state(frames, tiles, plane, start))
 
@@ -128,12 +127,12 @@ def _at_the_end(data: Data, last: Round) -> tuple[Floats, Floats]:
     return fits.without(last.hidden).weighted(last.variance * last.excess)
 
 
-def _body(data: Data, last: Round, plane: MotionPlane, moving: bool) -> BodyAppearance:
+def _body(data: Data, last: Round, end: tuple[Floats, Floats], plane: MotionPlane, moving: bool) -> BodyAppearance:
     """Return the body of the last round with its uncertainties."""
+    normal, gradient = end
     absorbed_of_turns = _absorbed_of_turns(data, last)
     absorbed = float(np.clip(max(absorbed_of_turns, _absorbed_of_pivot(data, last)), 0.0, MAX_RATIO))
     state, covariance = last.state, last.covariance / (1.0 - absorbed)
-    normal, gradient = _at_the_end(data, last)
     corners = data.tiles.corners
     groups = group_neighbours(corners, _GROUPS)
     total, freedom = group_scatter(normal, gradient, groups)
