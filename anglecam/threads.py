@@ -36,7 +36,7 @@ def map_in_threads(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
     threads = native_threads()
     if threads == 1:
         return [work(item) for item in items]
-    with ThreadPoolExecutor(threads) as pool:
+    with one_opencv_thread(), ThreadPoolExecutor(threads) as pool:
         return list(pool.map(work, items))
 
 

@@ -131,16 +131,16 @@ def _joined_runs(values, highest, level):  # type: ignore[no-untyped-def]
     table[:, _BLOCK] = height * width
     for y in range(height):
         for k in range(row_begins[y], row_begins[y + 1]):
-            p, left, right = which[k], np.int64(start[k]), np.int64(stop[k])
+            p, begin, end = which[k], np.int64(start[k]), np.int64(stop[k])
             if table[p, _AREA] == 0:
-                table[p, _TOP], table[p, _FIRST_X], table[p, _FIRST_Y] = y, left, y
-            table[p, _LEFT] = min(table[p, _LEFT], left)
-            table[p, _RIGHT] = max(table[p, _RIGHT], right)
+                table[p, _TOP], table[p, _FIRST_X], table[p, _FIRST_Y] = y, begin, y
+            table[p, _LEFT] = min(table[p, _LEFT], begin)
+            table[p, _RIGHT] = max(table[p, _RIGHT], end)
             table[p, _BOTTOM] = y + 1
-            table[p, _AREA] += right - left
-            table[p, _BLOCK] = min(table[p, _BLOCK], (y // 2) * width + left // 2)
-            sums[p, 0] += (left + right - 1) * (right - left) // 2
-            sums[p, 1] += y * (right - left)
+            table[p, _AREA] += end - begin
+            table[p, _BLOCK] = min(table[p, _BLOCK], (y // 2) * width + begin // 2)
+            sums[p, 0] += (begin + end - 1) * (end - begin) // 2
+            sums[p, 1] += y * (end - begin)
     return table, sums
 
 
