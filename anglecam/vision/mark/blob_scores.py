@@ -51,9 +51,7 @@ def score_circles(
         (n, frames) index of the blob of each picture, -1 where it has none.
     """
     alike = np.log(blobs.area), np.log(np.maximum(blobs.contrast, _LEAST_CONTRAST))
-    return _scored(  # type: ignore[no-any-return]
-        blobs.frame, blobs.plane_px, blobs.area, blobs.contrast, *alike, draws, centres_px, radii_px, frames
-    )
+    return _scored(blobs.frame, blobs.plane_px, blobs.area, blobs.contrast, *alike, draws, centres_px, radii_px, frames)
 
 
 @njit(cache=True, nogil=True)
@@ -76,7 +74,7 @@ def score_blobs(area: Floats, contrast: Floats, share: float, extent_px: float) 
     """
     constancy = np.exp(-4.0 * np.std(np.log(area)))
     travel = 1.0 - np.exp(-extent_px / 10.0)
-    return share**2 * np.median(contrast) * constancy * np.median(area) ** 0.25 * (0.1 + travel)  # type: ignore[no-any-return]
+    return share**2 * np.median(contrast) * constancy * np.median(area) ** 0.25 * (0.1 + travel)
 
 
 @njit(cache=True, nogil=True)
