@@ -51,9 +51,7 @@ def score_circles(
         (n, frames) index of the blob of each picture, -1 where it has none.
     """
     alike = np.log(blobs.area), np.log(np.maximum(blobs.contrast, _LEAST_CONTRAST))
-    return _scored(
-        blobs.frame, blobs.plane_px, blobs.area, blobs.contrast, *alike, draws, centres_px, radii_px, frames
-    )
+    return _scored(blobs.frame, blobs.plane_px, blobs.area, blobs.contrast, *alike, draws, centres_px, radii_px, frames)
 
 
 @njit(cache=True, nogil=True)

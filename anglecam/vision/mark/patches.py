@@ -93,10 +93,10 @@ def _joined_runs(values, highest, level):  # type: ignore[no-untyped-def]
         row = values[y]
         inside = False
         for k in range(highest.shape[1]):
-            left, right = k * _STRIP_PX, min((k + 1) * _STRIP_PX, width)
+            begin, end = k * _STRIP_PX, min((k + 1) * _STRIP_PX, width)
             if not highest[y, k] > level:
-                right = left + 1 if inside else left  # a run ends at the strip's first pixel
-            for x in range(left, right):
+                end = begin + 1 if inside else begin  # a run ends at the strip's first pixel
+            for x in range(begin, end):
                 if (row[x] > level) != inside:
                     if inside:
                         stop[runs] = x
@@ -107,7 +107,8 @@ def _joined_runs(values, highest, level):  # type: ignore[no-untyped-def]
         if inside:
             stop[runs] = width
             runs += 1
-        above, begins = (row_begins[y - 1] if y else 0), row_begins[y]
+        begins = row_begins[y]
+        above = row_begins[y - 1] if y else begins
         for run in range(begins, runs):
             parent[run] = run
             # runs of the row above that end before this one begins touch no later one
