@@ -93,10 +93,10 @@ def _joined_runs(values, highest, level):  # type: ignore[no-untyped-def]
         row = values[y]
         inside = False
         for k in range(highest.shape[1]):
-            begin, end = k * _STRIP_PX, min((k + 1) * _STRIP_PX, width)
+            left, right = k * _STRIP_PX, min((k + 1) * _STRIP_PX, width)
             if not highest[y, k] > level:
-                end = begin + 1 if inside else begin  # a run ends at the strip's first pixel
-            for x in range(begin, end):
+                right = left + 1 if inside else left  # a run ends at the strip's first pixel
+            for x in range(left, right):
                 if (row[x] > level) != inside:
                     if inside:
                         stop[runs] = x
