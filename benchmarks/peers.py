@@ -220,7 +220,7 @@ def main(seconds: float) -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         films = [shoot(folder / f"{codec}", camera, seconds) for codec, camera in CAMERAS.items()]
-        warm = shoot(folder / "warm", CAMERAS["MJPEG"], 1.5)
+        warm = shoot(folder / "warm", CAMERAS["MJPEG"], 4.0)
         print("| |", " ".join(f"{codec}, ° RMS | frames/s |" for codec in CAMERAS), "frames lost |")
         print("| --- " * (2 * len(films) + 2) + "|")
         for _, method in there:
