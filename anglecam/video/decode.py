@@ -10,7 +10,6 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
-from typing import Literal
 
 import av
 from av.video.frame import PictureType
@@ -27,12 +26,11 @@ Row = tuple[float, av.VideoFrame | None]
 
 PREDICTING_CODECS = ("h264", "hevc")
 """Pictures of these are predicted from others. Several are decoded at once, each by a thread, since they are seldom cut
-into slices; those from which no other is predicted can be left out."""
+into slices; where key frames suffice, the others can be left out."""
 _PREDICTED_FROM = 16
 """A picture is predicted from none that is shown more than so many places later: these codecs keep no more."""
 INTRA_CODECS = ("mjpeg", "prores", "dnxhd", "huffyuv", "ffvhuff", "utvideo", "rawvideo")
 """Every packet of these is a picture of its own, which is decoded without the others."""
-Skipped = Literal["NONKEY", "NONREF"]
 Wants = Callable[[int], bool]
 """Whether the picture of the row with a given number is wanted; the first row has 0."""
 
@@ -84,16 +82,13 @@ def decode(path: Path, wants: Wants | None = None) -> Iterator[Row]:
         yield from islice(decode_container(path, container, wants), intact, None)
 
 
-def decode_some(path: Path, skipped: Skipped) -> Iterator[Row]:
-    """Yield a film's rows, some of them without a picture: those that the decoder skips or cannot decode.
+def decode_keys(path: Path) -> Iterator[Row]:
+    """Yield a film's rows, those alone with a picture that are decoded without any other.
 
     Parameters
     ----------
     path : Path
         The film; its container states when each packet is presented.
-    skipped : {'NONKEY', 'NONREF'}
-        FFmpeg's name of the pictures to skip: ``NONKEY`` leaves those that need no other, ``NONREF`` all from which
-        others are predicted.
 
     Yields
     ------
@@ -106,15 +101,15 @@ def decode_some(path: Path, skipped: Skipped) -> Iterator[Row]:
         As `decode`.
     """
     with open_container(path) as container:
-        container.streams.video[0].codec_context.skip_frame = skipped
+        container.streams.video[0].codec_context.skip_frame = "NONKEY"
         for time, picture in decode_container(path, container, threads="FRAME"):
             # a stream that is refreshed in strips has key frames that need others
-            needs_others = skipped == "NONKEY" and picture is not None and picture.pict_type != PictureType.I
-            yield time, None if needs_others else picture
+            alone = picture is not None and picture.pict_type == PictureType.I
+            yield time, picture if alone else None
 
 
 def may_skip(container: av.container.InputContainer) -> bool:
-    """Return whether `decode_some` can decode a film: AVI does not state which pictures are missing."""
+    """Return whether `decode_keys` can decode a film: AVI does not state which pictures are missing."""
     return container.format.name != "avi" and container.streams.video[0].codec_context.name in PREDICTING_CODECS
 
 

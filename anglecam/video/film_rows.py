@@ -15,7 +15,7 @@ import av
 
 from anglecam.errors import InputError
 from anglecam.io.rig import RigFrames
-from anglecam.video.decode import Row, Skipped, Wants
+from anglecam.video.decode import Row, Wants
 
 MOST_BYTES = 256 * 2**20
 """Of decoded pictures: 220 lossless ones of 640 × 480 px, 580 of an ordinary codec."""
@@ -25,9 +25,6 @@ _FEWEST = 16
 """Rows of which none is dropped, however large their pictures are."""
 _LARGEST_GAP = 2.0
 """Between rows that are decoded, relative to the spacing of half of `MOST_SPREAD` rows."""
-SKIPPED: tuple[Skipped, ...] = ("NONKEY", "NONREF")
-"""Kinds of pictures that may be left out when evenly spaced rows are taken, those first that leave out most; see
-`anglecam.video.decode.decode_some`."""
 
 
 @dataclass
@@ -76,8 +73,8 @@ class FilmRows:
         Whether each picture is decoded without the others, so that some can be left out.
     declared_bytes : int
         Memory of all pictures, as many as the container states; 0 where that is not to be relied on.
-    decode_some : callable, optional
-        Decodes the rows without the pictures of one of the kinds in `SKIPPED`.
+    decode_keys : callable, optional
+        Decodes the rows, those alone with a picture that need no other.
     """
 
     def __init__(
@@ -87,12 +84,12 @@ class FilmRows:
         wanted: RigFrames | None = None,
         independent: bool = False,
         declared_bytes: int = 0,
-        decode_some: Callable[[Skipped], Iterator[Row]] | None = None,
+        decode_keys: Callable[[], Iterator[Row]] | None = None,
     ) -> None:
         self.wanted = RigFrames() if wanted is None else wanted
         self.first = self.wanted.first or 0
         self._path, self._decode, self._independent, self._declared_bytes = path, decode, independent, declared_bytes
-        self._decode_some = decode_some
+        self._decode_keys = decode_keys
         self._times: list[float] | None = None
         self._undecodable = self._interlaced = self._count = 0
         self._kept: KeptRows | None = None
@@ -182,17 +179,14 @@ class FilmRows:
         if self._independent:
             kept = KeptRows()
             self._kept, (self._count, _) = kept, _keep(kept, self._decoded(kept.wants))
-        if self._decode_some is None:
-            return
-        for skipped in SKIPPED:
+        elif self._decode_keys is not None:
             kept = KeptRows(stride=2)
             try:
-                count, gap = _keep(kept, self._wanted(self._decode_some(skipped)), pictures_only=True)
+                count, gap = _keep(kept, self._wanted(self._decode_keys()), pictures_only=True)
             except InputError:  # it is repeated where all pictures are decoded
                 return
             if gap <= _LARGEST_GAP * count / (MOST_SPREAD / 2):
                 self._kept, self._count = kept, count
-                return
 
     def _decoded(self, wants: Wants | None) -> Iterator[Row]:
         some = None if wants is None or not self._independent else lambda number: wants(number - self.first)

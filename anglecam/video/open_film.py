@@ -12,7 +12,7 @@ from anglecam.errors import RigError
 from anglecam.io.numbered_images import find_numbered_images
 from anglecam.io.rig import RigFrames
 from anglecam.video.container import open_container
-from anglecam.video.decode import INTRA_CODECS, Row, decode, decode_container, decode_some, may_skip
+from anglecam.video.decode import INTRA_CODECS, Row, decode, decode_container, decode_keys, may_skip
 from anglecam.video.display import Display, read_display
 from anglecam.video.fields import STILL_CODECS, is_bottom_first
 from anglecam.video.film import Film
@@ -58,8 +58,8 @@ def open_film(path: Path, frames: RigFrames | None = None) -> Film:
         independent = stream.codec_context.name in INTRA_CODECS
         cut_short = is_cut_short(path)
         declared_bytes = 0 if cut_short else declared * picture_bytes(picture)
-        some = partial(decode_some, path) if may_skip(container) else None
-        rows = FilmRows(path, partial(decode, path), wanted, independent, declared_bytes, some)
+        keys = partial(decode_keys, path) if may_skip(container) else None
+        rows = FilmRows(path, partial(decode, path), wanted, independent, declared_bytes, keys)
         return _film(path, stream, picture, size, form, rows, declared, cut_short)
 
 
