@@ -95,7 +95,7 @@ def place_on_tile(offsets, starts, turns, pivot, corner, side, gains, parallax, 
         (3, m) x and y from the tile's corner, px, and the gain.
     """
     placed = np.empty((3, len(offsets)))
-    left, top, half = pivot[0] - corner[0], pivot[1] - corner[1], side / 2
+    half = side / 2
     for k in range(len(turns)):
         c, s = np.cos(turns[k]), np.sin(turns[k])
         # A point whose height exceeds the tile's by δ is displaced by (1 − R)·p·δ, and δ = lean·(point − middle).
@@ -110,8 +110,9 @@ def place_on_tile(offsets, starts, turns, pivot, corner, side, gains, parallax, 
                 by_y + power * gains[p, 2],
             )
         for m in range(starts[k], starts[k + 1]):
-            x = left + c * offsets[m, 0] - s * offsets[m, 1]
-            y = top + s * offsets[m, 0] + c * offsets[m, 1]
+            # In this order whole pixels stay whole where nothing turns: those on the tile's edge belong to it.
+            x = pivot[0] + c * offsets[m, 0] - s * offsets[m, 1] - corner[0]
+            y = pivot[1] + s * offsets[m, 0] + c * offsets[m, 1] - corner[1]
             rise = (lean[0] * (x - half) + lean[1] * (y - half)) / rest
             x, y = x + across * rise, y + down * rise
             placed[0, m], placed[1, m] = x, y
