@@ -151,7 +151,7 @@ def at_the_truth(kinds: tuple[str, ...]) -> tuple[Floats, Floats]:
     records = exact(kinds)
     fit = fit_output_error(Plant(), records, [TRUE])
     bound = cramer_rao_bound(Plant(), TRUE, records, [np.zeros(2)] * len(records), SIGMA)
-    return bound, np.linalg.pinv(fit.jacobian)[:3]
+    return bound, np.linalg.pinv(fit.slopes.projected)
 
 
 def drawn(kinds: tuple[str, ...], seed: int) -> tuple[list[Record], Floats, Floats]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.identification.noise import autoregression
+from anglecam.identification.slopes import Slopes
 from anglecam.models.model import Model
 
 CLUSTER_FRAMES = 15
@@ -37,9 +38,8 @@ class Fit:
     """Nuisance parameters of each recording: initial states, then the zero (rad) unless it is declared."""
     residuals: tuple[Floats, ...] = field(repr=False)
     """Measured minus predicted angle of each recording, rad."""
-    jacobian: Floats = field(repr=False)
-    """(N, p + q) derivatives of the whitened predictions, not divided by σ, with respect to the p shared and all q
-    nuisance parameters."""
+    slopes: Slopes = field(repr=False)
+    """Derivatives of the whitened predictions, not divided by σ."""
     phi: float
     """AR(1) coefficient, frame to frame, of the noise model that the fit was whitened with."""
     white: Floats = field(repr=False)
@@ -98,9 +98,8 @@ class Fit:
             for start, stop in pairwise(edges)
             for i in range(start, stop, CLUSTER_FRAMES)
         ]
-        variance = self.cost / max(1, len(self.white) - jacobian.shape[1])
         product = [np.outer(self.white[part], self.white[part] @ jacobian[part]) for part in parts]
-        return np.concatenate(product) / variance * len(parts) / max(1, len(parts) - 1)
+        return np.concatenate(product) / self._variance * len(parts) / max(1, len(parts) - 1)
 
     def parameter_shift(self, records: Sequence[Record], errors: Sequence[Floats]) -> Floats:
         """Return the (p,) shift of each parameter, SI, that errors of the angles cause, to first order.
@@ -121,9 +120,8 @@ class Fit:
         free = self._sensitive & ~self._at_bound
         jacobian, norm = self._scaled(free)
         white = np.concatenate([whiten(r, self.phi, error) for r, error in zip(records, errors, strict=True)])
-        change = np.linalg.lstsq(jacobian, white, rcond=None)[0] / norm
         shift = np.full(len(self.parameters), np.nan)
-        shift[free] = change[: int(free.sum())]
+        shift[free] = np.linalg.lstsq(jacobian, white, rcond=None)[0] / norm
         return shift
 
     @property
@@ -134,26 +132,29 @@ class Fit:
 
     @property
     def _sensitive(self) -> NDArray[np.bool_]:
-        """(p,) whether the prediction changes with each parameter.
+        """(p,) whether the prediction changes with each parameter in a way that no nuisance parameter can follow.
 
         Stiction is an event: the joint either breaks away or stays stuck, so a small change of a break-away level may
         change nothing.
         """
-        return np.linalg.norm(self.jacobian[:, : len(self.parameters)], axis=0) > 0.0
+        return np.linalg.norm(self.slopes.projected, axis=0) > 0.0
 
     def _scaled(self, which: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-        """Return the Jacobian's columns of some shared and all nuisance parameters, normalised, and the norms."""
-        columns = np.concatenate([which, np.ones(self.jacobian.shape[1] - len(which), bool)])
-        norm = np.linalg.norm(self.jacobian[:, columns], axis=0)
-        norm[norm == 0.0] = 1.0
-        return self.jacobian[:, columns] / norm, norm
+        """Return the projected derivatives with respect to some shared parameters, normalised, and the norms."""
+        columns = self.slopes.projected[:, which]
+        norm = np.linalg.norm(columns, axis=0)
+        return columns / norm, norm
+
+    @property
+    def _variance(self) -> float:
+        """Variance of the whitened residuals, rad²."""
+        return self.cost / max(1, len(self.white) - self.slopes.rank)
 
     def _covariance(self, correlate: Callable[[Floats], Floats]) -> Floats:
         sensitive, at_bound = self._sensitive, self._at_bound
         jacobian, norm = self._scaled(sensitive)
-        variance = self.cost / max(1, len(self.white) - jacobian.shape[1])
         bread = np.linalg.pinv(jacobian.T @ jacobian)
-        covariance = variance * bread @ (jacobian.T @ correlate(jacobian)) @ bread / np.outer(norm, norm)
+        covariance = self._variance * bread @ (jacobian.T @ correlate(jacobian)) @ bread / np.outer(norm, norm)
         if (sensitive & at_bound).any():
             step = bread @ (jacobian.T @ self.white) / norm
             lower, upper = self.model.lower - self.parameters, self.model.upper - self.parameters

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from anglecam.data.record import Record
 from anglecam.data.runs import Runs, runs_of
 from anglecam.data.typing import Floats
+from anglecam.identification.slopes import Slopes
 from anglecam.models.model import Model
 from anglecam.models.plant import Plant
 
@@ -35,17 +36,6 @@ class Predicted:
     """(N,) rad; NaN where the model diverges."""
     motion: Floats | None
     """(N, 2) angle and rate of a `Plant`, before the camera's effects."""
-
-
-@dataclass(frozen=True)
-class Slopes:
-    """Derivatives of the whitened predictions of all recordings."""
-
-    shared: Floats
-    """(N, p) with respect to the shared parameters."""
-    own: Floats
-    """(N, k) with respect to the nuisance parameters of the recording that each row belongs to; zeros for a zero that
-    is declared."""
 
 
 @dataclass(frozen=True)
@@ -103,18 +93,6 @@ class Joined:
         """Return the (N,) whitened residuals, rad."""
         return self.whiten(self.angle - predicted.angle)
 
-    def dense(self, slopes: Slopes) -> Floats:
-        """Return the derivatives as (N, p + q): p shared parameters, and all q nuisance parameters in their order."""
-        count, owner, rows = slopes.shared.shape[1], self.runs.owner, np.arange(len(self.angle))
-        which = self.fitted(np.empty((len(self.runs.parts), slopes.own.shape[1])))
-        place = count + np.cumsum(which).reshape(which.shape) - 1
-        matrix = np.zeros((len(rows), count + int(which.sum())))
-        matrix[:, :count] = slopes.shared
-        for j in range(which.shape[1]):
-            has = which[owner, j]
-            matrix[rows[has], place[owner[has], j]] = slopes.own[has, j]
-        return matrix
-
     def whiten(self, values: Floats) -> Floats:
         """Whiten (N,) or (N, k) values of all recordings; see `anglecam.identification.fit.whiten`."""
         if not self.correlation.any():
@@ -160,7 +138,7 @@ class Joined:
             columns[:, j] = self._slope(started, here.angle, NUISANCE_STEP)
         if self.zero_fitted.any():
             columns[:, -1] = self.zero_fitted[self.runs.owner]  # the prediction contains the zero as a summand
-        return Slopes(self.whiten(shared), self.whiten(columns))
+        return Slopes(self.whiten(shared), self.whiten(columns), self.runs.edges)
 
     def _slope(self, shifted: Callable[[float], Floats], here: Floats, step: float) -> Floats:
         """Return the (N,) difference quotient; near divergence the other side is taken, or zeros."""

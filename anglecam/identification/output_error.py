@@ -11,22 +11,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import OptimizeResult, least_squares
 from threadpoolctl import ThreadpoolController
 
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit
-from anglecam.identification.joined import Joined, Predicted, join
+from anglecam.identification.joined import Joined, join
+from anglecam.identification.slopes import Slopes
+from anglecam.identification.variable_projection import fit_nuisance, fit_shared, point_at
 from anglecam.models.model import Model
 
-SETTLED = 1e-3
-"""Log-likelihood; a fit ends when its last `PATIENCE` steps have gained no more than this. Along a ridge it would
-otherwise continue with many tiny steps."""
-PATIENCE = 3
-"""Steps; with a kinked prediction one small step may precede a large one, so a single small step does not end a fit."""
 TRIAL_EVALUATIONS = 8
 """Evaluations of each of several starts before only the best of them is continued."""
 MAX_EVALUATIONS = 60
@@ -128,70 +125,20 @@ def output_error(
 def _fit_once(
     model: Model, joined: Joined, start: Floats, nuisance: Sequence[Floats], phi: float, fixed: bool, most: int
 ) -> Fit:
-    start = np.clip(start, model.lower, model.upper)
-    p, rows = len(start), len(joined.angle)
-    unknown = joined.fitted(joined.stack(nuisance))
-    x0 = np.concatenate([start, *nuisance])
-    latest: dict[bytes, Predicted] = {}
-
-    def split(x: Floats) -> tuple[Floats, Floats]:
-        own = np.zeros(unknown.shape)
-        own[unknown] = x[p:]
-        return x[:p], own
-
-    def predicted(x: Floats) -> Predicted:
-        """Predict all recordings; the last result is kept, as the Jacobian follows the errors at the same point."""
-        if x.tobytes() not in latest:
-            latest.clear()
-            latest[x.tobytes()] = joined.predict(model, *split(x))
-        return latest[x.tobytes()]
-
-    def errors(x: Floats) -> Floats:
-        return joined.errors(predicted(x))
-
-    def jacobian(x: Floats) -> Floats:
-        return -joined.dense(joined.slopes(model, *split(x), predicted(x), fixed=fixed))
-
-    free = np.arange(p if fixed else 0, len(x0))
-    lower, upper = np.full(len(x0), -np.inf), np.full(len(x0), np.inf)
-    lower[:p], upper[:p] = model.lower, model.upper
-
-    def full(x: Floats) -> Floats:
-        unknowns = x0.copy()
-        unknowns[free] = x
-        return unknowns
-
-    def fit_at(x: Floats, white: Floats, slopes: Floats) -> Fit:
-        parameters, own = split(x)
-        residuals = tuple(joined.runs.split(joined.angle - predicted(x).angle))
-        fitted = tuple(one[which] for one, which in zip(own, unknown, strict=True))
-        return Fit(model, parameters, fitted, residuals, slopes, phi, white)
-
-    inside = np.clip(x0, np.nextafter(lower, np.inf), np.nextafter(upper, -np.inf))
-    costs = [0.5 * float(np.sum(errors(inside) ** 2))]
-    if not math.isfinite(costs[0]):
-        return fit_at(x0, np.full(rows, np.inf), np.zeros((rows, len(x0))))
-
-    def settled(intermediate_result: OptimizeResult) -> None:
-        costs.append(intermediate_result.cost)
-        if len(costs) > PATIENCE and costs[-1 - PATIENCE] - costs[-1] <= 2.0 * SETTLED / rows * costs[-1]:
-            raise StopIteration
-
-    found = least_squares(
-        lambda x: errors(full(x)),
-        inside[free],
-        jac=lambda x: jacobian(full(x))[:, free],
-        bounds=(lower[free], upper[free]),
-        x_scale="jac",
-        xtol=1e-9,
-        ftol=1e-9,
-        gtol=1e-12,
-        max_nfev=most,
-        callback=settled,
-    )
-    slopes = np.zeros((rows, len(x0)))
-    slopes[:, free] = -found.jac
-    return fit_at(full(found.x), found.fun, slopes)
+    own = joined.stack(nuisance)
+    unknown = joined.fitted(own)
+    begin = point_at(model, joined, np.clip(start, model.lower, model.upper), own)
+    if not math.isfinite(begin.cost):
+        rows = len(joined.angle)
+        slopes = Slopes(np.zeros((rows, len(start))), np.zeros((rows, own.shape[1])), joined.runs.edges)
+        end = replace(begin, white=np.full(rows, np.inf))
+    elif fixed:
+        end, slopes = fit_nuisance(model, joined, begin, most)
+    else:
+        end, slopes = fit_shared(model, joined, begin, most)
+    residuals = tuple(joined.runs.split(joined.angle - end.predicted.angle))
+    fitted = tuple(one[which] for one, which in zip(end.own, unknown, strict=True))
+    return Fit(model, end.parameters, fitted, residuals, slopes, phi, end.white)
 
 
 def first_state(model: Model, record: Record) -> Floats:

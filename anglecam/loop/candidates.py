@@ -23,6 +23,11 @@ from anglecam.threads import map_in_threads
 STAGED_STARTS = 8
 """Start values of a staged parameter from which a fit is made: those with the smallest cost before fitting."""
 
+FLAT_FACTORS = tuple(np.geomspace(0.5, 2.0, 13).tolist())
+"""Multiples of a fitted staged parameter that are tried, 12 % apart."""
+FLAT_ROUNDS = 4
+"""Most fits from such multiples."""
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -240,14 +245,29 @@ def with_staged(
     for count in range(len(effects_of(fit)[-1].parameters) + 1, len(effect.parameters) + 1):
         richer = plant.with_effect(replace(effect, parameters=effect.parameters[:count]))
         bare = np.append(fit.parameters[:first], np.zeros(len(fit.parameters) - first))
-        values = [np.append(x, v) for v in effect.parameters[count - 1].starts for x in (fit.parameters, bare)]
+        before = [fit.parameters] if np.array_equal(bare, fit.parameters) else [fit.parameters, bare]
+        values = [np.append(x, v) for v in effect.parameters[count - 1].starts for x in before]
         values.sort(key=lambda one: output_error(richer, one, records, fit.nuisance, fit.phi))
-        fit, spent = fit_best_start(richer, records, values[:STAGED_STARTS], fit.nuisance, fit.phi), spent + 1
+        fit = fit_best_start(richer, records, values[:STAGED_STARTS], fit.nuisance, fit.phi)
+        fit, spent = _beyond_flat(fit, records, policy), spent + 1
         gain = log_likelihood_gain(best.cost, fit.cost, len(fit.white))
         needed = special.chdtri(spent, policy.candidates.false_staged_parameter_rate)
         if 2.0 * gain > needed and rms_difference(fit, best) > camera:
             best, spent = fit, 0
     return best
+
+
+def _beyond_flat(fit: Fit, records: Sequence[Record], policy: Policy) -> Fit:
+    """Fit again from other values of the last parameter while they lower the cost; the cost is flat between events."""
+    for _ in range(FLAT_ROUNDS):
+        value = fit.parameters[-1]
+        values = [np.append(fit.parameters[:-1], factor * value) for factor in FLAT_FACTORS]
+        costs = [output_error(fit.model, one, records, fit.nuisance, fit.phi) for one in values]
+        if log_likelihood_gain(fit.cost, min(costs), len(fit.white)) < policy.stepwise.better_minimum_nat:
+            break
+        start = values[int(np.argmin(costs))]
+        fit = fit_output_error(fit.model, records, [start], nuisance=fit.nuisance, phi=fit.phi)
+    return fit
 
 
 def _bound_speeds(effect: Effect, fit: Fit, records: Sequence[Record], policy: Policy) -> Effect:

@@ -24,7 +24,7 @@ from anglecam.identification.output_error import fit_output_error, predict_outpu
 from anglecam.loop.candidates import Candidate, find_rivals, fit_to_more, log_likelihood_gain, promising
 from anglecam.loop.cross_validation import Prediction, compare, predict_held_out, robust_sigma, split_records
 from anglecam.loop.policy import DEFAULT, Policy
-from anglecam.loop.refit import effects_left, effects_of, refit_with_last, refit_with_phi, refit_without
+from anglecam.loop.refit import effects_left, effects_of, plant_of, refit_with_last, refit_with_phi, refit_without
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.loop.stepwise import (
     Assessment,
@@ -142,7 +142,7 @@ def _structure_remains(task: Task, first: Assessment, last: Assessment, before: 
     """Return whether the final model leaves structure that no candidate explains."""
     policy = task.policy
     named, least = bool(effects_of(last.fit)), smallest_structure(task, first)
-    if _contradicted(task, last, least):
+    if _contradicted(task, last, least) or _gains_energy(last.fit, policy):
         return True
     level = policy.verdict.false_unexplained_rate if named else policy.residual_test.false_alarm_rate
     if last.residual_test.p_value >= level or last.fit.rmse**2 <= task.camera**2 + least**2:
@@ -176,6 +176,12 @@ def _contradicted(task: Task, last: Assessment, least: float) -> bool:
     nuisance, both = [*last.fit.nuisance, *predicted.nuisance], [*task.fitted, *task.predicted]
     fit = fit_to_more(last.fit, both, nuisance, task.ledger, task.policy)
     return robust_sigma(fit.residuals[len(task.fitted) :]) > most
+
+
+def _gains_energy(fit: Fit, policy: Policy) -> bool:
+    """Return whether a body without a command would gain energy: something that the model lacks drives it."""
+    damping, sigma = float(fit.parameters[0]), float(np.nan_to_num(fit.sigma[0]))
+    return not plant_of(fit).driven and damping < -policy.verdict.energy_gain_sigmas * sigma
 
 
 def _error_beyond(prediction: Prediction, noise: float) -> float:

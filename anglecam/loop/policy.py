@@ -277,6 +277,12 @@ class VerdictPolicy:
         "no model of a mechanism holds, such as the hand that released it",
         "withdrawing an effect because of a disturbance outside the mechanism",
     )
+    energy_gain_sigmas: float = _threshold(
+        3.0,
+        "standard uncertainties",
+        "a body that nothing drives gains no energy: its damping may not be further below zero",
+        "withdrawing a correct model of a swing that hardly decays: 0.1 % of such swings",
+    )
 
 
 @dataclass(frozen=True)

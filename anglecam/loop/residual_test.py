@@ -22,8 +22,9 @@ from scipy import special
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit, whiten
+from anglecam.identification.slopes import Slopes
 from anglecam.loop.policy import DEFAULT, Policy
-from anglecam.loop.screen import Direction, absorbed_space
+from anglecam.loop.screen import Direction
 from anglecam.loop.torque_basis import torque_responses
 
 DRAWS = 999
@@ -94,20 +95,18 @@ def run_residual_test(
     ResidualTest
         With a p-value from `DRAWS` bootstrap draws.
     """
-    absorbed = absorbed_space(fit)
-    n, free = len(fit.white), len(fit.white) - absorbed.shape[1]
+    n, free = len(fit.white), len(fit.white) - fit.slopes.rank
     draws = rng.standard_normal((n, DRAWS))
-    both = np.column_stack([fit.white, draws])
-    both -= absorbed @ (absorbed.T @ both)
+    both = fit.slopes.without_followed(np.column_stack([fit.white, draws]))
     energy = np.sum(both**2, axis=0)
     energy[energy == 0.0] = 1.0
 
     p_each = _p_of_effects(effect_directions, both, energy, free)
     torque_gain = 0.0
     for name, basis in _shapes(fit, records).items():
-        p_each[f"residual against {name}"], _, _ = _p_of_space(basis, absorbed, both, energy, free)
+        p_each[f"residual against {name}"], _, _ = _p_of_space(basis, fit.slopes, both, energy, free)
     for name, basis in torque_responses(fit, records).items():
-        p_each[f"torque against {name}"], share, k = _p_of_space(basis, absorbed, both, energy, free)
+        p_each[f"torque against {name}"], share, k = _p_of_space(basis, fit.slopes, both, energy, free)
         torque_gain = max(torque_gain, -0.5 * free * float(np.log(max(1.0 - share, 1e-6))) - 0.5 * k)
     p_each["autocorrelation"] = special.chdtrc(LAGS, _portmanteau(both, energy, records))
 
@@ -185,14 +184,14 @@ def _shapes(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
 
 
 def _p_of_space(
-    basis: Floats, absorbed: Floats, residuals: Floats, energy: Floats, free: int
+    basis: Floats, slopes: Slopes, residuals: Floats, energy: Floats, free: int
 ) -> tuple[Floats, float, int]:
     """Return the p-value of each residual's (column's) energy share in the part of a space that the fit cannot follow.
 
     For white noise in n dimensions the share in k of them has the distribution Beta(k/2, (n − k)/2). The share of the
     first residual and k are returned, too.
     """
-    u, size, _ = np.linalg.svd(basis - absorbed @ (absorbed.T @ basis), full_matrices=False)
+    u, size, _ = np.linalg.svd(slopes.without_followed(basis), full_matrices=False)
     u = u[:, size > 1e-6 * max(float(np.linalg.norm(basis)), 1e-300)]
     k = u.shape[1]
     if k == 0:

@@ -77,13 +77,6 @@ class Forecast:
     """``gain`` as a share of the largest forecast of any effect."""
 
 
-def absorbed_space(fit: Fit) -> Floats:
-    """Return an orthonormal basis, (N, k), of the column space of the fit's Jacobian."""
-    used = np.linalg.norm(fit.jacobian, axis=0) > 0.0  # the column of a parameter at its bound may be zero
-    basis, _ = np.linalg.qr(fit.jacobian[:, used])
-    return basis
-
-
 def changes(fit: Fit, records: Sequence[Record], effects: Sequence[Effect]) -> list[Change]:
     """Return the change that each effect, at each of its start values, makes to the predictions of a fitted plant.
 
@@ -139,11 +132,11 @@ def directions(
     list of Direction
         Without changes that the fit can reproduce completely.
     """
-    absorbed, joined, found = absorbed_space(fit), join(records, fit.phi), []
+    joined, found = join(records, fit.phi), []
     for one in prediction_changes:
         change = joined.whiten(one.angle)
         whole = float(np.linalg.norm(change))
-        change = change - absorbed @ (absorbed.T @ change)
+        change = fit.slopes.without_followed(change)
         if np.linalg.norm(change) > policy.screen.smallest_free_share * whole:
             found.append(Direction(one.effect, one.start, change))
     return found
@@ -185,8 +178,7 @@ def forecasts(fit: Fit, effect_directions: Sequence[Direction]) -> list[Forecast
     list of Forecast
         One for each effect, largest gain first.
     """
-    absorbed = absorbed_space(fit)
-    left = fit.white - absorbed @ (absorbed.T @ fit.white)
+    left = fit.slopes.without_followed(fit.white)
     energy = float(left @ left)
     best: dict[str, Forecast] = {}
     for direction in effect_directions:

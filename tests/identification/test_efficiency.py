@@ -39,7 +39,7 @@ def trials():
     """Return errors of linear estimator, output error and filter, the covariances of the last two, and the bound."""
     exact = record(TruePlant(), Recording("steps"), np.random.default_rng(0), sigma_deg=0.0)
     exact = replace(exact, zero_known=True)
-    linear = np.linalg.pinv(fit_output_error(Plant(), [exact], [TRUE]).jacobian)[:3]
+    linear = np.linalg.pinv(fit_output_error(Plant(), [exact], [TRUE]).slopes.projected)
     rows = []
     for seed in range(SEEDS):
         rng = np.random.default_rng(seed)

@@ -9,6 +9,7 @@ from anglecam.data.camera_evidence import View
 from anglecam.data.series import AngleSeries
 from anglecam.effects import effect
 from anglecam.identification.fit import Fit
+from anglecam.identification.slopes import Slopes
 from anglecam.loop.camera_correction import correct_camera_effects
 from anglecam.models.plant import Plant
 
@@ -21,7 +22,9 @@ BASE = [26.0, 524.0, 508.0]
 def fitted(*effects):
     plant = Plant(tuple(effect(name) for name, _ in effects))
     parameters = np.array(BASE + [value for _, values in effects for value in values])
-    return Fit(plant, parameters, (), (), np.zeros((0, 0)), 0.0, np.zeros(0))
+    return Fit(
+        plant, parameters, (), (), Slopes(np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(1, int)), 0.0, np.zeros(0)
+    )
 
 
 def series(time, angle):

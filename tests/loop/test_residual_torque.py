@@ -8,6 +8,7 @@ import pytest
 from anglecam.data.record import Record
 from anglecam.identification.fit import Fit
 from anglecam.identification.noise import Noise
+from anglecam.identification.slopes import Slopes
 from anglecam.loop.residual_torque import estimate_residual_torque
 from anglecam.models.plant import Plant
 from support.series import noise
@@ -20,7 +21,8 @@ SIGMA = np.radians(0.02)
 def _remainder(error, *, phi=0.0, time=TIME):
     """Return the torque that a fit leaves over whose model stands still and whose residual is ``error``."""
     record = Record("swing", time, error, None, False, np.full(len(time), np.nan))
-    fit = Fit(Plant(), np.array([A, B, 508.0]), (np.zeros(3),), (error,), np.zeros((len(time), 6)), phi, error)
+    flat = Slopes(np.zeros((len(time), 3)), np.zeros((len(time), 3)), np.array([0, len(time)]))
+    fit = Fit(Plant(), np.array([A, B, 508.0]), (np.zeros(3),), (error,), flat, phi, error)
     (left,) = estimate_residual_torque(fit, [record], Noise(SIGMA, phi, 0.0, "rest"))
     return left
 

@@ -68,9 +68,8 @@ def parameter_covariance(fit: Fit, sigma: float) -> Floats:
     (p, p) ndarray
         SI.
     """
-    unknowns = fit.jacobian.shape[1]
-    norm = np.linalg.norm(fit.jacobian, axis=0)
-    triangle = np.linalg.qr(fit.jacobian / norm, mode="r")
-    half = np.linalg.solve(triangle, np.eye(unknowns)) / norm[:, None]
-    p = len(fit.parameters)
-    return sigma**2 * (half @ half.T)[:p, :p]
+    columns = fit.slopes.projected
+    norm = np.linalg.norm(columns, axis=0)
+    triangle = np.linalg.qr(columns / norm, mode="r")
+    half = np.linalg.solve(triangle, np.eye(len(norm))) / norm[:, None]
+    return sigma**2 * half @ half.T

@@ -260,10 +260,7 @@ def _slopes(plant: Plant, unknowns: Floats, record: Record) -> Floats:
 
 def _information_root(fit: Fit) -> Floats:
     """Return R, (p, p): a change δ of the parameters raises the cost of the recordings so far by |Rδ|²."""
-    p = len(fit.parameters)
-    shared, nuisance = fit.jacobian[:, :p], fit.jacobian[:, p:]
-    basis, _ = np.linalg.qr(nuisance[:, np.linalg.norm(nuisance, axis=0) > 0.0])
-    return np.asarray(np.linalg.qr(shared - basis @ (basis.T @ shared), mode="r"))
+    return np.asarray(np.linalg.qr(fit.slopes.projected, mode="r"))
 
 
 def _linear_distance(target: Record, model: _Foreseen, known: Floats, duration: float, phi: float) -> float:
