@@ -70,6 +70,8 @@ class Pinhole:
 
     def shaken(self, dx: float, dy: float, roll: float) -> Pinhole:
         """Return the camera moved so that the picture shifts by (dx, dy) px and turns by `roll` rad about the shaft."""
+        if dx == dy == roll == 0.0:
+            return self
         sign = -1.0 if self.mirrored else 1.0
         return dataclasses.replace(
             self,

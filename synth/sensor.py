@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.exposure import Shutter
+from synth.normal import standard_normal
 from synth.spec import Camera
 
 Floats = NDArray[np.float64]
@@ -45,7 +46,7 @@ def develop(light: Light, camera: Camera, gain: Floats, rng: np.random.Generator
     if camera.flicker is not None:
         signal *= gain.astype(np.float32)[:, None, None]
     if camera.noise_grey > 0 or camera.electrons_at_white is not None:
-        noise = rng.standard_normal(signal.shape, dtype=np.float32)
+        noise = standard_normal(rng, signal.shape)
         if camera.electrons_at_white is None:
             noise *= camera.noise_grey
         else:

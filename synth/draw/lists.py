@@ -74,45 +74,44 @@ def gather(seen: Ints, shapes: Floats, places: Ints, before: Ints, first: int) -
     rows, width = before.shape[0], before.shape[1] - 1
     found, bounds = np.empty((8 * len(places) + 64, 2), np.int32), np.empty((8 * len(places) + 64, 2))
     starts, count = np.zeros(len(places) + 1, np.int32), 0
-    lines = np.empty((3, 4))
     # most triangles are far from every such pixel, as a coarser picture shows
     blocks = np.zeros(((rows >> _BLOCK) + 1, (width >> _BLOCK) + 1), np.bool_)
     for slot in range(len(places)):
         blocks[places[slot, 0] >> _BLOCK, places[slot, 1] >> _BLOCK] = True
     for t in seen:
-        xs, ys = (shapes[t, 0], shapes[t, 2], shapes[t, 4]), (shapes[t, 1], shapes[t, 3], shapes[t, 5])
-        left, right = max(int(np.floor(min(xs) + 0.5)), 0), min(int(np.floor(max(xs) + 0.5)), width - 1)
+        xa, ya, xb, yb, xc, yc = shapes[t, 0], shapes[t, 1], shapes[t, 2], shapes[t, 3], shapes[t, 4], shapes[t, 5]
+        left, right = max(int(np.floor(min(xa, xb, xc) + 0.5)), 0), min(int(np.floor(max(xa, xb, xc) + 0.5)), width - 1)
         if left > right:
             continue
-        top = max(int(np.floor(min(ys) + 0.5)), first) - first
-        bottom = min(int(np.floor(max(ys) + 0.5)), first + rows - 1) - first
+        top = max(int(np.floor(min(ya, yb, yc) + 0.5)), first) - first
+        bottom = min(int(np.floor(max(ya, yb, yc) + 0.5)), first + rows - 1) - first
         crossed = False
         for row in range(top >> _BLOCK, (bottom >> _BLOCK) + 1):
             for x in range(left >> _BLOCK, (right >> _BLOCK) + 1):
                 crossed |= blocks[row, x]
         if not crossed:
             continue
-        for e in range(3):
-            # a·x + b·y + c, positive inside, and how far this changes from a pixel's centre to its corner
-            p, q = 2 * e, 2 * e + 2 if e < 2 else 0
-            a, b = shapes[t, q + 1] - shapes[t, p + 1], shapes[t, p] - shapes[t, q]
-            lines[e, 0], lines[e, 1], lines[e, 2] = a, b, a * (0.0 - shapes[t, p]) + b * (0.0 - shapes[t, p + 1])
-            lines[e, 3] = (0.5 - _ON_LINE) * (abs(a) + abs(b))
+        a0, b0, c0 = _side(xa, ya, xb, yb)
+        a1, b1, c1 = _side(xb, yb, xc, yc)
+        a2, b2, c2 = _side(xc, yc, xa, ya)
         gx, gy, q0, nearest, farthest = shapes[t, 6], shapes[t, 7], shapes[t, 8], shapes[t, 9], shapes[t, 10]
+        reach = 0.5 * (abs(gx) + abs(gy))
         for row in range(top, bottom + 1):
-            for slot in range(before[row, left], before[row, right + 1]):
-                inside, x = True, places[slot, 1]
-                for e in range(3):
-                    inside &= lines[e, 0] * x + lines[e, 1] * (row + first) + lines[e, 2] + lines[e, 3] > 0.0
-                if not inside:
-                    continue
-                if count == len(found):
-                    found, bounds = np.concatenate((found, found)), np.concatenate((bounds, bounds))
-                middle, reach = gx * x + gy * (row + first) + q0, 0.5 * (abs(gx) + abs(gy))
+            begin, end = before[row, left], before[row, right + 1]
+            if count + end - begin > len(found):
+                found, bounds = np.concatenate((found, found)), np.concatenate((bounds, bounds))
+            y = row + first
+            for slot in range(begin, end):
+                # written for every pixel, and kept if the triangle reaches into it: a branch would take longer
+                x = places[slot, 1]
+                inside = a0 * x + b0 * y + c0 > 0.0
+                inside &= a1 * x + b1 * y + c1 > 0.0
+                inside &= a2 * x + b2 * y + c2 > 0.0
+                middle = gx * x + gy * y + q0
                 bounds[count, 0], bounds[count, 1] = min(middle + reach, nearest), max(middle - reach, farthest)
                 found[count, 0], found[count, 1] = slot, t
-                starts[slot + 1] += 1
-                count += 1
+                starts[slot + 1] += inside
+                count += inside
     for slot in range(len(places)):
         starts[slot + 1] += starts[slot]
     listed, depths, ends = np.empty(count, np.int32), np.empty((count, 2)), starts[:-1].copy()
@@ -121,3 +120,10 @@ def gather(seen: Ints, shapes: Floats, places: Ints, before: Ints, first: int) -
         listed[at], depths[at, 0], depths[at, 1] = found[n, 1], bounds[n, 0], bounds[n, 1]
         ends[found[n, 0]] += 1
     return starts, listed, depths
+
+
+@njit(cache=True, error_model="numpy", forceinline=True)
+def _side(xa: float, ya: float, xb: float, yb: float) -> tuple[float, float, float]:
+    """Return (a, b, c): a·x + b·y + c is positive if the pixel at (x, y) reaches to the inner side of an edge."""
+    a, b = yb - ya, xa - xb
+    return a, b, (0.5 - _ON_LINE) * (abs(a) + abs(b)) - a * xa - b * ya
