@@ -84,6 +84,8 @@ def close(
         bars.update(bar, description="done", completed=1, total=1)
     screen.print(model_table(closed.models))
     screen.print(loop_table(closed.verdict, closed.experiment))
+    for line in closed.missing:
+        errors.print(printable(f"{session}: {line}"), soft_wrap=True)
     screen.print(f"report: {out / 'report.html'}", soft_wrap=True)
     end(measured.problems)
 

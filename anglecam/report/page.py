@@ -59,7 +59,7 @@ def write_report(
     experiment: Experiment | None,
     series: Sequence[AngleSeries],
     models: Sequence[Identified],
-    problems: Sequence[Exception],
+    problems: Sequence[str],
 ) -> None:
     """Write the report on a verdict.
 
@@ -79,7 +79,7 @@ def write_report(
         The measured angles.
     models : sequence of Identified
         Base models to compare.
-    problems : sequence of Exception
+    problems : sequence of str
         Recordings that could not be used, with the cause.
     """
     # autoescape, because names of files and recordings come from the user; the SVG figures are marked as safe
@@ -108,7 +108,7 @@ def write_report(
         validation=validation_in_words(verdict),
         series=rows,
         columns=[{"key": key, "head": head} for key, head in OPTIONAL_COLUMNS.items() if any(row[key] for row in rows)],
-        problems=[str(p) for p in problems],
+        problems=problems,
         models=[_model_row(m) for m in models],
         driven=any(r.command is not None for r in verdict.fitted),
         tests=_test_rows(verdict.first_test.tests),

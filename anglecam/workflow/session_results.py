@@ -4,34 +4,42 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+from anglecam.data.record import Record
 from anglecam.identification.export import fitted_model, transfer_as_dict, write_mat
 from anglecam.identification.identified import Identified
 from anglecam.identification.identify_records import identify_records
 from anglecam.io.files import write_json
+from anglecam.io.rig import Rig
 from anglecam.io.series_csv import write_series
 from anglecam.io.session import CORRECTED, SERIES_ENDING
 from anglecam.loop.camera_correction import correct_camera_effects
 from anglecam.loop.cross_validation import split_records
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.verdict import Verdict
-from anglecam.loop.verdict_json import next_experiment, verdict_as_dict, write_next_command
+from anglecam.loop.verdict_json import NEXT_COMMAND, next_experiment, verdict_as_dict, write_next_command
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.report.page import write_report
 from anglecam.terminal import make_folder
 from anglecam.workflow.session import LoopInput, MeasuredSession, close_session, identify_session
+from anglecam.workflow.side_products import attempt
+
+REPORT = "report.html"
 
 
 @dataclass(frozen=True)
 class Closed:
     """The results of closing the loop."""
 
-    models: tuple[Identified, Identified]
-    """From the paper's filter and from output error."""
+    models: tuple[Identified, ...]
+    """From the paper's filter and from output error, as far as they could be fitted."""
     verdict: Verdict
     experiment: Experiment | None
     """The recommended next recording; ``None`` where no further recording would separate the models."""
+    missing: tuple[str, ...]
+    """A line for each part beside the verdict that failed, with its cause."""
 
 
 def write_identified(
@@ -83,21 +91,40 @@ def write_closed(
     session = measured.session
     measured.split(hold_out)
     fitted, held_out = split_records(shown.records, [*session.rig.held_out, *hold_out])
-    progress("extended Kalman filter")
-    ekf, model = (identify_records(fitted, session.rig, name, held_out=held_out) for name in ("ekf", "oe2"))
     verdict = close_session(measured, hold_out=hold_out, shown=shown, progress=progress)
+    progress("extended Kalman filter")
+    missing: list[str] = []
+    models = []
+    for estimator, name in (("ekf", "ekf"), ("oe2", "model")):
+        model = attempt(
+            f"{name}.json", partial(_identify, fitted, held_out, session.rig, estimator, out, name), missing
+        )
+        models += [] if model is None else [model]
     progress("report")
-    _write_model(ekf, out, "ekf")
-    _write_model(model, out, "model")
-    experiment = next_experiment(verdict)
-    write_next_command(experiment, out)
+    experiment = attempt("the next experiment", lambda: next_experiment(verdict), missing)
+    attempt(NEXT_COMMAND, lambda: write_next_command(experiment, out), missing)
+    attempt(CORRECTED, lambda: _write_corrected(shown, verdict, out / CORRECTED), missing)
     result = verdict_as_dict(verdict, experiment)
-    write_json(out / "loop.json", result)
-    _write_corrected(shown, verdict, out / CORRECTED)
-    title, models = session.directory.resolve().name, (ekf, model)
-    page = out / "report.html"
-    write_report(page, title, verdict, result, experiment, measured.series, list(models), measured.problems)
-    return Closed(models, verdict, experiment)
+    title, page = session.directory.resolve().name, out / REPORT
+    problems = [*map(str, measured.problems), *missing]
+    attempt(
+        REPORT,
+        lambda: write_report(page, title, verdict, result, experiment, measured.series, models, problems),
+        missing,
+    )
+    write_json(out / "loop.json", result | {"missing": missing})
+    return Closed(tuple(models), verdict, experiment, tuple(missing))
+
+
+def _identify(
+    fitted: Sequence[Record], held_out: Sequence[Record], rig: Rig, estimator: str, out: Path, name: str
+) -> Identified:
+    """Fit a model and write it; delete an older one first."""
+    for ending in (".json", ".mat"):
+        (out / f"{name}{ending}").unlink(missing_ok=True)
+    model = identify_records(fitted, rig, estimator, held_out=held_out)
+    _write_model(model, out, name)
+    return model
 
 
 def _write_model(model: Identified, out: Path, name: str) -> None:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 import anglecam
 from anglecam.errors import InputError, RigError
 from anglecam.io.session import read_session
+from anglecam.workflow import session_results
 from anglecam.workflow.session import loop_input, measure_session, require_recordings
 from support.motion import Plant, Recording, command_rows, move
 
@@ -80,3 +83,23 @@ def test_a_recording_with_few_measured_frames_is_not_fitted_unless_the_rig_accep
     assert "stairs: no model is fitted to it: only" in str(measured.problems[0])
     (session / "rig.yaml").write_text("least_measured: 0.1\n")
     assert len(measure_session(read_session(session)).records) == 2
+
+
+def test_a_part_beside_the_verdict_that_fails_is_missing_and_the_verdict_is_written(session, tmp_path, monkeypatch):
+    def diverges(*_arguments, **_more):
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "ekf.json").write_text("{}")  # of an earlier run
+    monkeypatch.setattr(session_results, "identify_records", diverges)
+    monkeypatch.setattr(session_results, "next_experiment", diverges)
+    measured = measure_session(read_session(session))
+    closed = session_results.write_closed(measured, loop_input(measured), out)
+    written = json.loads((out / "loop.json").read_text())
+    assert written["verdict"] == closed.verdict.verdict == "nothing_missing"
+    names = [line.split(":")[0] for line in written["missing"]]
+    assert names == ["ekf.json", "model.json", "the next experiment"]
+    assert all("SVD did not converge" in line for line in written["missing"])
+    assert "SVD did not converge" in (out / "report.html").read_text()
+    assert not (out / "ekf.json").exists()
