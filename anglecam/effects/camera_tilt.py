@@ -31,7 +31,7 @@ def _observe(time: Floats, angle: Floats, parameters: Floats, view: View) -> Flo
 
 
 def _needs(view: View) -> bool:
-    return not view.only_pivot_differs
+    return view.lever_px is not None and not view.only_pivot_differs
 
 
 EFFECT = Effect(

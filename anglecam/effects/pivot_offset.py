@@ -30,7 +30,7 @@ def _observe(time: Floats, angle: Floats, parameters: Floats, view: View) -> Flo
 
 
 def _needs(view: View) -> bool:
-    return view.only_pivot_differs is not False
+    return view.lever_px is not None and view.only_pivot_differs is not False
 
 
 EFFECT = Effect(

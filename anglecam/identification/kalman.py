@@ -15,7 +15,7 @@ import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
 from numba import njit
 
-from anglecam.data.command import Command
+from anglecam.data.command import NO_COMMAND, Command
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.models.integrator import COMPILED, SOURCES, integrate
@@ -94,7 +94,7 @@ class RunningFilter:
         measurement_variance: float,
     ) -> None:
         states = len(mean)
-        self._command = command or Command(np.zeros(1), np.zeros(1))
+        self._command = command or NO_COMMAND
         self._interval = interval
         self._H = observation_matrix(states)
         self._drift = process_variance * np.eye(states)
@@ -190,8 +190,7 @@ def _advance(state: Floats, span: Floats, command: Command) -> tuple[Floats, Flo
     """Return the state integrated over ``span`` (2,) and the derivative of its end with respect to its start."""
     reached, F = state.copy(), np.eye(len(state))
     steps = 1e-5 * np.maximum(np.abs(state[:5]), _STEPS)
-    knots = np.stack([command.time, command.angle, np.zeros(len(command.time))])
-    reached[:2], F[:2, :5] = _flow(state[:5], span, knots, steps, _NO_EFFECTS, MAX_STEP)
+    reached[:2], F[:2, :5] = _flow(state[:5], span, command.knots, steps, _NO_EFFECTS, MAX_STEP)
     return reached, F
 
 

@@ -118,6 +118,14 @@ class RigFrames(Declared):
         return self
 
 
+class RigCommand(Declared):
+    """What the rows of the command files mean."""
+
+    hold: Literal["zero", "linear"] = "zero"
+    """``zero``: each value holds until the next row, as a servo is commanded; ``linear``: the rows are samples of a
+    continuous signal, with straight lines between them."""
+
+
 class RigSync(Declared):
     """What relates the command's clock to the clip's clock."""
 
@@ -191,6 +199,9 @@ class Rig(Declared):
     """Which frames of a film are measured."""
     marks: RigKeypoints | None = None
     """For sessions whose recordings are tracks of points."""
+    source: Literal["camera", "encoder"] = "camera"
+    """Where the angles come from; those of an encoder have no errors of a camera."""
+    command: RigCommand = RigCommand()
     sync: RigSync = RigSync()
     model: RigModel = RigModel()
 

@@ -58,10 +58,13 @@ class Session:
     """Remarks for the user, one line each."""
 
 
-def command_beside(source: Path) -> Command | None:
+def command_beside(source: Path, rig: Rig | None = None) -> Command | None:
     """Read the command file in a recording's folder that has its name; ``None`` if there is none."""
     path = (source.resolve() if source.is_dir() else source).with_name(recording_name(source) + COMMAND_ENDING)
-    return read_command(path) if path.exists() else None
+    if not path.exists():
+        return None
+    command = read_command(path)
+    return command.sampled() if rig is not None and rig.command.hold == "linear" else command
 
 
 def recording_name(source: Path) -> str:
@@ -178,13 +181,16 @@ def read_session(directory: Path, rig: Rig | None = None) -> Session:
     if not sources:
         fault = f"no clip ({', '.join(CLIP_ENDINGS)}) and no *{SERIES_ENDING} in it"
         raise RigError(unused[0] if unused else f"{directory}: {fault}")
+    filmed = [source for source in sources.values() if not source.name.endswith(SERIES_ENDING)]
+    if rig.source == "encoder" and filmed:
+        raise RigError(f"{filmed[0]}: its angle is seen by a camera, but rig.yaml states source: encoder")
     unknown = sorted(set(rig.held_out) - set(sources))
     if unknown and rig_is_the_folders:
         raise RigError(f"{directory / 'rig.yaml'}: held_out names {unknown[0]}, which is not a recording here")
     recordings = []
     for name, source in sorted(sources.items()):
         try:
-            recordings.append(Recording(name, source, command_beside(source)))
+            recordings.append(Recording(name, source, command_beside(source, rig)))
         except InputError as problem:
             problems.append(problem)
     commands = sorted(directory.glob(f"*{COMMAND_ENDING}"))

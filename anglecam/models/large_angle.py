@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from anglecam.data.camera_evidence import UNKNOWN_VIEW, View
-from anglecam.data.command import Command
+from anglecam.data.command import NO_COMMAND, Command
 from anglecam.data.typing import Floats
 from anglecam.neck.large_angle import LargeAngleNeck, linearise, restoring_tangent, restoring_torque
 
@@ -257,14 +257,14 @@ class LargeAngle:
         """
         neck, nodes = self.neck_at(parameters), self._nodes
         p = neck.parameters
-        switches, values = (np.zeros(1), np.zeros(1)) if command is None else (command.time, command.angle)
+        held = NO_COMMAND if command is None else command.held()
         constants = (p.head.inertia, p.servo.rotor_inertia, p.damping, p.servo.back_emf_damping)
         return _integrate(
             time,
             float(state[0]),
             float(state[1]),
-            switches,
-            p.servo.torque_gain * p.servo.command_gain * values,
+            held.time,
+            p.servo.torque_gain * p.servo.command_gain * held.angle,
             nodes[0],
             nodes[1] - nodes[0],
             restoring_torque(neck, nodes),

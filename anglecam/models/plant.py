@@ -215,7 +215,7 @@ class Plant:
 
 def _arrived(command: Command | None, pairs: Sequence[tuple[Effect, Floats]]) -> Floats:
     """Return the knots (3, m) of the command that arrives at the drive: instants, levels and slopes."""
-    knots = _NO_COMMAND if command is None else Knots(command.time, command.angle, np.zeros(len(command.time)))
+    knots = _NO_COMMAND if command is None else Knots(*command.knots)
     for effect, values in pairs:
         if effect.command is not None:
             knots = effect.command(knots, values)

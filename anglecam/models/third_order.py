@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from anglecam.data.camera_evidence import UNKNOWN_VIEW, View
-from anglecam.data.command import Command
+from anglecam.data.command import NO_COMMAND, Command
 from anglecam.data.typing import Floats
 
 MAX_STEP = 0.004
@@ -94,7 +94,6 @@ class ThirdOrder:
         self, parameters: Floats, time: Floats, command: Command | None, state: Floats, view: View = UNKNOWN_VIEW
     ) -> Floats:
         """Return the (n,) angle, rad, of a free run; see `anglecam.models.plant.Plant.run`."""
-        switches = np.zeros(1) if command is None else command.time
-        values = np.zeros(1) if command is None else command.angle
+        held = NO_COMMAND if command is None else command.held()
         numerator = parameters[3:] if self.driven else np.zeros(3)
-        return _integrate(time, state, switches, values, numerator, parameters[:3], MAX_STEP)
+        return _integrate(time, state, held.time, held.angle, numerator, parameters[:3], MAX_STEP)

@@ -263,7 +263,8 @@ def _worst(residuals: Sequence[Floats], most: int = MOST_RECORDINGS) -> list[int
 def _draw_command(axes: Axes, command: Command, time: Floats) -> None:
     inside = (command.time > time[0]) & (command.time < time[-1])
     knots = np.concatenate([time[:1], command.time[inside], time[-1:]])
-    axes.step(knots, np.degrees(command.at(knots)), where="post", color=COMMAND, lw=0.9, label="command")
+    style = "steps-post" if command.slope is None else "default"
+    axes.plot(knots, np.degrees(command.at(knots)), drawstyle=style, color=COMMAND, lw=0.9, label="command")
 
 
 def _draw_band(axes: Axes, floor: float) -> None:

@@ -170,7 +170,7 @@ def _arriving(effect: Effect, values: Floats, command: Command, time: Floats) ->
         return demanded[0] + lfilter([0.0, 1.0 - kept], [1.0, -kept], demanded - demanded[0])
     if effect.command is None:
         raise TypeError(f"{effect.id} does not act on the command")
-    knots = effect.command(Knots(command.time, command.angle, np.zeros(len(command.time))), values)
+    knots = effect.command(Knots(*command.knots), values)
     at = np.maximum(np.searchsorted(knots.time, time, side="right") - 1, 0)
     since = np.maximum(time - knots.time[at], 0.0)  # before the first knot its level holds
     return knots.level[at] + knots.slope[at] * since

@@ -74,7 +74,8 @@ def open_source(path: Path, rig: Rig | None = None, frames: FrameRange = (None, 
         Where the rig file is wrong.
     """
     with blame(path):
-        return _open(path, _of_frames(rig_beside(path) if rig is None else rig, frames), command_beside)
+        declared = _of_frames(rig_beside(path) if rig is None else rig, frames)
+        return _open(path, declared, lambda source: command_beside(source, declared))
 
 
 def open_recording(path: Path, rig: Rig, command: Command | None) -> Source:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from anglecam.data.camera_evidence import UNKNOWN_VIEW
 from anglecam.data.command import Command
 from anglecam.data.record import Record, record_from_series
 from anglecam.data.series import AngleSeries
@@ -282,4 +283,4 @@ def _record(series: AngleSeries, command: Command | None, clock_sigma: float, ri
     declared = rig.model.gravity_deg
     upright = None if declared is None else math.radians(declared)
     record = record_from_series(series, command, zero_known=rig.neutral != "auto", mass_from_upright=upright)
-    return replace(record, clock_sigma=clock_sigma)
+    return replace(record, clock_sigma=clock_sigma, view=record.view if rig.source == "camera" else UNKNOWN_VIEW)
