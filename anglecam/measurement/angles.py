@@ -65,7 +65,7 @@ class Angles:
     view: ViewErrors
     """Contribution of lens and tilt."""
     within_exposure: Floats
-    """Standard uncertainty due to acceleration within the exposure, rad."""
+    """Standard uncertainty due to acceleration within the exposure, and to a long blur, rad."""
     registered: Registered | None = None
     """Source of the fine angles; ``None`` for coarse angles."""
     shared: float = 0.0

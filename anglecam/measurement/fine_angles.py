@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.camera.shutter import mean_off_middle
+from anglecam.camera.shutter import blur_error, mean_off_middle
 from anglecam.data.command import Command
 from anglecam.data.typing import Floats
 from anglecam.io.rig import Rig
@@ -71,7 +71,8 @@ def fine_angles(
     shared = _sigma_of_mean(turn[used], noise[used], float(np.median(pose[registered])), filmed_px[used])
     against = sensitivity - sensitivity[used].mean(axis=0)
     by_pivot = np.einsum("ni,ij,nj->n", against, found.pivot_covariance_px2, against)
-    unsteady = mean_off_middle(time, line, rig.camera.exposure_s)
+    exposure = rig.camera.exposure_s
+    unsteady = np.hypot(mean_off_middle(time, line, exposure), blur_error(time, line, coarse.lever_px, exposure))
     sigma = np.sqrt(noise**2 + pose**2 + shared**2 + by_pivot + coarse.view.sigma**2 + unsteady**2)
     if resting is None:
         # an absolute direction depends on the mark's mean position on the body, and on the pivot

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from anglecam.camera.calibration import Calibration, read_calibration, write_calibration
 from anglecam.camera.lens import Lens, lens_from_rig
-from anglecam.camera.shutter import mean_off_middle, measurement_time
+from anglecam.camera.shutter import BLUR_SHARE, blur_error, mean_off_middle, measurement_time
 from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Rig, read_rig
 
@@ -271,3 +271,12 @@ def test_the_mean_over_an_exposure_lies_off_its_middle_by_what_is_stated():
     off = mean - 0.5 * acceleration * t[2] ** 2
     np.testing.assert_allclose(mean_off_middle(t, 0.5 * acceleration * t**2, exposure), off, rtol=1e-4)
     assert not mean_off_middle(t, t**2, None).any()
+
+
+def test_a_blur_adds_uncertainty_beyond_the_width_of_an_edge_only():
+    t, lever = np.arange(0.0, 1.0, 1.0 / 30.0), 200.0
+    for blur_px, longer in ((3.0, 0.0), (4.0, 0.0), (14.0, 10.0)):
+        steady = blur_px / lever / 0.02 * t
+        expected = BLUR_SHARE * longer / lever
+        assert blur_error(t, steady, lever, 0.02) == pytest.approx(np.full(len(t), expected), abs=1e-12)
+    assert not blur_error(t, 10.0 * t, lever, None).any()
