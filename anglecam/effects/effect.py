@@ -6,8 +6,8 @@ through one *port*. With its parameters at their null values the model is exactl
     command       the command that arrives: u(t) → v(t), piecewise linear in and out
     lag           first-order delay of the drive: τ·v̇ = u − v
     servo         torque of servo and springs: c·v − b·θ → another torque
-    load          acceleration added, a function of angle and rate
-    friction      levels of dry friction
+    load          acceleration added, a function of time, angle and rate
+    friction      levels of dry friction, a function of the servo's torque and of the angle
     dynamics      acceleration added by something with additional states, and the derivatives of those states
     timing        the instant at which the camera recorded what a frame shows
     observation   the angle that the camera measures, a function of the true angle
@@ -130,20 +130,20 @@ class Effect:
     lag: Callable[[Floats], float] | None = field(default=None, repr=False)
     """Parameters → τ, s."""
     servo: Any = field(default=None, repr=False)
-    """Compiled (torque, θ, abc, parameters) → torque of servo and springs, rad/s². Its first argument is c·v − b·θ, or
+    """Compiled (torque, θ, ω, abc, parameters) → torque of servo and springs, rad/s². Its first argument is c·v − b·θ, or
     the result of the servo effect before it."""
     load: Any = field(default=None, repr=False)
-    """Compiled (θ, ω, parameters) → angular acceleration added, rad/s². It is integrated in steps of 6 ms; for
-    quadratic drag that is accurate to 2e-4° at 5 1/rad and to 1e-3° at 20 1/rad. See `kinked` for a torque that is not
-    smooth in θ and ω."""
+    """Compiled (time, θ, ω, abc, parameters) → angular acceleration added, rad/s². Time is the recording's, s. It is
+    integrated in steps of 6 ms; for quadratic drag that is accurate to 2e-4° at 5 1/rad and to 1e-3° at 20 1/rad. See
+    `kinked` for a torque that is not smooth in θ and ω."""
     friction: Any = field(default=None, repr=False)
-    """Compiled (parameters) → levels while sliding up and sliding down, break-away level if higher (rad/s²), Stribeck
-    speed (rad/s); opposes motion."""
+    """Compiled (torque, θ, abc, parameters) → levels while sliding up and sliding down, break-away level if higher
+    (rad/s²), Stribeck speed (rad/s); opposes motion. The torque is that of servo and springs after every servo effect,
+    rad/s². There is no friction where all parameters are zero."""
     dynamics: Any = field(default=None, repr=False)
-    """Compiled (θ, ω, v, abc, states, parameters) → (derivatives of the states, angular acceleration added in rad/s²).
-    v is the command at the drive, rad, and abc is a, b, c. ``states`` and the derivatives are tuples of `states`
-    numbers. The integrator steps by at most 2 ms, so rates of the states must stay below 1000/s, and it does not call
-    the function of an effect that is not in the plant."""
+    """Compiled (time, θ, ω, v, abc, states, parameters) → (derivatives of the states, angular acceleration added in
+    rad/s²). v is the command at the drive, rad, and abc is a, b, c. ``states`` and the derivatives are tuples of
+    `states` numbers. The integrator steps by at most 2 ms, so rates of the states must stay below 1000/s."""
     initial: Any = field(default=None, repr=False)
     """Compiled (θ, ω, v, abc, parameters) → tuple of the states at a recording's first frame, for ``dynamics``; zeros
     where it is ``None``."""

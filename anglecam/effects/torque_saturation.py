@@ -15,7 +15,7 @@ from anglecam.effects.effect import Effect, Parameter, Values
 
 
 @njit
-def _servo(torque: float, theta: float, abc: Values, parameters: Values) -> float:
+def _servo(torque: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     inverse, share = parameters[0], parameters[1]
     if inverse <= 0.0:
         return torque

@@ -23,7 +23,7 @@ RATIO, FREQUENCY, DAMPING = 0.3, 40.0, 3.0
 
 
 @njit
-def _second_mass(theta, omega, v, abc, states, parameters):
+def _second_mass(time, theta, omega, v, abc, states, parameters):
     """Return ÿ and the reaction on the load of a mass at y on a spring and a damper."""
     push = parameters[1] ** 2 * (theta - states[0]) + parameters[2] * (omega - states[1])
     return (states[1], push), -parameters[0] * push
@@ -35,7 +35,7 @@ def _moves_along(theta, omega, v, abc, parameters):
 
 
 @njit
-def _lagging_drive(theta, omega, v, abc, states, parameters):
+def _lagging_drive(time, theta, omega, v, abc, states, parameters):
     """Replace the drive c·v by c·x with τ·ẋ = v − x."""
     return ((v - states[0]) / parameters[0],), abc[2] * (states[0] - v)
 
