@@ -16,7 +16,7 @@ through one *port*. With its parameters at their null values the model is exactl
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
@@ -25,6 +25,7 @@ import numpy as np
 
 from anglecam.data.camera_evidence import View
 from anglecam.data.typing import Floats
+from anglecam.effects.seen import Seen
 from anglecam.effects.unit_names import split_unit
 
 Values = tuple[float, ...]
@@ -59,8 +60,9 @@ class Parameter:
     """Lower bound, SI."""
     upper: float
     """Upper bound, SI."""
-    starts: tuple[float, ...]
-    """Starting values of a fit, SI; several where the cost may have several minima."""
+    starts: tuple[float, ...] = ()
+    """Starting values of a fit, SI; several where the cost may have several minima, none where the effect works them
+    out in `Effect.starts`."""
     to_file: float = 1.0
     """Factor from SI to the unit in ``name``."""
     inverse: bool = False
@@ -130,8 +132,8 @@ class Effect:
     lag: Callable[[Floats], float] | None = field(default=None, repr=False)
     """Parameters → τ, s."""
     servo: Any = field(default=None, repr=False)
-    """Compiled (torque, θ, ω, abc, parameters) → torque of servo and springs, rad/s². Its first argument is c·v − b·θ, or
-    the result of the servo effect before it."""
+    """Compiled (torque, θ, ω, abc, parameters) → torque of servo and springs, rad/s². Its first argument is c·v − b·θ,
+    or the result of the servo effect before it."""
     load: Any = field(default=None, repr=False)
     """Compiled (time, θ, ω, abc, parameters) → angular acceleration added, rad/s². Time is the recording's, s. It is
     integrated in steps of 6 ms; for quadratic drag that is accurate to 2e-4° at 5 1/rad and to 1e-3° at 20 1/rad. See
@@ -151,6 +153,9 @@ class Effect:
     """(frame times s, angle rad, parameters, view) → instants at which what the frames show happened, s."""
     observation: Callable[[Floats, Floats, Floats, View], Floats] | None = field(default=None, repr=False)
     """(frame times s, angle rad, parameters, view) → the angle that is measured, rad."""
+    starts: Callable[[Seen], Sequence[Values]] | None = field(default=None, repr=False)
+    """What the model so far shows → parameters at which a fit starts, SI, the likeliest first; for an effect whose
+    magnitude, place or frequency depends on plant and motion. ``None`` where the parameters state their starts."""
     needs: Callable[[View], bool] = field(default=lambda view: True, repr=False)
     """Whether a view contains what the effect is computed from."""
 
@@ -171,6 +176,11 @@ class Effect:
     def null(self) -> Floats:
         """Parameter values at which the effect is absent, SI."""
         return np.array([p.null for p in self.parameters])
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Lower and upper bounds of the parameters, SI."""
+        return np.array([p.lower for p in self.parameters]), np.array([p.upper for p in self.parameters])
 
     @cached_property
     def port(self) -> str:

@@ -22,8 +22,9 @@ from scipy import special
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit, whiten
+from anglecam.loop.absorbed import absorbed_space
 from anglecam.loop.policy import DEFAULT, Policy
-from anglecam.loop.screen import Direction, absorbed_space
+from anglecam.loop.screen import Direction
 from anglecam.loop.torque_basis import torque_responses
 
 DRAWS = 999

@@ -4,8 +4,8 @@
 
 The functions are composed from the ledger, so that nobody edits the integrator to add an effect. Parameters travel as
 tuples: reading them from an array in every evaluation costs more than the evaluation itself. So does passing them in a
-call; the functions of a step are therefore compiled into one (``forceinline``). An effect that is not in the plant is not
-evaluated: its states stand still and it adds nothing, not even a zero.
+call; the functions of a step are therefore compiled into one (``forceinline``). An effect that is not in the plant is
+not evaluated: its states stand still and it adds nothing, not even a zero.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class CompiledEffects:
     width: int
     """Largest number of parameters of an effect."""
     rows: Any
-    """(table) → the rows as tuples, by port; then whether any servo and any load is in the plant, and whether it rubs."""
+    """(table) → the rows as tuples, by port; then whether a servo and a load are in the plant, and whether it rubs."""
     rates: Any
     """(time, θ, ω, additional states, v, abc, rows) → θ̈ without dry friction, torque of servo and springs (rad/s²),
     derivatives of the states."""

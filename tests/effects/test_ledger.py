@@ -37,7 +37,7 @@ MOVED = {
     "linkage_geometry": ({"share": 1.0}, [1.0]),
     "constant_torque": ({"torque": 5.0}, [5.0]),
 }
-UNITS = {"", "s", "deg", "deg/s", "deg/s2", "1/s", "1/s2", "1/rad"}
+UNITS = {"", "s", "deg", "deg/s", "deg/s2", "1/s", "1/s2", "1/rad", "s/rad", "Hz"}
 VIEW = View(neutral=math.radians(20.0), lever_px=200.0, pivot_px=(-80.0, 60.0))
 NOD = np.radians(np.linspace(-25.0, 25.0, len(TIME)))
 

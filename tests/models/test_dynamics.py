@@ -15,6 +15,7 @@ from anglecam.effects import LEDGER, Effect, Parameter, effect, ledger_of
 from anglecam.models.added_acceleration import added_acceleration
 from anglecam.models.integrator import integrator_of
 from anglecam.models.plant import Plant
+from support.starts import first_start
 
 A, B, C = 26.0, 524.0, 508.0
 TIME = np.arange(0.0, 5.0, 1 / 30)
@@ -140,7 +141,7 @@ def test_two_effects_with_states_act_together(integrator):
 @pytest.mark.parametrize("effects", [(), ("coulomb_friction",), ("dead_zone", "quadratic_drag", "backlash"), LEDGER])
 def test_an_effect_added_to_the_ledger_leaves_every_other_prediction_bit_for_bit(integrator, effects):
     entries = tuple(effect(e) if isinstance(e, str) else e for e in effects)
-    parameters = np.concatenate([[A, B, C], *([p.starts[0] for p in e.parameters] for e in entries)])
+    parameters = np.concatenate([[A, B, C], *(first_start(e) for e in entries)])
     angles = [
         plant.predict(parameters, TIME, COMMAND, np.array([0.1, 0.5]))
         for plant in (Plant(entries), Plant(entries, integrator=integrator))
