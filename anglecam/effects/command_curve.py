@@ -47,14 +47,14 @@ EFFECT = Effect(
     equation="θ̈ = c·v(u) − a·θ̇ − b·θ, v′(u) = e^(g·s), s = x·cos ψ + x²·sin ψ, x = u/15°",
     relaxes="Eqs. (4), (5): the reference is proportional to the command",
     parameters=(
-        Parameter("curve_strength", "g", 0.0, -5.0, 5.0, (0.1, -0.1)),
+        Parameter("curve_strength", "g", 0.0, 0.0, 5.0, (0.1,)),
         Parameter(
             "curve_shape_deg",
             "ψ",
             0.5 * math.pi,
             -math.tau,
             math.tau,
-            (0.0, 0.25 * math.pi, 0.75 * math.pi),
+            tuple(0.25 * math.pi * eighth for eighth in range(-3, 5)),
             math.degrees(1.0),
             circular=True,
         ),
