@@ -62,7 +62,7 @@ EFFECT = Effect(
             is_speed=True,
         ),
     ),
-    aliases=("quadratic_drag", "backlash", "dead_zone"),
+    aliases=("quadratic_drag", "backlash", "dead_zone", "load_dependent_friction"),
     separating_experiment="a slow triangle of small amplitude, on which dry friction shows as a constant lag in angle",
     source="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994",
     friction=_friction,

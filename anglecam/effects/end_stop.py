@@ -16,7 +16,6 @@ from numba import njit
 from anglecam.effects.effect import Effect, Parameter, Values
 from anglecam.effects.seen import Seen
 
-
 DISSIPATION = 0.3
 """s/rad, at which a fit starts. Without it the energy that an impact takes shows as a stop that is stiffer and further
 out, which is another minimum of the cost."""

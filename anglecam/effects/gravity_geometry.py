@@ -52,7 +52,7 @@ EFFECT = Effect(
             circular=True,
         ),
     ),
-    aliases=("stiffening_spring", "linkage_geometry"),
+    aliases=("stiffening_spring", "linkage_geometry", "one_sided_spring"),
     separating_experiment="the same steps with the mount turned by 90°: gravity turns with it, the spring does not",
     source="the paper, Eqs. (16), (23)",
     load=_load,

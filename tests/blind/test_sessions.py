@@ -62,7 +62,7 @@ def test_a_fit_of_the_true_effect_recovers_the_reported_number(name):
     assert first.in_file_unit(fit.parameters[3])[0] == pytest.approx(value, rel=0.01)
 
 
-@pytest.mark.parametrize("name", ["constant_torque", "one_sided_spring"])
+@pytest.mark.parametrize("name", ["constant_torque", "detent"])
 def test_a_drawn_film_is_written_as_a_case_that_reads_back(name, tmp_path):
     write_case(name, SEED, tmp_path)
     case = read_case(tmp_path / f"{name}-{SEED}")
