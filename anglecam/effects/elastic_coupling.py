@@ -47,7 +47,7 @@ def _starts(seen: Seen) -> list[Values]:
         torques.append(np.stack(each, axis=2).reshape(len(time), -1))
     multiples, share = seen.explained(torques)
     inner = np.flatnonzero((share[1:-1] >= share[:-2]) & (share[1:-1] >= share[2:])) + 1
-    found = []
+    found: list[Values] = []
     for i in sorted(inner, key=lambda i: -share[i])[:3]:
         # the mass is the sum of both multiples, and the larger one states the damping
         size, damping = float(np.sum(multiples[i])), DAMPINGS[int(np.argmax(np.abs(multiples[i])))]

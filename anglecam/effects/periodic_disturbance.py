@@ -34,7 +34,7 @@ def _starts(seen: Seen) -> list[Values]:
     highest = min(HIGHEST_HZ, BELOW_NYQUIST * 0.5 / seen.interval)
     tried = min(MOST_TRIED, max(8, round(PER_CYCLE * seen.span * (highest - LOWEST_HZ))))
     waves = seen.waves(seen.times, math.tau * np.linspace(LOWEST_HZ, highest, tried), most=3)
-    found = [(max(w.amplitude, 1e-6), w.number / math.tau, w.phase) for w in waves]
+    found: list[Values] = [(max(w.amplitude, 1e-6), w.number / math.tau, w.phase) for w in waves]
     return found or [(0.01 * seen.torque + 1e-6, 1.0, 0.0)]
 
 

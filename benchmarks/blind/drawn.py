@@ -177,6 +177,16 @@ OUTSIDE: Mapping[str, Drawn] = {
 
 ALL = {**LEDGER, **OUTSIDE}
 
+NUMBERED = (
+    "actuator_lag", "angle_drift", "backlash", "camera_tilt", "clock_scale", "constant_torque", "coulomb_friction",
+    "dead_time", "dead_zone", "elastic_coupling", "gravity_geometry", "lens_distortion", "linkage_geometry",
+    "periodic_disturbance", "pivot_offset", "quadratic_drag", "rate_limit", "rolling_shutter", "one_sided_spring",
+    "stiffening_spring", "torque_saturation", "time_varying_parameter", "cogging", "command_curve", "end_stop",
+    "load_dependent_friction", "perspective", "speed_dependent_torque", "detent", "hysteresis_spring",
+    "self_excitation", "shifted_load", "torque_walk", "wind_gusts",
+)  # fmt: skip
+"""The effects in an order that never changes, because a number in it is part of a draw's seed; append new ones."""
+
 
 def draw(name: str, seed: int) -> dict[str, Keys]:
     """Draw one effect's signs and shape, with a typical size.
@@ -194,7 +204,7 @@ def draw(name: str, seed: int) -> dict[str, Keys]:
         ``{name: keys}`` as in a film's spec, for `benchmarks.blind.sessions.scaled`.
     """
     effect = ALL[name]
-    rng = np.random.default_rng([seed, sorted(ALL).index(name), 1])
+    rng = np.random.default_rng([seed, NUMBERED.index(name), 1])
     sign = float(rng.choice([-1.0, 1.0])) if effect.signed else 1.0
     sizes = {key: effect.null + sign * (value - effect.null) for key, value in effect.size.items()}
     return {name: sizes | effect.shape(rng)}

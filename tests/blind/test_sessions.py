@@ -6,7 +6,7 @@ import pytest
 from anglecam.effects import effect
 from anglecam.identification.output_error import fit_output_error
 from anglecam.models.plant import Plant
-from benchmarks.blind.drawn import ALL, OUTSIDE, draw, magnified
+from benchmarks.blind.drawn import ALL, NUMBERED, OUTSIDE, draw, magnified
 from benchmarks.blind.drawn_films import film_spec, write_case
 from benchmarks.blind.films import read_case
 from benchmarks.blind.judged import true_values
@@ -39,6 +39,10 @@ def test_the_base_model_fits_a_session_without_effects_exactly():
 def test_an_effect_is_scaled_to_the_specified_residual():
     found = scaled(draw("clock_scale", SEED), SEED, 0.5)
     assert residual_deg(found, SEED) == pytest.approx(0.025, rel=0.02)
+
+
+def test_every_effect_has_a_number_for_its_draws():
+    assert sorted(NUMBERED) == sorted(ALL)
 
 
 @pytest.mark.parametrize("name", ALL)
