@@ -3,11 +3,12 @@
     seen = (P + m⊥)/(1 − κ·m∥) − (P + h·n⊥)/(1 − κ·h·n∥),   y = ∠seen − the same at θ = 0
 
 m is the unit vector from the pivot to the mark in space, n the plane's normal on which the shaft's mark stands h lever
-arms before the plane, and ⊥ and ∥ are their parts in the picture and towards the camera. The plane is turned by φ about
-an axis at α. κ is the lever arm over the distance, and P the pivot from the middle of the picture in lever arms, which
-the film shows. `camera_tilt` is the limit κ = 0. From a pivot in the plane (h = 0) the picture of a line is a line at
-any distance, so that κ changes no direction: perspective shows only by the mark before the plane, and by little more
-than `camera_tilt` unless the camera is near. The lens is a pinhole whose axis meets the middle of the picture.
+arms before the plane, and ⊥ and ∥ are their parts in the picture and towards the camera. The plane is turned by −φ
+about an axis at α. κ is the lever arm over the distance, and P the pivot from the middle of the picture in lever arms,
+which the film shows. `camera_tilt` is the limit κ = 0. From a pivot in the plane (h = 0) the picture of a line is a
+line at any distance, so that the angle is that of some tilt: perspective shows only by the mark before the plane, and
+by little more than `camera_tilt` unless the camera is near. The lens is a pinhole whose axis meets the middle of the
+picture.
 """
 
 from __future__ import annotations
@@ -38,12 +39,12 @@ def _observe(time: Floats, angle: Floats, parameters: Floats, view: View) -> Flo
         return 1.0 / np.maximum(1.0 - closeness * towards, NEAREST)
 
     shaft = nearness(np.asarray(height * math.cos(tilt)))
-    from_x, from_y = along * shaft, (across - height * math.sin(tilt)) * shaft
+    from_x, from_y = along * shaft, (across + height * math.sin(tilt)) * shaft
 
     def off(line: Floats) -> Floats:
         """Return the turn of the seen line against the true line; it has no jump where the line turns over."""
         x, y = np.cos(line - axis), np.sin(line - axis)
-        scale = nearness(y * math.sin(tilt))
+        scale = nearness(-y * math.sin(tilt))
         seen_x, seen_y = (along + x) * scale - from_x, (across + y * math.cos(tilt)) * scale - from_y
         return np.arctan2(x * seen_y - y * seen_x, x * seen_x + y * seen_y)
 

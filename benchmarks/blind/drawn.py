@@ -102,8 +102,13 @@ LEDGER: Mapping[str, Drawn] = {
     ),
     "end_stop": Drawn(
         {"upper_deg": 12.0},
+        along=("lower_deg",),
         inverse=True,
-        shape=lambda rng: {"stiffness": rng.uniform(1000, 6000), "dissipation": rng.uniform(0, 0.5)},
+        shape=lambda rng: {
+            "lower_deg": -12.0 * rng.uniform(0.8, 1.2),
+            "stiffness": rng.uniform(500, 4000),
+            "dissipation": rng.uniform(0, 0.5),
+        },
         reported=_same("stiffness"),
     ),
     "elastic_coupling": Drawn(

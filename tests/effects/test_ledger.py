@@ -57,6 +57,8 @@ MOVED = {
     "time_varying_parameter": ({"share": 0.5, "time_s": 3.0}, [-0.5 / 3.0, 1.0 / 3.0]),
     "command_curve": ({"p_per_rad": 0.8, "q_per_rad2": 4.0}, bent(0.8, 4.0)),
 }
+CONTACT_DEG = {"end_stop": 2e-3}
+"""Where a step in which the body meets a stop is of second order; see the effect's module."""
 UNITS = {"", "s", "deg", "deg/s", "deg/s2", "1/s", "1/s2", "1/rad", "s/rad", "Hz"}
 VIEW = View(neutral=math.radians(20.0), lever_px=200.0, pivot_px=(-80.0, 60.0))
 NOD = np.radians(np.linspace(-25.0, 25.0, len(TIME)))
@@ -77,7 +79,7 @@ def test_motion_with_an_effect_equals_the_laboratorys(tmp_path, effect_id, kind)
     command = Command(rows[:, 0], np.radians(rows[:, 1]))
     model = Plant((effect(effect_id),))
     predicted = model.predict(np.append(ABC, parameters), TIME, command, np.array([true[0], 0.0]))
-    assert np.degrees(np.abs(predicted - true)).max() < 2e-4
+    assert np.degrees(np.abs(predicted - true)).max() < CONTACT_DEG.get(effect_id, 2e-4)
 
 
 def _observe(effect_id: str, *parameters: float) -> np.ndarray:

@@ -20,7 +20,7 @@ def test_the_motion_equals_scipys(stall, no_load):
 
 
 def test_while_the_limit_is_not_reached_it_is_the_base_model():
-    assert largest_deg(predicted("speed_dependent_torque", 1e-4, 0.3) - predicted("dead_zone", 0.0)) < 1e-12
+    assert largest_deg(predicted("speed_dependent_torque", 1e-4, 0.1) - predicted("dead_zone", 0.0)) < 1e-12
 
 
 def test_at_an_unlimited_speed_it_is_a_torque_limit():
