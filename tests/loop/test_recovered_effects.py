@@ -15,7 +15,7 @@ TRUTHS = {
     "load_dependent_friction": {"share": 0.064, "spring_share": 0.38},
     "speed_dependent_torque": {"stall": 253.0, "no_load_deg_per_s": 436.0},
     "cogging": {"amplitude": 1.5, "periods_per_turn": 80.0, "phase": 1.35},
-    "end_stop": {"stiffness": 4500.0, "upper_deg": 12.7, "dissipation": 0.28},
+    "end_stop": {"stiffness": 2070.0, "upper_deg": 13.57, "lower_deg": -11.89, "dissipation": 0.317},
     "elastic_coupling": {"inertia_share": 0.024, "frequency_hz": 3.7, "damping_ratio": 0.04},
     "one_sided_spring": {"stiffness": 17.6, "slack_deg": -0.54},
     "periodic_disturbance": {"amplitude": 1.45, "frequency_hz": 1.46, "phase": 3.3},
