@@ -17,7 +17,8 @@ from anglecam.identification.output_error import first_state, fit_best_start, fi
 from anglecam.loop.cross_validation import Prediction, predict_held_out
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_of, plant_of, refit_without
-from anglecam.loop.screen import Forecast
+from anglecam.loop.screen import Forecast, starts_of
+from anglecam.loop.seen import seen_of
 from anglecam.threads import map_in_threads
 
 STAGED_STARTS = 8
@@ -153,8 +154,7 @@ def fit_with(
         values = [np.append(base.parameters, start[: len(unstaged)]) for start in starts]
         return fit_best_start(plant, records, values, nuisance, base.phi)
 
-    first = effect.null
-    first[0] = effect.parameters[0].starts[0]
+    first = starts_of(effect, seen_of(base, records))[0]
     near = [effect.null + share * (forecast.start - effect.null) for share in (0.5, 2.0)]
     # several parameters may give several local minima; dry friction does wherever the body sticks or breaks away
     several = len(unstaged) > 1 or effect.friction is not None

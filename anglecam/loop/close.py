@@ -202,9 +202,13 @@ def _further_gain_share(now: Assessment, before: Fit) -> float:
 
 
 def _rivals(fit: Fit, effect: Effect, task: Task) -> dict[str, Fit]:
-    """Return the effects that cannot be distinguished from one of the model's effects, the others kept in place."""
+    """Return the effects that cannot be distinguished from one of the model's effects, the others kept in place.
+
+    The promising ones are fitted, and every declared alias.
+    """
     base, best = refit_without(fit, effect, task.fitted), refit_with_last(fit, effect, task.fitted)
     prediction_changes = changes(base, task.fitted, effects_left(task.ledger, base))
     ranked = forecasts(base, directions(base, task.fitted, prediction_changes, task.policy))
-    others = [f for f in promising(ranked, task.policy) if f.effect.id != effect.id]
+    tried = {f.effect.id for f in promising(ranked, task.policy)}.union(effect.aliases)
+    others = [f for f in ranked if f.effect.id in tried and f.effect.id != effect.id]
     return find_rivals(best, base, task.fitted, effect, others, task.camera, task.policy)
