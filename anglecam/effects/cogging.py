@@ -13,8 +13,9 @@ import math
 import numpy as np
 from numba import njit
 
+from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter, Values
-from anglecam.effects.seen import Seen
+from anglecam.effects.seen import Seen, sines_and_cosines
 
 FEWEST, MOST = 0.75, 16.0
 """Periods over the range of the motion between which the residual is searched."""
@@ -27,13 +28,24 @@ def _load(time: float, theta: float, omega: float, abc: Values, parameters: Valu
     return parameters[0] * np.sin(parameters[1] * theta + parameters[2])
 
 
+def _numbers(seen: Seen) -> Floats:
+    return _one_period(seen) * np.linspace(FEWEST, MOST, round(PER_PERIOD * (MOST - FEWEST)))
+
+
+def _one_period(seen: Seen) -> float:
+    """Return the number of periods in one turn of which one fills the range of the motion."""
+    return math.tau / max(seen.high - seen.low, 1e-3)
+
+
+def _searched(seen: Seen) -> list[Floats]:
+    return sines_and_cosines(seen.angles, _numbers(seen))
+
+
 def _starts(seen: Seen) -> list[Values]:
     """Start with the waves over the angle that explain most of the residual."""
-    period = math.tau / max(seen.high - seen.low, 1e-3)
-    numbers = period * np.linspace(FEWEST, MOST, round(PER_PERIOD * (MOST - FEWEST)))
-    waves = seen.waves(seen.angles, numbers, most=4)
+    waves = seen.waves(seen.angles, _numbers(seen), most=4)
     return [(max(w.amplitude, 1e-6), w.number, w.phase) for w in waves] or [
-        (0.01 * seen.torque + 1e-6, 4 * period, 0.0)
+        (0.01 * seen.torque + 1e-6, 4 * _one_period(seen), 0.0)
     ]
 
 
@@ -55,4 +67,5 @@ EFFECT = Effect(
     source="Hendershot, Miller, Design of Brushless Permanent-Magnet Machines, 2010, ch. 3",
     load=_load,
     starts=_starts,
+    searched=_searched,
 )

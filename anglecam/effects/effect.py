@@ -156,6 +156,10 @@ class Effect:
     starts: Callable[[Seen], Sequence[Values]] | None = field(default=None, repr=False)
     """What the model so far shows → parameters at which a fit starts, SI, the likeliest first; for an effect whose
     magnitude, place or frequency depends on plant and motion. ``None`` where the parameters state their starts."""
+    searched: Callable[[Seen], Sequence[Floats]] | None = field(default=None, repr=False)
+    """What the model so far shows → torques (n, 2k) at `Seen.times` of each recording, for an effect with a parameter
+    that only the residual shows, such as a frequency: pairs of columns, one pair for each of k values of it. They do
+    not depend on the residual. `starts` finds the best pairs; the residual test finds them in noise, too."""
     needs: Callable[[View], bool] = field(default=lambda view: True, repr=False)
     """Whether a view contains what the effect is computed from."""
 

@@ -39,13 +39,18 @@ def _initial(theta: float, omega: float, v: float, abc: Values, parameters: Valu
     return theta, omega
 
 
-def _starts(seen: Seen) -> list[Values]:
-    """Start with the frequencies at which a small second mass, moved by the model's motion, explains most."""
+def _searched(seen: Seen) -> list[Floats]:
+    """Return the torques of a small second mass that the model's motion moves, with either damping ratio."""
     torques = []
     for time, angle in zip(seen.times, seen.angles, strict=True):
         each = [_push(angle, float(time[1] - time[0]), math.tau * TRIED_HZ, damping) for damping in DAMPINGS]
         torques.append(np.stack(each, axis=2).reshape(len(time), -1))
-    multiples, share = seen.explained(torques)
+    return torques
+
+
+def _starts(seen: Seen) -> list[Values]:
+    """Start with the frequencies at which a small second mass explains most of the residual."""
+    multiples, share = seen.explained(_searched(seen))
     inner = np.flatnonzero((share[1:-1] >= share[:-2]) & (share[1:-1] >= share[2:])) + 1
     found: list[Values] = []
     for i in sorted(inner, key=lambda i: -share[i])[:3]:
@@ -84,4 +89,5 @@ EFFECT = Effect(
     dynamics=_dynamics,
     initial=_initial,
     starts=_starts,
+    searched=_searched,
 )

@@ -98,7 +98,13 @@ class Seen:
         return found
 
     def _pairs(self, along: Sequence[Floats], numbers: Floats) -> tuple[Floats, Floats]:
-        torques = [np.empty((len(x), 2 * len(numbers))) for x in along]
-        for torque, x in zip(torques, along, strict=True):
-            torque[:, 0::2], torque[:, 1::2] = np.sin(np.outer(x, numbers)), np.cos(np.outer(x, numbers))
-        return self.explained(torques)
+        return self.explained(sines_and_cosines(along, numbers))
+
+
+def sines_and_cosines(along: Sequence[Floats], numbers: Floats) -> list[Floats]:
+    """Return sin and cos of wave numbers·x in pairs of columns, (n, 2k), for each recording's x, (n,)."""
+    torques = [np.empty((len(x), 2 * len(numbers))) for x in along]
+    for torque, x in zip(torques, along, strict=True):
+        phase = np.outer(x, numbers)
+        torque[:, 0::2], torque[:, 1::2] = np.sin(phase), np.cos(phase)
+    return torques

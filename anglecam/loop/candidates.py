@@ -17,8 +17,7 @@ from anglecam.identification.output_error import first_state, fit_best_start, fi
 from anglecam.loop.cross_validation import Prediction, predict_held_out
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_of, plant_of, refit_without
-from anglecam.loop.screen import Forecast, starts_of
-from anglecam.loop.seen import seen_of
+from anglecam.loop.screen import Forecast
 from anglecam.threads import map_in_threads
 
 STAGED_STARTS = 8
@@ -154,13 +153,12 @@ def fit_with(
         values = [np.append(base.parameters, start[: len(unstaged)]) for start in starts]
         return fit_best_start(plant, records, values, nuisance, base.phi)
 
-    first = starts_of(effect, seen_of(base, records))[0]
     near = [effect.null + share * (forecast.start - effect.null) for share in (0.5, 2.0)]
     # several parameters may give several local minima; dry friction does wherever the body sticks or breaks away
     several = len(unstaged) > 1 or effect.friction is not None
     incomplete, failed = policy.candidates.incomplete_fit_share, policy.candidates.failed_fit_share
-    further = [(near, failed)] if several else [([forecast.tried, first], incomplete), (near, failed)]
-    best = fit_from(forecast.start, forecast.tried, first) if several else fit_from(forecast.start)
+    further = [(near, failed)] if several else [([forecast.tried, forecast.likeliest], incomplete), (near, failed)]
+    best = fit_from(forecast.start, forecast.tried, forecast.likeliest) if several else fit_from(forecast.start)
     # the change by a limit is not proportional: scaled down, it may be zero and have no gradient
     for starts, share in further if forecast.share >= policy.screen.smallest_forecast_share else ():
         if log_likelihood_gain(base.cost, best.cost, len(base.white)) < share * forecast.gain:

@@ -190,12 +190,12 @@ def _error_beyond(prediction: Prediction, noise: float) -> float:
 
 
 def _further_gain_share(now: Assessment, before: Fit) -> float:
-    """Return the forecast gain of one more effect, or of an arbitrary torque curve, as a share of the total gain.
+    """Return the gain that one more effect, or an arbitrary torque curve, would bring as a share of the total gain.
 
-    The total is that forecast gain and the gain since ``before``. An error of the measurement that follows the angle,
+    The total is that further gain and the gain since ``before``. An error of the measurement that follows the angle,
     such as that of a codec that lags where the body moves, is no further cause.
     """
-    more = max(now.residual_test.torque_gain, *(forecast.gain for forecast in now.forecasts[:1]), 0.0)
+    more = now.residual_test.further_gain
     if more <= 0.0:
         return 0.0
     return more / (more + max(log_likelihood_gain(before.cost, now.fit.cost, len(before.white)), 0.0))

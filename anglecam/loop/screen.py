@@ -40,6 +40,8 @@ class Change:
     """Parameters of the effect, SI."""
     angle: Floats = field(repr=False)
     """(N,) change of the predictions of all recordings, rad."""
+    likeliest: Floats
+    """The first of the effect's start values, SI."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +53,8 @@ class Direction:
     """Parameters of the effect, SI."""
     change: Floats = field(repr=False)
     """(N,) change of the whitened predictions, orthogonal to the fit's Jacobian, rad."""
+    likeliest: Floats
+    """The first of the effect's start values, SI."""
 
     @property
     def size(self) -> float:
@@ -73,6 +77,8 @@ class Forecast:
     """Parameters of the effect, SI; the first is scaled to the best multiple of the change."""
     tried: Floats
     """The same parameters before scaling."""
+    likeliest: Floats
+    """The first of the effect's start values, SI."""
     gain: float
     """Expected log-likelihood gain, nat."""
     share: float = 1.0
@@ -106,10 +112,11 @@ def changes(fit: Fit, records: Sequence[Record], effects: Sequence[Effect]) -> l
             return richer.predict_all(np.append(fit.parameters, effect_parameters), runs, first)[0]
 
         base = predict(effect.null)  # with the effect in the model, so that errors of the integrator cancel
-        for start in starts_of(effect, seen):
+        starts = starts_of(effect, seen)
+        for start in starts:
             change = predict(start) - base
             if np.all(np.isfinite(change)):
-                found.append(Change(effect, start, change))
+                found.append(Change(effect, start, change, starts[0]))
     return found
 
 
@@ -140,7 +147,7 @@ def directions(
         whole = float(np.linalg.norm(change))
         change = fit.slopes.without_followed(change)
         if np.linalg.norm(change) > policy.screen.smallest_free_share * whole:
-            found.append(Direction(one.effect, one.start, change))
+            found.append(Direction(one.effect, one.start, change, one.likeliest))
     return found
 
 
@@ -218,4 +225,4 @@ def _forecast(direction: Direction, left: Floats, energy: float) -> Forecast:
     gain = 0.5 * len(left) * math.log(energy / max(lowered, 1e-6 * energy)) if energy > 0.0 else 0.0
     scaled = direction.start.copy()
     scaled[0] = best_first if best_first != null[0] else direction.start[0]
-    return Forecast(direction.effect, scaled, direction.start, gain)
+    return Forecast(direction.effect, scaled, direction.start, direction.likeliest, gain)

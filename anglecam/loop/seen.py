@@ -1,4 +1,4 @@
-"""Works out `Seen` of a fitted plant: its motion, and what a torque of any shape would explain of its residual.
+"""Works out `Seen` of a fitted plant: its motion, and what a torque of any shape would explain of a residual.
 
 A torque τ(t) changes the angle of the linear plant by the e of ë + a·ė + b·e = τ. Whitened and without the part that
 the fit's parameters can follow, e is compared with the residual by least squares.
@@ -7,7 +7,7 @@ the fit's parameters can follow, e is compared with the residual by least square
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numba import njit
@@ -79,24 +79,76 @@ def _instants(time: Floats) -> Floats:
     return np.linspace(time[0], time[-1], math.ceil((time[-1] - time[0]) / STEP) + 1)
 
 
-def _explained(
+def largest_shares(
+    fit: Fit, records: Sequence[Record], times: Sequence[Floats], torques: Sequence[Floats], residuals: Floats
+) -> Floats:
+    """Return the share of each residual's energy that the best of several pairs of torques explains.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of a `Plant`, on ``records``.
+    records : sequence of Record
+        The fitted recordings.
+    times : sequence of (n,) ndarray
+        `Seen.times` of the fit.
+    torques : sequence of (n, 2k) ndarray
+        For each recording: k pairs of columns.
+    residuals : (N, m) ndarray
+        Whitened residuals without the part that the fit's parameters can follow.
+
+    Returns
+    -------
+    (m,) ndarray
+        Largest over the pairs.
+    """
+    found = np.zeros(residuals.shape[1])
+    for change, whole in _changes(fit, records, times, torques):
+        one, two = change[:, 0::2], change[:, 1::2]
+        one = one * _inverse(np.linalg.norm(one, axis=0), whole[0::2])
+        two = two - one * np.sum(one * two, axis=0)
+        two = two * _inverse(np.linalg.norm(two, axis=0), whole[1::2])
+        explained = (one.T @ residuals) ** 2 + (two.T @ residuals) ** 2
+        found = np.maximum(found, explained.max(axis=0))
+    energy = np.sum(residuals**2, axis=0)
+    return np.minimum(found / np.where(energy > 0.0, energy, 1.0), 1.0)
+
+
+def _inverse(length: Floats, whole: Floats) -> Floats:
+    """Return 1/length; 0 for what is only the rounding error of a column as long as ``whole``."""
+    kept = length > 1e-3 * whole
+    return np.where(kept, 1.0 / np.where(kept, length, 1.0), 0.0)
+
+
+def _changes(
     fit: Fit, records: Sequence[Record], times: Sequence[Floats], torques: Sequence[Floats]
-) -> tuple[Floats, Floats]:
-    """Return the best multiples (k, 2) of k pairs of torques, and the shares of the residual's energy, (k,)."""
-    joined, left = join(records, fit.phi), fit.slopes.without_followed(fit.white)
-    energy = float(left @ left)
-    multiples, shares = [], []
+) -> Iterator[tuple[Floats, Floats]]:
+    """Yield `AT_ONCE` torques' changes of the whitened angles that the fit cannot follow, and the norms of all of it.
+
+    A change that is not finite is zero.
+    """
+    joined = join(records, fit.phi)
     for begin in range(0, torques[0].shape[1], AT_ONCE):
         blocks = [
             _response(t, torque[:, begin : begin + AT_ONCE], record.time, *fit.parameters[:2])
             for t, torque, record in zip(times, torques, records, strict=True)
         ]
         change = joined.whiten(np.concatenate(blocks))
-        whole = np.sum(change**2, axis=0)
-        change = fit.slopes.without_followed(change)
+        change[:, ~np.all(np.isfinite(change), axis=0)] = 0.0
+        yield fit.slopes.without_followed(change), np.linalg.norm(change, axis=0)
+
+
+def _explained(
+    fit: Fit, records: Sequence[Record], times: Sequence[Floats], torques: Sequence[Floats]
+) -> tuple[Floats, Floats]:
+    """Return the best multiples (k, 2) of k pairs of torques, and the shares of the residual's energy, (k,)."""
+    left = fit.slopes.without_followed(fit.white)
+    energy = float(left @ left)
+    multiples, shares = [], []
+    for change, whole in _changes(fit, records, times, torques):
         both, one, two = left @ change, change[:, 0::2], change[:, 1::2]
         # a little more on the diagonal, so that a pair which the fit can follow explains nothing
-        more = 1e-6 * np.maximum(whole[0::2], whole[1::2]) + 1e-300
+        more = 1e-6 * np.maximum(whole[0::2], whole[1::2]) ** 2 + 1e-300
         p, q, r = np.sum(one**2, axis=0) + more, np.sum(one * two, axis=0), np.sum(two**2, axis=0) + more
         found = np.stack([r * both[0::2] - q * both[1::2], p * both[1::2] - q * both[0::2]]) / (p * r - q**2)
         multiples.append(found.T)

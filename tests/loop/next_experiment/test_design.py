@@ -83,7 +83,7 @@ def fit_each(records: list[Record], ids: list[str], phi: float = 0.0) -> list[Fi
 
     def fit(name: str) -> Fit:
         start = first_start(effect(name))
-        return fit_with(base, records, Forecast(effect(name), start, start, 0.0))
+        return fit_with(base, records, Forecast(effect(name), start, start, start, 0.0))
 
     return [fit(name) for name in ids]
 
