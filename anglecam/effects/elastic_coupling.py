@@ -60,14 +60,18 @@ def _starts(seen: Seen) -> list[Values]:
     return found or [(0.03, float(frequency), DAMPINGS[0]) for frequency in TRIED_HZ[30::40]]
 
 
+@njit(nogil=True, cache=True)
 def _push(angle: Floats, step: float, rates: Floats, damping: float) -> Floats:
     """Return p, (n, k), along an evenly sampled motion, in steps that are accurate enough to start a fit."""
-    speed, place, moving = np.gradient(angle, step), np.full(len(rates), angle[0]), np.zeros(len(rates))
     push = np.zeros((len(angle), len(rates)))
-    for i in range(len(angle)):
-        push[i] = rates**2 * (angle[i] - place) + 2.0 * damping * rates * (speed[i] - moving)
-        moving = moving + step * push[i]
-        place = place + step * moving
+    for k, rate in enumerate(rates):
+        place, moving = angle[0], 0.0
+        for i in range(len(angle)):
+            before, after = max(i - 1, 0), min(i + 1, len(angle) - 1)
+            speed = (angle[after] - angle[before]) / (step * (after - before))
+            push[i, k] = rate * rate * (angle[i] - place) + 2.0 * damping * rate * (speed - moving)
+            moving += step * push[i, k]
+            place += step * moving
     return push
 
 
