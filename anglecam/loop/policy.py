@@ -163,8 +163,8 @@ class StepwisePolicy:
     false_effect_rate: float = _threshold(
         0.01,
         "probability",
-        "p-value of the likelihood ratio that an effect must undercut to be added, times the number of directions "
-        "among which its best one was searched",
+        "p-value of the likelihood ratio that an effect must undercut to be added, times the number of "
+        "independent frequencies if its frequency was searched in the residual",
         "how often noise alone adds an effect; of two bootstrap intervals one is easily above zero",
         "not calibrated alone; an effect was named in 2 and 3 of 200 sessions in which nothing is missing",
     )

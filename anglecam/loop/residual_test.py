@@ -57,8 +57,8 @@ class ResidualTest:
     """Probability that noise alone gives at least one test a p-value as small as the smallest one here."""
     tests: tuple[StructureTest, ...]
     further_gain: float
-    """Log-likelihood gain of the best effect, or of an arbitrary torque curve over angle or over speed, less its
-    expectation for noise; at least 0."""
+    """Log-likelihood gain of the best effect, or of an arbitrary torque curve over angle or over speed, less what the
+    best would gain in noise on average; at least 0."""
     competing: dict[str, float]
     """Effect id → number of independent directions of which the best one is compared with the residual."""
     detectable: dict[str, float]
@@ -109,16 +109,16 @@ def run_residual_test(
     energy = np.sum(both**2, axis=0)
     energy[energy == 0.0] = 1.0
 
-    p_each, competing, further_gain = {}, {}, 0.0
+    p_each, competing, gains = {}, {}, [np.zeros(1 + DRAWS)]
     for name, (p, gain) in _tested_effects(fit, records, effect_directions, both, energy).items():
         competing[name] = _competing(p[1:])
         p_each[f"effect {name}"] = _corrected(p, competing[name])
-        further_gain = max(further_gain, float(gain[0] - gain[1:].mean()))
+        gains.append(gain - gain[1:].mean())
     for name, basis in _shapes(fit, records).items():
-        p_each[f"residual against {name}"], _, _ = _p_of_space(basis, fit.slopes, both, energy, free)
+        p_each[f"residual against {name}"], _ = _p_of_space(basis, fit.slopes, both, energy, free)
     for name, basis in torque_responses(fit, records).items():
-        p_each[f"torque against {name}"], share, k = _p_of_space(basis, fit.slopes, both, energy, free)
-        further_gain = max(further_gain, float(_gain(share, free)) - 0.5 * k)
+        p_each[f"torque against {name}"], gain = _p_of_space(basis, fit.slopes, both, energy, free)
+        gains.append(gain - gain[1:].mean())
     p_each["autocorrelation"] = special.chdtrc(LAGS, _portmanteau(both, energy, records))
 
     # under the null hypothesis the data are one more draw, so their smallest p-value is ranked among those of all draws
@@ -132,6 +132,8 @@ def run_residual_test(
         sigmas = -(special.ndtri(_corrected(critical, 1.0 / count)) + special.ndtri(rates.missed_detection_rate))
         needed = max(float(sigmas * np.sqrt(fit.cost / free)), smallest_rms * math.sqrt(n))
         detectable |= _detectable([one for one in effect_directions if one.effect.id == name], needed)
+    largest = np.max(gains, axis=0)
+    further_gain = max(0.0, float(largest[0] - largest[1:].mean()))
     return ResidualTest(float(p_value), tests, further_gain, competing, detectable, rates.false_alarm_rate)
 
 
@@ -173,7 +175,7 @@ def _p_of_directions(each: Sequence[Direction], residuals: Floats, energy: Float
     return np.where(largest > 0.0, p, 1.0 - p), _gain(np.maximum(largest, 0.0), free)
 
 
-def _gain(share: Floats | float, free: int) -> Floats:
+def _gain(share: Floats, free: int) -> Floats:
     """Return the log-likelihood gain if a share of a residual's energy is explained."""
     return np.asarray(-0.5 * free * np.log(np.maximum(1.0 - share, 1e-6)))
 
@@ -232,21 +234,19 @@ def _shapes(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
     return {name: np.concatenate(blocks) for name, blocks in groups.items()}
 
 
-def _p_of_space(
-    basis: Floats, slopes: Slopes, residuals: Floats, energy: Floats, free: int
-) -> tuple[Floats, float, int]:
-    """Return the p-value of each residual's (column's) energy share in the part of a space that the fit cannot follow.
+def _p_of_space(basis: Floats, slopes: Slopes, residuals: Floats, energy: Floats, free: int) -> tuple[Floats, Floats]:
+    """Return p-value and log-likelihood gain of a space for each residual (column).
 
-    For white noise in n dimensions the share in k of them has the distribution Beta(k/2, (n − k)/2). The share of the
-    first residual and k are returned, too.
+    They follow from the share of the residual's energy in the part of the space that the fit cannot follow. For white
+    noise in n dimensions the share in k of them has the distribution Beta(k/2, (n − k)/2).
     """
     u, size, _ = np.linalg.svd(slopes.without_followed(basis), full_matrices=False)
     u = u[:, size > 1e-6 * max(float(np.linalg.norm(basis)), 1e-300)]
     k = u.shape[1]
     if k == 0:
-        return np.ones(residuals.shape[1]), 0.0, 0
+        return np.ones(residuals.shape[1]), np.zeros(residuals.shape[1])
     share = np.minimum(np.sum((u.T @ residuals) ** 2, axis=0) / energy, 1.0)
-    return special.betaincc(0.5 * k, 0.5 * (free - k), share), float(share[0]), k
+    return special.betaincc(0.5 * k, 0.5 * (free - k), share), _gain(share, free)
 
 
 def _portmanteau(residuals: Floats, energy: Floats, records: Sequence[Record]) -> Floats:
