@@ -82,8 +82,6 @@ RIGHT = {
     "periodic_disturbance": {"nothing"},
     "nothing": {"nothing"},
 }
-NAMES = {"periodic_disturbance": {"unexplained"}}
-"""anglecam's right answer where it is not the name of the case."""
 FINER = 8
 STILL = 0.01
 """ε of the smoothed sign, rad/s; a head that should stick creeps more slowly than this."""
@@ -326,7 +324,7 @@ def main() -> None:
                 effects = {} if keys is None else {case: keys}
                 sessions = [session(effects, seed=seed, sigma_deg=noise) for seed in range(chosen.seeds)]
                 for name, method in methods.items():
-                    right = RIGHT[case] if name != "anglecam" else NAMES.get(case, {case})
+                    right = RIGHT[case] if name != "anglecam" else {case}
                     label = case if keys is None else f"{case}, {size}"
                     print(f"| {label} | {noise} | {name} | {line([method(s) for s in sessions], right)} |", flush=True)
 

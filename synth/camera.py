@@ -2,8 +2,9 @@
 
 A pinhole camera looks at the shaft from `distance_m`. Its principal point is where the shaft appears in the picture, so
 in a square view everything on the shaft turns about that pixel by the same angle, at every depth. The lens distorts
-about the middle of the picture instead, as with a shift lens. World axes: x to the right, y up, z towards the
-camera. Pixel (0, 0) is the centre of the top left pixel, x to the right, y down.
+about the middle of the picture instead, as with a shift lens. With the effect `perspective` the principal point is the
+middle of the picture and the camera stands beside the shaft, as an ordinary camera does. World axes: x to the right, y
+up, z towards the camera. Pixel (0, 0) is the centre of the top left pixel, x to the right, y down.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from synth.effects.camera_tilt import CameraTilt
 from synth.effects.lens_distortion import LensDistortion
+from synth.effects.perspective import Perspective
 from synth.spec import Spec
 
 Floats = NDArray[np.float64]
@@ -31,13 +33,15 @@ class Pinhole:
     """Width and height, px."""
     focal_px: float
     principal_px: tuple[float, float]
-    """Where the shaft appears, in the picture before it is mirrored."""
+    """Where the optical axis meets the picture before it is mirrored; the shaft's place unless `aside_m` is given."""
     distance_m: float
     """From the camera to the shaft's point in the plane of motion."""
     rotation: Floats
     """(3, 3), from the world's axes to the camera's (right, up, backwards)."""
     k1: float = 0.0
     """r becomes r·(1 + k1·r²), r from `lens_px` in units of the focal length."""
+    aside_m: tuple[float, float] = (0.0, 0.0)
+    """The shaft to the right of the optical axis and above it, m, in the camera's axes."""
     mirrored: bool = False
     """Whether the picture is mirrored left to right at the end."""
 
@@ -55,7 +59,7 @@ class Pinhole:
 
     def draw(self, points: ArrayLike) -> tuple[Floats, Floats]:
         """Return the pixels (…, 2) before mirroring and the depth (…) along the line of sight, m, of points (…, 3)."""
-        seen = np.asarray(points, dtype=float) @ self.rotation.T
+        seen = np.asarray(points, dtype=float) @ self.rotation.T + [*self.aside_m, 0.0]
         depth = self.distance_m - seen[..., 2]
         ideal = np.asarray(self.principal_px) + self.focal_px * seen[..., :2] * [1.0, -1.0] / depth[..., None]
         off = ideal - self.lens_px
@@ -66,7 +70,19 @@ class Pinhole:
         """Return the point (3,) at height z over the plane of motion that an undistorted square view shows there."""
         x = self.size[0] - 1 - pixel[0] if self.mirrored else pixel[0]
         scale = (self.distance_m - z) / self.focal_px
-        return np.array([(x - self.principal_px[0]) * scale, (self.principal_px[1] - pixel[1]) * scale, z])
+        right, up = (x - self.principal_px[0]) * scale, (self.principal_px[1] - pixel[1]) * scale
+        return np.array([right - self.aside_m[0], up - self.aside_m[1], z])
+
+    def posed(self, placed: Floats) -> Floats:
+        """Return the poses (n, 3, 4) of bodies in the camera's axes, with the shaft's distance left out."""
+        seen = self.rotation @ placed
+        seen[:, :2, 3] += self.aside_m
+        return np.asarray(seen)
+
+    @property
+    def eye(self) -> Floats:
+        """Return the position of the camera in the world, (3,), m."""
+        return np.asarray(self.rotation.T @ [-self.aside_m[0], -self.aside_m[1], self.distance_m])
 
     def shaken(self, dx: float, dy: float, roll: float) -> Pinhole:
         """Return the camera moved so that the picture shifts by (dx, dy) px and turns by `roll` rad about the shaft."""
@@ -104,12 +120,22 @@ def aim(spec: Spec, lever: float) -> Pinhole:
     lens = spec.effects.get(LensDistortion)
     mirrored = rig.facing == "left"
     x, y = rig.pivot_px
+    shaft = (camera.size[0] - 1 - x if mirrored else x, y)
+    principal, aside = shaft, (0.0, 0.0)
+    if near := spec.effects.get(Perspective):
+        about = math.radians(near.axis_deg)
+        axis = np.array([math.cos(about), math.sin(about), 0.0])
+        view = Rotation.from_rotvec(math.radians(near.yaw_deg) * axis) * view
+        principal = ((camera.size[0] - 1) / 2, (camera.size[1] - 1) / 2)
+        metres = lever / rig.lever_px
+        aside = ((shaft[0] - principal[0]) * metres, (principal[1] - shaft[1]) * metres)
     return Pinhole(
         size=camera.size,
         focal_px=rig.lever_px * camera.distance_m / lever,
-        principal_px=(camera.size[0] - 1 - x if mirrored else x, y),
+        principal_px=principal,
         distance_m=camera.distance_m,
         rotation=view.as_matrix(),
         k1=lens.k1 if lens else 0.0,
+        aside_m=aside,
         mirrored=mirrored,
     )

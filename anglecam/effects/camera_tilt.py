@@ -4,7 +4,7 @@
 
 The camera is turned by φ about an axis at α. Lengths across that axis are shortened, and a shaft mark that lies h lever
 arms before the plane of motion is displaced across it against the mark on the body. The paper's camera is square to the
-plane, Fig. 7. Perspective adds less, by the ratio of lever arm to distance.
+plane, Fig. 7. It is far away here; `perspective` is the same from a finite distance.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ EFFECT = Effect(
         Parameter("axis_deg", "α", 0.0, -math.pi, math.pi, (0.8, 1.6, 2.4), math.degrees(1.0)),
         Parameter("mark_before_plane_in_levers", "h", 0.0, -2.0, 2.0, (0.8, -0.8)),
     ),
-    aliases=("pivot_offset", "lens_distortion", "linkage_geometry"),
+    aliases=("pivot_offset", "lens_distortion", "linkage_geometry", "perspective"),
     separating_experiment="a chessboard held in the plane of motion: anglecam calibrate, then camera: {calibration: …}",
     source="Hartley, Zisserman, Multiple View Geometry, 2nd ed., 2004, sec. 6.3",
     observation=_observe,

@@ -20,7 +20,7 @@ SI_TO_FILE = math.degrees(1.0)
 
 
 @njit
-def _friction(parameters: Values) -> tuple[float, float, float, float]:
+def _friction(torque: float, theta: float, abc: Values, parameters: Values) -> tuple[float, float, float, float]:
     mean, difference, more = parameters[0], parameters[1], parameters[2]
     breakaway = mean + more if more > 0.0 else 0.0
     return max(mean + difference, 0.0), max(mean - difference, 0.0), breakaway, parameters[3]
@@ -62,7 +62,7 @@ EFFECT = Effect(
             is_speed=True,
         ),
     ),
-    aliases=("quadratic_drag", "backlash", "dead_zone"),
+    aliases=("quadratic_drag", "backlash", "dead_zone", "load_dependent_friction"),
     separating_experiment="a slow triangle of small amplitude, on which dry friction shows as a constant lag in angle",
     source="Armstrong-Hélouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994",
     friction=_friction,

@@ -13,7 +13,7 @@ from anglecam.effects.effect import Effect, Parameter, Values
 
 
 @njit
-def _load(theta: float, omega: float, parameters: Values) -> float:
+def _load(time: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     return -parameters[0] * abs(omega)
 
 
@@ -24,7 +24,7 @@ EFFECT = Effect(
     equation="θ̈ = c·u − a·θ̇ − b·θ − e·|θ̇|",
     relaxes="Eq. (22): damping is the same in both directions",
     parameters=(Parameter("difference_per_s", "e", 0.0, -100.0, 100.0, (0.2, -0.2, 2.0, -2.0)),),
-    aliases=("coulomb_friction", "constant_torque"),
+    aliases=("coulomb_friction", "constant_torque", "load_dependent_friction"),
     separating_experiment="the same steps up and down at two speeds, one at least three times the other",
     source="Janot, Gautier, Brunot, Data set and reference models of EMPS, Nonlinear Benchmarks Workshop, 2019",
     load=_load,

@@ -17,7 +17,7 @@ from anglecam.effects.effect import Effect, Parameter, Values
 
 
 @njit
-def _servo(torque: float, theta: float, abc: Values, parameters: Values) -> float:
+def _servo(torque: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     if parameters[0] == 0.0:
         return torque
     width = abs(abc[2]) * parameters[0]

@@ -6,8 +6,8 @@ through one *port*. With its parameters at their null values the model is exactl
     command       the command that arrives: u(t) → v(t), piecewise linear in and out
     lag           first-order delay of the drive: τ·v̇ = u − v
     servo         torque of servo and springs: c·v − b·θ → another torque
-    load          acceleration added, a function of angle and rate
-    friction      levels of dry friction
+    load          acceleration added, a function of time, angle and rate
+    friction      levels of dry friction, a function of the servo's torque and of the angle
     dynamics      acceleration added by something with additional states, and the derivatives of those states
     timing        the instant at which the camera recorded what a frame shows
     observation   the angle that the camera measures, a function of the true angle
@@ -16,7 +16,7 @@ through one *port*. With its parameters at their null values the model is exactl
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
@@ -25,6 +25,7 @@ import numpy as np
 
 from anglecam.data.camera_evidence import View
 from anglecam.data.typing import Floats
+from anglecam.effects.seen import Seen
 from anglecam.effects.unit_names import split_unit
 
 Values = tuple[float, ...]
@@ -59,8 +60,9 @@ class Parameter:
     """Lower bound, SI."""
     upper: float
     """Upper bound, SI."""
-    starts: tuple[float, ...]
-    """Starting values of a fit, SI; several where the cost may have several minima."""
+    starts: tuple[float, ...] = ()
+    """Starting values of a fit, SI; several where the cost may have several minima, none where the effect works them
+    out in `Effect.starts`."""
     to_file: float = 1.0
     """Factor from SI to the unit in ``name``."""
     inverse: bool = False
@@ -130,20 +132,20 @@ class Effect:
     lag: Callable[[Floats], float] | None = field(default=None, repr=False)
     """Parameters → τ, s."""
     servo: Any = field(default=None, repr=False)
-    """Compiled (torque, θ, abc, parameters) → torque of servo and springs, rad/s². Its first argument is c·v − b·θ, or
-    the result of the servo effect before it."""
+    """Compiled (torque, θ, ω, abc, parameters) → torque of servo and springs, rad/s². Its first argument is c·v − b·θ,
+    or the result of the servo effect before it."""
     load: Any = field(default=None, repr=False)
-    """Compiled (θ, ω, parameters) → angular acceleration added, rad/s². It is integrated in steps of 6 ms; for
-    quadratic drag that is accurate to 2e-4° at 5 1/rad and to 1e-3° at 20 1/rad. See `kinked` for a torque that is not
-    smooth in θ and ω."""
+    """Compiled (time, θ, ω, abc, parameters) → angular acceleration added, rad/s². Time is the recording's, s. It is
+    integrated in steps of 6 ms; for quadratic drag that is accurate to 2e-4° at 5 1/rad and to 1e-3° at 20 1/rad. See
+    `kinked` for a torque that is not smooth in θ and ω."""
     friction: Any = field(default=None, repr=False)
-    """Compiled (parameters) → levels while sliding up and sliding down, break-away level if higher (rad/s²), Stribeck
-    speed (rad/s); opposes motion."""
+    """Compiled (torque, θ, abc, parameters) → levels while sliding up and sliding down, break-away level if higher
+    (rad/s²), Stribeck speed (rad/s); opposes motion. The torque is that of servo and springs after every servo effect,
+    rad/s². There is no friction where all parameters are zero."""
     dynamics: Any = field(default=None, repr=False)
-    """Compiled (θ, ω, v, abc, states, parameters) → (derivatives of the states, angular acceleration added in rad/s²).
-    v is the command at the drive, rad, and abc is a, b, c. ``states`` and the derivatives are tuples of `states`
-    numbers. The integrator steps by at most 2 ms, so rates of the states must stay below 1000/s, and it does not call
-    the function of an effect that is not in the plant."""
+    """Compiled (time, θ, ω, v, abc, states, parameters) → (derivatives of the states, angular acceleration added in
+    rad/s²). v is the command at the drive, rad, and abc is a, b, c. ``states`` and the derivatives are tuples of
+    `states` numbers. The integrator steps by at most 2 ms, so rates of the states must stay below 1000/s."""
     initial: Any = field(default=None, repr=False)
     """Compiled (θ, ω, v, abc, parameters) → tuple of the states at a recording's first frame, for ``dynamics``; zeros
     where it is ``None``."""
@@ -151,6 +153,13 @@ class Effect:
     """(frame times s, angle rad, parameters, view) → instants at which what the frames show happened, s."""
     observation: Callable[[Floats, Floats, Floats, View], Floats] | None = field(default=None, repr=False)
     """(frame times s, angle rad, parameters, view) → the angle that is measured, rad."""
+    starts: Callable[[Seen], Sequence[Values]] | None = field(default=None, repr=False)
+    """What the model so far shows → parameters at which a fit starts, SI, the likeliest first; for an effect whose
+    magnitude, place or frequency depends on plant and motion. ``None`` where the parameters state their starts."""
+    searched: Callable[[Seen], Sequence[Floats]] | None = field(default=None, repr=False)
+    """What the model so far shows → torques (n, 2k) at `Seen.times` of each recording, for an effect with a parameter
+    that only the residual shows, such as a frequency: pairs of columns, one pair for each of k values of it. They do
+    not depend on the residual. `starts` finds the best pairs; the residual test finds them in noise, too."""
     needs: Callable[[View], bool] = field(default=lambda view: True, repr=False)
     """Whether a view contains what the effect is computed from."""
 
@@ -171,6 +180,11 @@ class Effect:
     def null(self) -> Floats:
         """Parameter values at which the effect is absent, SI."""
         return np.array([p.null for p in self.parameters])
+
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Lower and upper bounds of the parameters, SI."""
+        return np.array([p.lower for p in self.parameters]), np.array([p.upper for p in self.parameters])
 
     @cached_property
     def port(self) -> str:

@@ -14,14 +14,23 @@ import numpy as np
 from numba import njit
 
 from anglecam.effects.effect import Effect, Parameter, Values
+from anglecam.effects.seen import Seen
+
+DIRECTIONS = (0.25, 0.75, -0.75, 1.0, -0.25, 0.0)
+"""Angles of the centre of mass from upright at which a fit starts, in half turns."""
 
 
 @njit
-def _load(theta: float, omega: float, parameters: Values) -> float:
+def _load(time: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     if parameters[0] == 0.0:
         return 0.0
     neutral = parameters[1]
     return parameters[0] * (np.sin(neutral + theta) - np.sin(neutral) - theta * np.cos(neutral))
+
+
+def _starts(seen: Seen) -> list[Values]:
+    """Start with a weight as strong as a part of the stiffness, in every direction."""
+    return [(0.2 * seen.stiffness, math.pi * direction) for direction in DIRECTIONS]
 
 
 EFFECT = Effect(
@@ -32,20 +41,20 @@ EFFECT = Effect(
     relaxes="Eq. (25): small angles about neutral",
     parameters=(
         # weight acts downwards: G < 0 at θ0 would be G > 0 at θ0 + 180°
-        Parameter("gravity_deg_per_s2", "G", 0.0, 0.0, 2000.0, (30.0, 150.0), math.degrees(1.0)),
+        Parameter("gravity_deg_per_s2", "G", 0.0, 0.0, 2000.0, to_file=math.degrees(1.0)),
         Parameter(
             "gravity_deg",
             "θ0",
             0.25 * math.pi,
             -math.tau,
             math.tau,
-            (-0.8, 2.4, -2.4),
-            math.degrees(1.0),
+            to_file=math.degrees(1.0),
             circular=True,
         ),
     ),
-    aliases=("stiffening_spring", "linkage_geometry"),
+    aliases=("stiffening_spring", "linkage_geometry", "one_sided_spring"),
     separating_experiment="the same steps with the mount turned by 90°: gravity turns with it, the spring does not",
     source="the paper, Eqs. (16), (23)",
     load=_load,
+    starts=_starts,
 )

@@ -63,7 +63,7 @@ EFFECT = Effect(
     equation="p′ = p·(1 + κ·|p|²/R²) about the middle of the picture, κ = k1·(R/f)²",
     relaxes='"image distortion, and optical aberration" are left out',
     parameters=(Parameter("distortion_at_lever", "κ", null=0.0, lower=-0.3, upper=0.3, starts=(0.01, -0.01)),),
-    aliases=("camera_tilt", "pivot_offset", "linkage_geometry"),
+    aliases=("camera_tilt", "pivot_offset", "linkage_geometry", "perspective"),
     separating_experiment="a chessboard clip: anglecam calibrate, then camera: {calibration: …}",
     source="Brown, Photogrammetric Engineering 37(8), 1971",
     observation=_observe,

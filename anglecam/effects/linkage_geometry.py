@@ -29,7 +29,7 @@ _LEVER = _AT_NEUTRAL / slope(_LINKS, _CRANK)
 
 
 @njit
-def _servo(torque: float, theta: float, abc: Values, parameters: Values) -> float:
+def _servo(torque: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     amount = parameters[0]
     if amount == 0.0:
         return torque

@@ -43,7 +43,7 @@ EFFECT = Effect(
         Parameter("ahead_share_of_lever", "e1", null=0.0, lower=-0.5, upper=0.5, starts=(0.02, -0.02)),
         Parameter("up_share_of_lever", "e2", null=0.0, lower=-0.5, upper=0.5, starts=(0.02, -0.02)),
     ),
-    aliases=("camera_tilt", "lens_distortion", "linkage_geometry"),
+    aliases=("camera_tilt", "lens_distortion", "linkage_geometry", "perspective"),
     separating_experiment="slow motion over the whole range, marker: none: the path of the mark has its own centre",
     source="the paper, Fig. 7",
     observation=_observe,

@@ -13,7 +13,7 @@ from anglecam.effects.effect import Effect, Parameter, Values
 
 
 @njit
-def _load(theta: float, omega: float, parameters: Values) -> float:
+def _load(time: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     return -parameters[0] * omega * abs(omega)
 
 

@@ -15,7 +15,7 @@ from anglecam.effects.effect import Effect, Parameter, Values
 
 
 @njit
-def _servo(torque: float, theta: float, abc: Values, parameters: Values) -> float:
+def _servo(torque: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     inverse, share = parameters[0], parameters[1]
     if inverse <= 0.0:
         return torque
@@ -33,7 +33,7 @@ EFFECT = Effect(
         Parameter("limit_deg_per_s2", "T", 0.0, 0.0, 1.0, (0.005, 0.01, 0.02, 0.05), math.degrees(1.0), inverse=True),
         Parameter("servo_share", "s", 1.0, 0.0, 1.0, (0.3,)),
     ),
-    aliases=("rate_limit", "quadratic_drag"),
+    aliases=("rate_limit", "quadratic_drag", "speed_dependent_torque", "end_stop"),
     separating_experiment="steps of two heights, one at least three times the other: a limit slows only the larger one",
     source="the paper, Fig. 12; HS-225MG data sheet: stall torque 0.47 N·m",
     rank=1,

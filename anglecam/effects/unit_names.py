@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-UNIT_WORDS = ("deg", "rad", "s", "s2", "px", "per")
+UNIT_WORDS = ("deg", "rad", "s", "s2", "hz", "px", "per")
 """Words that a unit is made of."""
 
 
@@ -19,4 +19,4 @@ def split_unit(name: str) -> tuple[str, str]:
     words = name.split("_")
     end = next(i for i in range(1, len(words) + 1) if all(word in UNIT_WORDS for word in words[i:]))
     units = ["1", *words[end:]] if words[end:][:1] == ["per"] else words[end:]
-    return " ".join(words[:end]), " ".join(units).replace(" per ", "/")
+    return " ".join(words[:end]), " ".join(units).replace(" per ", "/").replace("hz", "Hz")

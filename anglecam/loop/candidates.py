@@ -153,14 +153,12 @@ def fit_with(
         values = [np.append(base.parameters, start[: len(unstaged)]) for start in starts]
         return fit_best_start(plant, records, values, nuisance, base.phi)
 
-    first = effect.null
-    first[0] = effect.parameters[0].starts[0]
     near = [effect.null + share * (forecast.start - effect.null) for share in (0.5, 2.0)]
     # several parameters may give several local minima; dry friction does wherever the body sticks or breaks away
     several = len(unstaged) > 1 or effect.friction is not None
     incomplete, failed = policy.candidates.incomplete_fit_share, policy.candidates.failed_fit_share
-    further = [(near, failed)] if several else [([forecast.tried, first], incomplete), (near, failed)]
-    best = fit_from(forecast.start, forecast.tried, first) if several else fit_from(forecast.start)
+    further = [(near, failed)] if several else [([forecast.tried, forecast.likeliest], incomplete), (near, failed)]
+    best = fit_from(forecast.start, forecast.tried, forecast.likeliest) if several else fit_from(forecast.start)
     # the change by a limit is not proportional: scaled down, it may be zero and have no gradient
     for starts, share in further if forecast.share >= policy.screen.smallest_forecast_share else ():
         if log_likelihood_gain(base.cost, best.cost, len(base.white)) < share * forecast.gain:

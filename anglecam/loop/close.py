@@ -190,21 +190,25 @@ def _error_beyond(prediction: Prediction, noise: float) -> float:
 
 
 def _further_gain_share(now: Assessment, before: Fit) -> float:
-    """Return the forecast gain of one more effect, or of an arbitrary torque curve, as a share of the total gain.
+    """Return the gain that one more effect, or an arbitrary torque curve, would bring as a share of the total gain.
 
-    The total is that forecast gain and the gain since ``before``. An error of the measurement that follows the angle,
+    The total is that further gain and the gain since ``before``. An error of the measurement that follows the angle,
     such as that of a codec that lags where the body moves, is no further cause.
     """
-    more = max(now.residual_test.torque_gain, *(forecast.gain for forecast in now.forecasts[:1]), 0.0)
+    more = now.residual_test.further_gain
     if more <= 0.0:
         return 0.0
     return more / (more + max(log_likelihood_gain(before.cost, now.fit.cost, len(before.white)), 0.0))
 
 
 def _rivals(fit: Fit, effect: Effect, task: Task) -> dict[str, Fit]:
-    """Return the effects that cannot be distinguished from one of the model's effects, the others kept in place."""
+    """Return the effects that cannot be distinguished from one of the model's effects, the others kept in place.
+
+    The promising ones are fitted, and every declared alias.
+    """
     base, best = refit_without(fit, effect, task.fitted), refit_with_last(fit, effect, task.fitted)
     prediction_changes = changes(base, task.fitted, effects_left(task.ledger, base))
     ranked = forecasts(base, directions(base, task.fitted, prediction_changes, task.policy))
-    others = [f for f in promising(ranked, task.policy) if f.effect.id != effect.id]
+    tried = {f.effect.id for f in promising(ranked, task.policy)}.union(effect.aliases)
+    others = [f for f in ranked if f.effect.id in tried and f.effect.id != effect.id]
     return find_rivals(best, base, task.fitted, effect, others, task.camera, task.policy)

@@ -7,6 +7,11 @@ the noise. The smallest p-value of all tests is the statistic of the residual te
 parametric bootstrap: white noise, from which the column space of the fit's Jacobian is projected out, as the fit
 projects it out. So neither the number of tests nor their correlation has to be known. Davison and Hinkley, Bootstrap
 Methods and their Application, 1997, sec. 4.2 and 4.4.
+
+An effect with an unknown frequency is compared with the residual at many of them, and some frequency always fits noise
+well. Every draw is therefore searched as the data are. From the draws follows with how many independent directions the
+best one competes, and by this number the p-value of the effect is corrected (Šidák, J. Am. Stat. Assoc. 62, 1967), so
+that an effect with many directions takes no power from the tests with one.
 """
 
 from __future__ import annotations
@@ -25,6 +30,7 @@ from anglecam.identification.fit import Fit, whiten
 from anglecam.identification.slopes import Slopes
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.screen import Direction
+from anglecam.loop.seen import largest_shares, seen_of
 from anglecam.loop.torque_basis import torque_responses
 
 DRAWS = 999
@@ -40,7 +46,7 @@ class StructureTest:
     name: str
     """``effect ID``, ``residual against X``, ``torque against X`` or ``autocorrelation``."""
     p_value: float
-    """Of this test alone, not corrected for the number of tests."""
+    """Of this test alone: corrected for the directions of its effect, but not for the number of tests."""
 
 
 @dataclass(frozen=True)
@@ -50,9 +56,11 @@ class ResidualTest:
     p_value: float
     """Probability that noise alone gives at least one test a p-value as small as the smallest one here."""
     tests: tuple[StructureTest, ...]
-    torque_gain: float
-    """Log-likelihood gain of the better of two arbitrary torque curves, over angle or over speed, less its expectation
-    for noise."""
+    further_gain: float
+    """Log-likelihood gain of the best effect, or of an arbitrary torque curve over angle or over speed, less what the
+    best would gain in noise on average; at least 0."""
+    competing: dict[str, float]
+    """Effect id → number of independent directions of which the best one is compared with the residual."""
     detectable: dict[str, float]
     """Effect id → smallest magnitude of its first parameter, SI, that the test would have detected; the policy's
     ``missed_detection_rate`` is the probability of overlooking it."""
@@ -101,13 +109,16 @@ def run_residual_test(
     energy = np.sum(both**2, axis=0)
     energy[energy == 0.0] = 1.0
 
-    p_each = _p_of_effects(effect_directions, both, energy, free)
-    torque_gain = 0.0
+    p_each, competing, gains = {}, {}, [np.zeros(1 + DRAWS)]
+    for name, (p, gain) in _tested_effects(fit, records, effect_directions, both, energy).items():
+        competing[name] = _competing(p[1:])
+        p_each[f"effect {name}"] = _corrected(p, competing[name])
+        gains.append(gain - gain[1:].mean())
     for name, basis in _shapes(fit, records).items():
-        p_each[f"residual against {name}"], _, _ = _p_of_space(basis, fit.slopes, both, energy, free)
+        p_each[f"residual against {name}"], _ = _p_of_space(basis, fit.slopes, both, energy, free)
     for name, basis in torque_responses(fit, records).items():
-        p_each[f"torque against {name}"], share, k = _p_of_space(basis, fit.slopes, both, energy, free)
-        torque_gain = max(torque_gain, -0.5 * free * float(np.log(max(1.0 - share, 1e-6))) - 0.5 * k)
+        p_each[f"torque against {name}"], gain = _p_of_space(basis, fit.slopes, both, energy, free)
+        gains.append(gain - gain[1:].mean())
     p_each["autocorrelation"] = special.chdtrc(LAGS, _portmanteau(both, energy, records))
 
     # under the null hypothesis the data are one more draw, so their smallest p-value is ranked among those of all draws
@@ -115,29 +126,69 @@ def run_residual_test(
     p_value = np.mean(smallest <= smallest[0])
     rates = policy.residual_test
     critical = float(np.quantile(smallest[1:], rates.false_alarm_rate))
-    sigmas = -(special.ndtri(critical) + special.ndtri(rates.missed_detection_rate))
-    needed = float(sigmas * np.sqrt(fit.cost / free))
-    needed = max(needed, smallest_rms * math.sqrt(n))
     tests = tuple(StructureTest(name, float(p[0])) for name, p in p_each.items())
-    detectable = _detectable(effect_directions, needed)
-    return ResidualTest(float(p_value), tests, torque_gain, detectable, rates.false_alarm_rate)
+    detectable: dict[str, float] = {}
+    for name, count in competing.items():
+        sigmas = -(special.ndtri(_corrected(critical, 1.0 / count)) + special.ndtri(rates.missed_detection_rate))
+        needed = max(float(sigmas * np.sqrt(fit.cost / free)), smallest_rms * math.sqrt(n))
+        detectable |= _detectable([one for one in effect_directions if one.effect.id == name], needed)
+    largest = np.max(gains, axis=0)
+    further_gain = max(0.0, float(largest[0] - largest[1:].mean()))
+    return ResidualTest(float(p_value), tests, further_gain, competing, detectable, rates.false_alarm_rate)
 
 
-def _p_of_effects(each: Sequence[Direction], residuals: Floats, energy: Floats, free: int) -> dict[str, Floats]:
-    """Return, for each effect, the smallest p-value over its directions, one for each residual (column).
+def _tested_effects(
+    fit: Fit, records: Sequence[Record], each: Sequence[Direction], residuals: Floats, energy: Floats
+) -> dict[str, tuple[Floats, Floats]]:
+    """Return, for each effect, the smallest p-value and the largest log-likelihood gain over its directions.
+
+    Both are arrays with one value for each residual (column). The directions of an effect that is searched in the
+    residual depend on the residual, so all pairs of directions that could have been chosen take their place.
+    """
+    found: dict[str, tuple[Floats, Floats]] = {}
+    free = len(residuals) - fit.slopes.rank
+    seen = None
+    for name in dict.fromkeys(direction.effect.id for direction in each):
+        same = [direction for direction in each if direction.effect.id == name]
+        searched = same[0].effect.searched
+        if searched is None:
+            found[name] = _p_of_directions(same, residuals, energy, free)
+        else:
+            seen = seen or seen_of(fit, records)
+            share = largest_shares(fit, records, seen.times, searched(seen), residuals)
+            found[name] = special.betaincc(1.0, 0.5 * (free - 2), share), _gain(share, free)
+    return found
+
+
+def _p_of_directions(each: Sequence[Direction], residuals: Floats, energy: Floats, free: int) -> tuple[Floats, Floats]:
+    """Return the smallest p-value and the largest log-likelihood gain over directions, for each residual (column).
 
     For white noise in n dimensions the share of the energy in one of them has the distribution Beta(1/2, (n − 1)/2).
     """
-    if not each:
-        return {}
     along = np.stack([direction.change / direction.size for direction in each]) @ residuals
     share = np.minimum(along**2 / energy, 1.0)
-    p = special.betaincc(0.5, 0.5 * (free - 1), share)
-    for i, direction in enumerate(each):
-        if direction.one_sided:
-            p[i] = np.where(along[i] > 0.0, 0.5 * p[i], 1.0 - 0.5 * p[i])
-    ids = np.array([direction.effect.id for direction in each])
-    return {f"effect {name}": p[ids == name].min(axis=0) for name in dict.fromkeys(ids)}
+    if not each[0].one_sided:
+        largest = share.max(axis=0)
+        return special.betaincc(0.5, 0.5 * (free - 1), largest), _gain(largest, free)
+    largest = np.where(along > 0.0, share, -share).max(axis=0)
+    p = 0.5 * special.betaincc(0.5, 0.5 * (free - 1), np.abs(largest))
+    return np.where(largest > 0.0, p, 1.0 - p), _gain(np.maximum(largest, 0.0), free)
+
+
+def _gain(share: Floats, free: int) -> Floats:
+    """Return the log-likelihood gain if a share of a residual's energy is explained."""
+    return np.asarray(-0.5 * free * np.log(np.maximum(1.0 - share, 1e-6)))
+
+
+def _competing(smallest: Floats) -> float:
+    """Return of how many independent p-values these are the smallest, from their median; at least 1."""
+    return max(1.0, math.log(0.5) / math.log1p(-min(float(np.median(smallest)), 0.5)))
+
+
+def _corrected(p: Floats | float, count: float) -> Floats:
+    """Return the probability that the smallest of several independent p-values is at most p, 1 − (1 − p)^count."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(-np.expm1(count * np.log1p(-np.minimum(p, 1.0))))
 
 
 def _detectable(each: Sequence[Direction], needed: float) -> dict[str, float]:
@@ -183,21 +234,19 @@ def _shapes(fit: Fit, records: Sequence[Record]) -> dict[str, Floats]:
     return {name: np.concatenate(blocks) for name, blocks in groups.items()}
 
 
-def _p_of_space(
-    basis: Floats, slopes: Slopes, residuals: Floats, energy: Floats, free: int
-) -> tuple[Floats, float, int]:
-    """Return the p-value of each residual's (column's) energy share in the part of a space that the fit cannot follow.
+def _p_of_space(basis: Floats, slopes: Slopes, residuals: Floats, energy: Floats, free: int) -> tuple[Floats, Floats]:
+    """Return p-value and log-likelihood gain of a space for each residual (column).
 
-    For white noise in n dimensions the share in k of them has the distribution Beta(k/2, (n − k)/2). The share of the
-    first residual and k are returned, too.
+    They follow from the share of the residual's energy in the part of the space that the fit cannot follow. For white
+    noise in n dimensions the share in k of them has the distribution Beta(k/2, (n − k)/2).
     """
     u, size, _ = np.linalg.svd(slopes.without_followed(basis), full_matrices=False)
     u = u[:, size > 1e-6 * max(float(np.linalg.norm(basis)), 1e-300)]
     k = u.shape[1]
     if k == 0:
-        return np.ones(residuals.shape[1]), 0.0, 0
+        return np.ones(residuals.shape[1]), np.zeros(residuals.shape[1])
     share = np.minimum(np.sum((u.T @ residuals) ** 2, axis=0) / energy, 1.0)
-    return special.betaincc(0.5 * k, 0.5 * (free - k), share), float(share[0]), k
+    return special.betaincc(0.5 * k, 0.5 * (free - k), share), _gain(share, free)
 
 
 def _portmanteau(residuals: Floats, energy: Floats, records: Sequence[Record]) -> Floats:

@@ -19,10 +19,12 @@ from anglecam.data.record import Record
 from anglecam.data.runs import runs_of
 from anglecam.data.typing import Floats
 from anglecam.effects import Effect
+from anglecam.effects.seen import Seen
 from anglecam.identification.fit import Fit
 from anglecam.identification.joined import join
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import plant_of
+from anglecam.loop.seen import seen_of
 from anglecam.models.plant import Plant
 
 START_SHARES = (0.0003, 0.003, 0.03, 0.3)
@@ -38,6 +40,8 @@ class Change:
     """Parameters of the effect, SI."""
     angle: Floats = field(repr=False)
     """(N,) change of the predictions of all recordings, rad."""
+    likeliest: Floats
+    """The first of the effect's start values, SI."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,8 @@ class Direction:
     """Parameters of the effect, SI."""
     change: Floats = field(repr=False)
     """(N,) change of the whitened predictions, orthogonal to the fit's Jacobian, rad."""
+    likeliest: Floats
+    """The first of the effect's start values, SI."""
 
     @property
     def size(self) -> float:
@@ -71,6 +77,8 @@ class Forecast:
     """Parameters of the effect, SI; the first is scaled to the best multiple of the change."""
     tried: Floats
     """The same parameters before scaling."""
+    likeliest: Floats
+    """The first of the effect's start values, SI."""
     gain: float
     """Expected log-likelihood gain, nat."""
     share: float = 1.0
@@ -96,7 +104,7 @@ def changes(fit: Fit, records: Sequence[Record], effects: Sequence[Effect]) -> l
     """
     plant, runs = plant_of(fit), runs_of(records)
     first = np.stack([nuisance[: plant.states] for nuisance in fit.nuisance])
-    found = []
+    seen, found = seen_of(fit, records), []
     for effect in effects:
         richer = plant.with_effect(effect)
 
@@ -104,10 +112,11 @@ def changes(fit: Fit, records: Sequence[Record], effects: Sequence[Effect]) -> l
             return richer.predict_all(np.append(fit.parameters, effect_parameters), runs, first)[0]
 
         base = predict(effect.null)  # with the effect in the model, so that errors of the integrator cancel
-        for start in starts_of(effect):
+        starts = starts_of(effect, seen)
+        for start in starts:
             change = predict(start) - base
             if np.all(np.isfinite(change)):
-                found.append(Change(effect, start, change))
+                found.append(Change(effect, start, change, starts[0]))
     return found
 
 
@@ -138,29 +147,45 @@ def directions(
         whole = float(np.linalg.norm(change))
         change = fit.slopes.without_followed(change)
         if np.linalg.norm(change) > policy.screen.smallest_free_share * whole:
-            found.append(Direction(one.effect, one.start, change))
+            found.append(Direction(one.effect, one.start, change, one.likeliest))
     return found
 
 
-def starts_of(effect: Effect) -> list[Floats]:
+def starts_of(effect: Effect, seen: Seen) -> list[Floats]:
     """List the parameters at which an effect is tried.
 
-    The first parameter takes every start value, and each other one its start values with the first at its first start
-    value. Staged parameters stay at their null.
+    An effect that works out its starts is tried at those. Otherwise the first parameter takes every start value, and
+    each other one its start values with the first at its first start value. Staged parameters stay at their null. The
+    first start is tried with smaller sizes as well.
+
+    Parameters
+    ----------
+    effect : Effect
+        An effect that could be added.
+    seen : Seen
+        Of the model so far.
+
+    Returns
+    -------
+    list of (k,) ndarray
+        SI; never empty.
     """
-    size = effect.parameters[0]
-    first = size.starts[0]
-    starts = []
-    for i, parameter in enumerate(effect.parameters):
-        for value in () if parameter.staged else parameter.starts:
-            values = effect.null
-            values[0], values[i] = first, value
-            starts.append(values)
+    size, starts = effect.parameters[0], []
+    if effect.starts is not None:
+        places = [place for place, _ in effect.fixed]
+        whole = [np.delete(np.array(start, dtype=float), places) for start in effect.starts(seen)]
+        starts = [np.clip(start, *effect.bounds) for start in whole]
+    else:
+        for i, parameter in enumerate(effect.parameters):
+            for value in () if parameter.staged else parameter.starts:
+                values = effect.null
+                values[0], values[i] = size.starts[0], value
+                starts.append(values)
     for share in START_SHARES:
-        small = effect.null
-        small[0] = size.null + share * (first - size.null)
+        small = starts[0].copy()
+        small[0] = size.null + share * (starts[0][0] - size.null)
         starts.append(small)
-    return starts
+    return list({start.tobytes(): start for start in starts}.values())
 
 
 def forecasts(fit: Fit, effect_directions: Sequence[Direction]) -> list[Forecast]:
@@ -200,4 +225,4 @@ def _forecast(direction: Direction, left: Floats, energy: float) -> Forecast:
     gain = 0.5 * len(left) * math.log(energy / max(lowered, 1e-6 * energy)) if energy > 0.0 else 0.0
     scaled = direction.start.copy()
     scaled[0] = best_first if best_first != null[0] else direction.start[0]
-    return Forecast(direction.effect, scaled, direction.start, gain)
+    return Forecast(direction.effect, scaled, direction.start, direction.likeliest, gain)

@@ -174,6 +174,8 @@ def _names(one: Assessment) -> set[str]:
 def _significant(task: Task, now: Assessment, best: Candidate, least: float) -> bool:
     """Return whether a candidate fits better than noise would, and predicts better by at least ``least``, rad RMS."""
     false_effect_rate = task.policy.stepwise.false_effect_rate
+    if best.effect.searched:  # among many frequencies one fits noise well
+        false_effect_rate /= now.residual_test.competing.get(best.effect.id, 1.0)
     if 2.0 * best.log_likelihood_gain <= special.chdtri(len(best.effect.parameters), false_effect_rate):
         return False  # noise would fit as well; and of two bootstrap intervals one is easily above zero
     # a left-out block may contain everything that determines a limit; held-out recordings then still show it

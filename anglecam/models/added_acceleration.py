@@ -42,7 +42,7 @@ def added_acceleration(
     def evaluate(t: float, states: Floats) -> tuple[Floats, float]:
         v = 0.0 if command is None else float(command.at(np.array([t]))[0])
         theta, omega = float(np.interp(t, time, angle)), float(np.interp(t, time, rate))
-        derivatives, added = effect.dynamics(theta, omega, v, plant, tuple(map(float, states)), parameters)
+        derivatives, added = effect.dynamics(t, theta, omega, v, plant, tuple(map(float, states)), parameters)
         return np.array(derivatives), added
 
     states = np.zeros(effect.states)

@@ -33,10 +33,10 @@ FADED = 12.0
 
 def _compile_run(effects: CompiledEffects):  # type: ignore[no-untyped-def]  # compiled
     """Return the compiled integrator of a ledger's effects."""
-    rows_of, friction_of, initial, advance = effects.rows, effects.friction, effects.initial, compile_advance(effects)
+    rows_of, initial, advance = effects.rows, effects.initial, compile_advance(effects)
 
     @njit(nogil=True)
-    def run(states, time, theta, omega, knots, lag, plant, rows, friction, max_step, near):  # type: ignore[no-untyped-def]
+    def run(states, time, theta, omega, knots, lag, plant, rows, max_step, near):  # type: ignore[no-untyped-def]
         """Write one run's angle and rate to ``states``, (n, 2)."""
         n, m = len(time), knots.shape[1]
         abc = np.array(plant)
@@ -67,7 +67,7 @@ def _compile_run(effects: CompiledEffects):  # type: ignore[no-untyped-def]  # c
                         for step in range(steps):
                             h = (end - begin) / steps
                             theta, omega, extra = advance(
-                                theta, omega, extra, begin + step * h, h, segment, lag, plant, rows, friction
+                                theta, omega, extra, now, begin + step * h, h, segment, lag, plant, rows
                             )
                 v = drive_at(stop - now, segment, lag)
                 now = stop
@@ -81,12 +81,11 @@ def _compile_run(effects: CompiledEffects):  # type: ignore[no-untyped-def]  # c
     @njit(nogil=True)
     def run_all(time, edges, first, knots, spans, lag, abc, table, max_step, near):  # type: ignore[no-untyped-def]
         plant, rows = (abc[0], abc[1], abc[2]), rows_of(table)
-        friction = friction_of(rows)
         states = np.empty((len(time), 2))
         for i in range(len(first)):
             part, command = slice(edges[i], edges[i + 1]), knots[:, spans[i, 0] : spans[i, 1]]
             theta, omega = first[i]
-            run(states[part], time[part], theta, omega, command, lag, plant, rows, friction, max_step, near[part])
+            run(states[part], time[part], theta, omega, command, lag, plant, rows, max_step, near[part])
         return states
 
     return run_all

@@ -107,30 +107,49 @@ def curve_of(effect: Effect, fit: Fit, records: Sequence[Record]) -> EffectCurve
     angle = np.concatenate(angles)
     rates = [np.gradient(a, r.time) for a, r in zip(angles, records, strict=True)]
     velocity = np.concatenate(rates)
-    if effect.port == "friction":
-        up, down, breakaway, speed = effect.friction(values)
-        omega = np.linspace(velocity.min(), velocity.max(), 400)
-        level = np.where(omega > 0.0, up, down)
-        if speed > 0.0:
-            level = level + np.maximum(breakaway - level, 0.0) * np.exp(-((omega / speed) ** 2))
-        return EffectCurve(
-            np.degrees(omega), -np.degrees(np.sign(omega) * level), "velocity, °/s", "friction torque, °/s²"
-        )
-    if effect.port == "load":
-        torque = np.array([effect.load(t, w, values) for t, w in zip(angle, velocity, strict=True)])
-        of_velocity = np.ptp([effect.load(0.0, w, values) for w in velocity]) > 0.0
-        x, name = (velocity, "velocity, °/s") if of_velocity else (angle, "angle, °")
-        return _ordered(np.degrees(x), np.degrees(torque), name, "torque added, °/s²")
     abc = np.zeros(3)
     abc[: min(3, len(fit.parameters))] = fit.parameters[:3]
+    levels = [np.zeros(len(r.time)) if r.command is None else r.command.at(r.time) for r in records]
+    demanded = abc[2] * np.concatenate(levels) - abc[1] * angle
+    if effect.port == "friction":
+        return _friction_curve(effect, values, abc, demanded, velocity)
+    if effect.port == "load":
+        return _load_curve(effect, values, abc, np.concatenate([r.time for r in records]), angle, velocity)
     if effect.port == "dynamics":
         pairs = zip(records, angles, strict=True)
         torque = np.concatenate([added_acceleration(effect, values, abc, r.time, a, r.command) for r, a in pairs])
         return _ordered(np.degrees(angle), np.degrees(torque), "angle, °", "torque added, °/s²")
-    levels = [np.zeros(len(r.time)) if r.command is None else r.command.at(r.time) for r in records]
-    demanded = abc[2] * np.concatenate(levels) - abc[1] * angle
-    applied = np.array([effect.servo(q, t, abc, values) for q, t in zip(demanded, angle, strict=True)])
+    at = zip(demanded, angle, velocity, strict=True)
+    applied = np.array([effect.servo(q, t, w, abc, values) for q, t, w in at])
     return _ordered(np.degrees(demanded), np.degrees(applied), "torque demanded, °/s²", "torque applied, °/s²", True)
+
+
+def _friction_curve(effect: Effect, values: Floats, abc: Floats, torque: Floats, velocity: Floats) -> EffectCurve:
+    """Return the friction over the velocity, or over the servo's torque if it depends on that."""
+    if effect.friction(0.0, 0.0, abc, values) != effect.friction(1.0, 0.0, abc, values):
+        q = np.linspace(torque.min(), torque.max(), 400)
+        level = np.array([effect.friction(one, 0.0, abc, values)[0] for one in q])
+        return EffectCurve(np.degrees(q), np.degrees(level), "torque demanded, °/s²", "friction torque, °/s²")
+    up, down, breakaway, speed = effect.friction(0.0, 0.0, abc, values)
+    omega = np.linspace(velocity.min(), velocity.max(), 400)
+    level = np.where(omega > 0.0, up, down)
+    if speed > 0.0:
+        level = level + np.maximum(breakaway - level, 0.0) * np.exp(-((omega / speed) ** 2))
+    return EffectCurve(np.degrees(omega), -np.degrees(np.sign(omega) * level), "velocity, °/s", "friction torque, °/s²")
+
+
+def _load_curve(
+    effect: Effect, values: Floats, abc: Floats, time: Floats, angle: Floats, velocity: Floats
+) -> EffectCurve:
+    """Return the torque added over the time at the largest velocity, or else over the velocity, or over the angle."""
+    t, fastest = np.linspace(time.min(), time.max(), 800), np.max(np.abs(velocity))
+    over_time = np.array([effect.load(one, 0.0, fastest, abc, values) for one in t])
+    if np.ptp(over_time) > 0.0:
+        return EffectCurve(t, np.degrees(over_time), "time, s", "torque added, °/s²")
+    torque = np.array([effect.load(0.0, q, w, abc, values) for q, w in zip(angle, velocity, strict=True)])
+    of_velocity = np.ptp([effect.load(0.0, 0.0, w, abc, values) for w in velocity]) > 0.0
+    x, name = (velocity, "velocity, °/s") if of_velocity else (angle, "angle, °")
+    return _ordered(np.degrees(x), np.degrees(torque), name, "torque added, °/s²")
 
 
 def _command_curve(effect: Effect, values: Floats, records: Sequence[Record]) -> EffectCurve:

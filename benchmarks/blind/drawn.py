@@ -1,4 +1,4 @@
-"""How the benchmarks draw effects: the eighteen of the ledger, and four outside it.
+"""How the benchmarks draw effects: those of the ledger, and some outside it.
 
 For each effect: the spec's keys that scale its size, the distribution of its other keys, and the true value of the
 parameter that the loop reports.
@@ -51,6 +51,15 @@ def _any_way(rng: Rng) -> Keys:
     return {"dx_px": 4 * math.cos(turn), "dy_px": 4 * math.sin(turn)}
 
 
+CURVE = math.radians(15.0)
+"""Command at which `anglecam.effects.command_curve` states the strength of its curve, rad."""
+
+
+def _any_curve(rng: Rng) -> Keys:
+    turn = rng.uniform(0, 2 * math.pi)
+    return {"p_per_rad": 0.1 * math.cos(turn) / CURVE, "q_per_rad2": 0.1 * math.sin(turn) / CURVE**2}
+
+
 LEDGER: Mapping[str, Drawn] = {
     "dead_time": Drawn({"tau_s": 0.002}, reported=_same("tau_s")),
     "actuator_lag": Drawn({"tau_s": 0.006}, reported=_same("tau_s")),
@@ -77,6 +86,64 @@ LEDGER: Mapping[str, Drawn] = {
         {"swing": 0.3}, shape=lambda rng: {"share": 1.0}, reported=lambda keys, camera, lever: 1.0
     ),
     "constant_torque": Drawn({"torque": 0.5}, signed=True, reported=_degrees("torque")),
+    "load_dependent_friction": Drawn(
+        {"share": 0.02}, shape=lambda rng: {"spring_share": rng.uniform(0, 0.8)}, reported=_same("share")
+    ),
+    "speed_dependent_torque": Drawn(
+        {"stall": 100.0},
+        inverse=True,
+        shape=lambda rng: {"no_load_deg_per_s": rng.uniform(300, 600)},
+        reported=_degrees("stall"),
+    ),
+    "cogging": Drawn(
+        {"amplitude": 1.0},
+        shape=lambda rng: {"periods_per_turn": rng.uniform(40, 120), "phase": rng.uniform(0, 2 * math.pi)},
+        reported=_degrees("amplitude"),
+    ),
+    "end_stop": Drawn(
+        {"upper_deg": 12.0},
+        along=("lower_deg",),
+        inverse=True,
+        shape=lambda rng: {
+            "lower_deg": -12.0 * rng.uniform(0.8, 1.2),
+            "stiffness": rng.uniform(500, 4000),
+            "dissipation": rng.uniform(0, 0.5),
+        },
+        reported=_same("stiffness"),
+    ),
+    "elastic_coupling": Drawn(
+        {"inertia_share": 0.01},
+        shape=lambda rng: {"frequency_hz": rng.uniform(2, 6), "damping_ratio": rng.uniform(0.01, 0.05)},
+        reported=_same("inertia_share"),
+    ),
+    "one_sided_spring": Drawn(
+        {"stiffness": 5.0},
+        signed=True,
+        shape=lambda rng: {"slack_deg": rng.uniform(-6, 6)},
+        reported=_same("stiffness"),
+    ),
+    "periodic_disturbance": Drawn(
+        {"amplitude": 0.6},
+        shape=lambda rng: {"frequency_hz": rng.uniform(0.8, 5), "phase": rng.uniform(0, 2 * math.pi)},
+        reported=_degrees("amplitude"),
+    ),
+    "time_varying_parameter": Drawn(
+        {"share": 0.1},
+        signed=True,
+        shape=lambda rng: {"time_s": rng.uniform(10, 60)},
+        reported=lambda keys, camera, lever: -keys["share"] / keys["time_s"],
+    ),
+    "command_curve": Drawn(
+        {},
+        along=("p_per_rad", "q_per_rad2"),
+        shape=_any_curve,
+        reported=lambda keys, camera, lever: math.hypot(keys["p_per_rad"] * CURVE, keys["q_per_rad2"] * CURVE**2),
+    ),
+    "perspective": Drawn(
+        {"yaw_deg": 8.0},
+        shape=lambda rng: {"axis_deg": rng.uniform(0, 180)},
+        reported=lambda keys, camera, lever: abs(keys["yaw_deg"]),
+    ),
     "camera_tilt": Drawn(
         {"tilt_deg": 8.0},
         shape=lambda rng: {"axis_deg": rng.uniform(0, 180)},
@@ -102,20 +169,28 @@ LEDGER: Mapping[str, Drawn] = {
 """Effects of the ledger, by the ids of `anglecam.effects.LEDGER`."""
 
 OUTSIDE: Mapping[str, Drawn] = {
-    "slack_spring": Drawn({"stiffness": 5.0}, shape=lambda rng: {"slack_deg": rng.uniform(-6, 6)}),
-    "flexible_appendage": Drawn(
-        {"inertia_share": 0.01},
-        shape=lambda rng: {"frequency_hz": rng.uniform(2, 6), "damping_ratio": rng.uniform(0.01, 0.05)},
+    "hysteresis_spring": Drawn({"force": 0.8}, shape=lambda rng: {"width_deg": rng.uniform(0.5, 3)}),
+    "detent": Drawn(
+        {"force": 3.0}, shape=lambda rng: {"angle_deg": rng.uniform(-5, 5), "width_deg": rng.uniform(0.5, 1.5)}
     ),
-    "periodic_disturbance": Drawn(
-        {"amplitude": 0.6},
-        shape=lambda rng: {"frequency_hz": rng.uniform(0.8, 5), "phase": rng.uniform(0, 2 * math.pi)},
-    ),
-    "warming_damping": Drawn({"share": 0.1}, shape=lambda rng: {"work": rng.uniform(5, 30)}),
+    "shifted_load": Drawn({"torque": 0.5}, signed=True, shape=lambda rng: {"at_s": rng.uniform(2, 5)}),
+    "wind_gusts": Drawn({"rms": 0.5}, shape=lambda rng: {"number": float(rng.integers(1000))}),
+    "self_excitation": Drawn({"rate": 1.0}, shape=lambda rng: {"width_deg": rng.uniform(6, 12)}),
+    "torque_walk": Drawn({"spread": 0.5}, shape=lambda rng: {"number": float(rng.integers(1000))}),
 }
 """Effects outside the ledger; the right verdict is ``unexplained``."""
 
 ALL = {**LEDGER, **OUTSIDE}
+
+NUMBERED = (
+    "actuator_lag", "angle_drift", "backlash", "camera_tilt", "clock_scale", "constant_torque", "coulomb_friction",
+    "dead_time", "dead_zone", "elastic_coupling", "gravity_geometry", "lens_distortion", "linkage_geometry",
+    "periodic_disturbance", "pivot_offset", "quadratic_drag", "rate_limit", "rolling_shutter", "one_sided_spring",
+    "stiffening_spring", "torque_saturation", "time_varying_parameter", "cogging", "command_curve", "end_stop",
+    "load_dependent_friction", "perspective", "speed_dependent_torque", "detent", "hysteresis_spring",
+    "self_excitation", "shifted_load", "torque_walk", "wind_gusts",
+)  # fmt: skip
+"""The effects in an order that never changes, because a number in it is part of a draw's seed; append new ones."""
 
 
 def draw(name: str, seed: int) -> dict[str, Keys]:
@@ -134,7 +209,7 @@ def draw(name: str, seed: int) -> dict[str, Keys]:
         ``{name: keys}`` as in a film's spec, for `benchmarks.blind.sessions.scaled`.
     """
     effect = ALL[name]
-    rng = np.random.default_rng([seed, sorted(ALL).index(name), 1])
+    rng = np.random.default_rng([seed, NUMBERED.index(name), 1])
     sign = float(rng.choice([-1.0, 1.0])) if effect.signed else 1.0
     sizes = {key: effect.null + sign * (value - effect.null) for key, value in effect.size.items()}
     return {name: sizes | effect.shape(rng)}

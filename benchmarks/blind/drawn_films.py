@@ -17,7 +17,7 @@ import typer
 import yaml
 
 from anglecam.effects import effect
-from benchmarks.blind.drawn import ALL, OUTSIDE, draw
+from benchmarks.blind.drawn import ALL, NUMBERED, OUTSIDE, draw
 from benchmarks.blind.judged import true_values
 from benchmarks.blind.sessions import HELD_OUT, Effects, look, scaled, spec_of
 from synth.spec import Spec
@@ -56,7 +56,7 @@ def film_spec(name: str, seed: int) -> Spec:
     ValueError
         If the rig cannot show any size of the effect.
     """
-    rng = np.random.default_rng([seed, sorted(ALL).index(name), 2])
+    rng = np.random.default_rng([seed, NUMBERED.index(name), 2])
     content = spec_of(_sized(name, seed, rng), seed=seed).model_dump(mode="json", exclude_unset=True)
     content["camera"] |= _camera(rng)
     if "rolling_shutter" in content["effects"]:

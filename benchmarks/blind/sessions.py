@@ -41,7 +41,8 @@ SPREAD = 0.2
 DECLARED = 0.25
 """Share of sessions with a declared neutral although no constant torque requires it."""
 NEAR_M, SMALLER, FARTHER = 0.6, 0.5, 2.0
-"""With lens distortion the camera is this close, m, and the rig this many times as large and as far from the middle."""
+"""With lens distortion or perspective the camera is this close, m; with lens distortion the rig is this many times as
+large and as far from the middle."""
 SETTLED = 4
 """Iterations for the row of the mouth and the time of that row; they converge to far below a microsecond."""
 CLOSE = 0.02
@@ -189,7 +190,7 @@ def spec_of(effects: Effects, *, seed: int, fps: float = 30, plant: tuple[float,
                 "pivot_px": (319.5 + behind if left else 319.5 - behind, 239.5 + below),
                 "facing": "left" if left else "right",
             },
-            "camera": {"fps": fps, **({"distance_m": NEAR_M} if wide else {})},
+            "camera": {"fps": fps, **({"distance_m": NEAR_M} if wide or "perspective" in effects else {})},
             # levels are drawn as head angles, which must stay within the reach of the linkage
             "recordings": _recordings(_rng(seed, MOVES), swing * float(b / c)),
         }

@@ -115,7 +115,7 @@ class Gl:
             self._scene.set_pose(node, poses[body])
         eye = np.eye(4)
         eye[:3, :3] = camera.rotation.T
-        eye[:3, 3] = camera.rotation.T @ [0.0, 0.0, camera.distance_m]
+        eye[:3, 3] = camera.eye
         self._scene.set_pose(self._eye, eye)
         shifts = (np.arange(self._passes) + 0.5) / self._passes - 0.5
         total = sum(self._once(camera, dx / self._times, dy / self._times) for dx in shifts for dy in shifts)

@@ -140,7 +140,7 @@ class Raster:
         """Project and light the wanted triangles that reach into rows `top` to `bottom`; return them."""
         surface = self._surface
         project(
-            surface.vertices, surface.body, camera.rotation @ placed, camera.distance_m, camera.focal_px,
+            surface.vertices, surface.body, camera.posed(placed), camera.distance_m, camera.focal_px,
             np.asarray(camera.principal_px, dtype=float), np.asarray(camera.lens_px), camera.k1,
             self._pixels, self._inverse_depth,
         )  # fmt: skip
@@ -169,5 +169,5 @@ def _key(camera: Pinhole, placed: Floats) -> tuple[object, ...]:
     """Return all that the picture of bodies at these poses depends on."""
     return (
         placed.tobytes(), camera.rotation.tobytes(), tuple(camera.principal_px), camera.distance_m, camera.focal_px,
-        camera.k1,
+        camera.k1, camera.aside_m,
     )  # fmt: skip

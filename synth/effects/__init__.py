@@ -1,8 +1,8 @@
 """The effects that a spec can switch on: every module here that defines ``EFFECT``. To add an effect, add a file.
 
 θ is the head's angle, u the command, and torques are angular accelerations: rad/s². Effects that anglecam can detect
-carry the id that it uses; `slack_spring`, `flexible_appendage`, `periodic_disturbance` and `warming_damping` exist only
-here, so that anglecam is tested on structure that none of its effects explains.
+carry the id that it uses; `hysteresis_spring`, `detent`, `shifted_load`, `wind_gusts`, `self_excitation` and
+`torque_walk` exist only here, so that anglecam is tested on structure that none of its effects explains.
 """
 
 from __future__ import annotations

@@ -59,25 +59,36 @@ class Friction:
     leave_downward: float
     stribeck: float | None
     """ω_s, rad/s."""
+    share: float = 0.0
+    """Share of the servo's torque that is added to every level (`load_dependent_friction`)."""
 
-    def sliding(self, sense: int, omega: float) -> float:
-        """Return the friction's angular acceleration, rad/s², against a motion of sense +1 or −1 and speed, rad/s."""
+    def sliding(self, sense: int, omega: float, servo: float = 0.0) -> float:
+        """Return the friction's angular acceleration, rad/s², against a motion of sense +1 or −1 and speed, rad/s.
+
+        `servo` is the servo's torque, rad/s².
+        """
         level = self.upward if sense > 0 else self.downward
         if self.stribeck is not None:
-            level += (self.breakaway(sense) - level) * math.exp(-((omega / self.stribeck) ** 2))
-        return -sense * level
+            leave = self.leave_upward if sense > 0 else self.leave_downward
+            level += (leave - level) * math.exp(-((omega / self.stribeck) ** 2))
+        return -sense * (level + self.share * abs(servo))
 
-    def breakaway(self, sense: int) -> float:
+    def breakaway(self, sense: int, servo: float = 0.0) -> float:
         """Return the torque needed to leave rest in a sense, rad/s²."""
-        return self.leave_upward if sense > 0 else self.leave_downward
+        return (self.leave_upward if sense > 0 else self.leave_downward) + self.share * abs(servo)
 
-    def sense(self, torque: float) -> int:
+    def sense(self, torque: float, servo: float = 0.0) -> int:
         """Return the direction in which a torque moves a resting head: +1, −1, or 0 where it sticks."""
-        return 1 if torque > self.leave_upward else -1 if torque < -self.leave_downward else 0
+        return 1 if torque > self.breakaway(1, servo) else -1 if torque < -self.breakaway(-1, servo) else 0
 
 
-def build_friction(effect: CoulombFriction) -> Friction:
-    """Return the friction of a spec's section, with its defaults filled in."""
+def build_friction(effect: CoulombFriction | None, share: float = 0.0) -> Friction | None:
+    """Return the friction of a spec's section, with its defaults filled in; ``None`` where nothing rubs.
+
+    `share` is that of the servo's torque in `load_dependent_friction`.
+    """
+    if effect is None:
+        return Friction(0.0, 0.0, 0.0, 0.0, None, share) if share > 0.0 else None
     downward = effect.torque if effect.downward is None else effect.downward
     leave = effect.breakaway
     return Friction(
@@ -86,4 +97,5 @@ def build_friction(effect: CoulombFriction) -> Friction:
         leave_upward=effect.torque if leave is None else leave,
         leave_downward=downward if leave is None else leave,
         stribeck=None if effect.stribeck_deg_per_s is None else math.radians(effect.stribeck_deg_per_s),
+        share=share,
     )

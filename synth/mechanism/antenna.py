@@ -1,4 +1,4 @@
-"""An antenna on the head, which shows the motion of the effect `flexible_appendage`."""
+"""An antenna on the head, which shows the motion of the effect `elastic_coupling`."""
 
 from __future__ import annotations
 

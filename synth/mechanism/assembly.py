@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from synth.effects.flexible_appendage import FlexibleAppendage
+from synth.effects.elastic_coupling import ElasticCoupling
 from synth.effects.pivot_offset import PivotOffset
 from synth.mechanism.antenna import antenna, antenna_pose
 from synth.mechanism.backdrop import backdrop
@@ -53,7 +53,7 @@ def build(spec: Spec, offset: tuple[float, float] = (0.0, 0.0)) -> list[Part]:
     hung = suspension(spec)
     parts += shaft(rig, offset if spec.effects.get(PivotOffset) else None)
     parts += [*links(rig.linkage, hung.arm), *springs(rig.linkage, hung), *stand(rig.linkage, hung.anchor)]
-    if spec.effects.get(FlexibleAppendage):
+    if spec.effects.get(ElasticCoupling):
         parts += antenna()
     return parts
 

@@ -21,7 +21,8 @@ def before(camera: Pinhole, pixels: Floats, height: float) -> Floats:
     """
     off = (pixels - np.asarray(camera.principal_px)) * [1.0, -1.0]
     plane = np.full((*off.shape[:-1], 1), height)
-    return np.asarray(np.concatenate([off * metres(camera, height), plane], axis=-1) @ camera.rotation)
+    across = off * metres(camera, height) - camera.aside_m
+    return np.asarray(np.concatenate([across, plane], axis=-1) @ camera.rotation)
 
 
 def facing(camera: Pinhole, pixels: Floats, height: float) -> Floats:

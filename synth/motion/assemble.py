@@ -13,6 +13,8 @@ from synth.effects import Effect
 from synth.effects.coulomb_friction import CoulombFriction, build_friction
 from synth.effects.dead_zone import DeadZone
 from synth.effects.linkage_geometry import LinkageGeometry
+from synth.effects.load_dependent_friction import LoadDependentFriction
+from synth.effects.speed_dependent_torque import SpeedDependentTorque
 from synth.effects.torque_saturation import TorqueSaturation
 from synth.motion.linkage import transmission
 from synth.motion.mechanism import BaseModel, Mechanism
@@ -41,15 +43,19 @@ def assemble(spec: Spec) -> System:
     effects = spec.effects
     mechanism = _mechanism(spec)
     zone, limit, dry = effects.get(DeadZone), effects.get(TorqueSaturation), effects.get(CoulombFriction)
+    falling, pressed = effects.get(SpeedDependentTorque), effects.get(LoadDependentFriction)
+    stall = falling.stall if falling else limit.limit if limit else None
     return System(
         mechanism=mechanism,
         servo=build_servo(
             mechanism.gain,
             math.radians(zone.half_width_deg) if zone else None,
-            limit.limit if limit else None,
+            stall,
+            math.radians(falling.no_load_deg_per_s) if falling else None,
+            divided=pressed is not None,
         ),
         acting=_acting(effects.present()),
-        friction=build_friction(dry) if dry else None,
+        friction=build_friction(dry, pressed.share if pressed else 0.0),
         count=state_count(effects.present()),
     )
 
@@ -65,21 +71,28 @@ def rest_angle(system: System) -> float:
     def no_command(t: float) -> float:
         return 0.0
 
-    def torque(theta: float) -> float:
-        state = [theta] + [0.0] * (system.count - 1)
-        mode = system.mode(0.0, state, no_command)
-        return system.torque(0.0, state, mode, no_command)[0] - system.disturbance(0.0)
+    friction = system.friction
 
-    first, friction = torque(0.0), system.friction
-    sense = friction.sense(first) if friction else int(np.sign(first))
+    def torques(theta: float) -> tuple[float, float]:
+        state = [theta] + [0.0] * (system.count - 1)
+        total, _, servo = system.torque(0.0, state, system.mode(0.0, state, no_command), no_command)
+        return total - system.disturbance(0.0), servo
+
+    first = torques(0.0)
+    sense = friction.sense(*first) if friction else int(np.sign(first[0]))
     if sense == 0:
         return 0.0
-    held = friction.breakaway(sense) - TORQUE_SLOP if friction else 0.0
+
+    def left(theta: float) -> float:
+        """Return the torque in that sense beyond what friction holds."""
+        total, servo = torques(theta)
+        return sense * total - (friction.breakaway(sense, servo) - TORQUE_SLOP if friction else 0.0)
+
     low, high = system.mechanism.reach
     angles = np.linspace(0.0, min(SEARCHED, high) if sense > 0 else max(-SEARCHED, low), 361)
     for before, after in itertools.pairwise(angles.tolist()):
-        if sense * torque(after) <= held:
-            return float(brentq(lambda theta: sense * torque(theta) - held, before, after, xtol=1e-15, rtol=1e-14))
+        if left(after) <= 0.0:
+            return float(brentq(left, before, after, xtol=1e-15, rtol=1e-14))
     return 0.0
 
 
@@ -110,4 +123,5 @@ def _mechanism(spec: Spec) -> Mechanism:
 def _servo_share(effects: Effects) -> float:
     """Return the share of b that is the servo's position feedback: all of it unless an effect states another."""
     stated = effects.get(TorqueSaturation) or effects.get(LinkageGeometry)
-    return stated.share if stated else 1.0
+    pressed = effects.get(LoadDependentFriction)
+    return stated.share if stated else 1.0 - pressed.spring_share if pressed else 1.0

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from synth.effects import Effect
 from synth.effects.actuator_lag import ActuatorLag
-from synth.effects.flexible_appendage import FlexibleAppendage
+from synth.effects.elastic_coupling import ElasticCoupling
 from synth.motion.assemble import assemble, rest_angle
 from synth.motion.drive import drive
 from synth.motion.integrate import integrate
@@ -41,7 +41,7 @@ class Motion:
 
     def appendage(self, times: ArrayLike) -> Floats:
         """Return ψ of the appendage from the head, rad, in the shape of the times, s; zero without an appendage."""
-        return self._row(self.places[FlexibleAppendage.id].start, times)
+        return self._row(self.places[ElasticCoupling.id].start, times)
 
     def _row(self, row: int, times: ArrayLike) -> Floats:
         at = np.asarray(times, dtype=float)

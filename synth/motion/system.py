@@ -87,8 +87,8 @@ class System:
             omega = state[1]
             acceleration = 0.0
             if sense:
-                torque, inertia = self.torque(t, state, mode, drive)
-                dry = friction.sliding(sense, omega) if friction else 0.0
+                torque, inertia, servo = self.torque(t, state, mode, drive)
+                dry = friction.sliding(sense, omega, servo) if friction else 0.0
                 acceleration = (torque + dry) / inertia
             out = [omega, acceleration] + [0.0] * (self.count - 2)
             for dynamics, place, _ in stateful:
@@ -97,17 +97,18 @@ class System:
 
         return rates
 
-    def torque(self, t: float, state: State, mode: Mode, drive: Signal) -> tuple[float, float]:
-        """Return all torques but friction, rad/s², and the inertia they act on, relative to the head's."""
+    def torque(self, t: float, state: State, mode: Mode, drive: Signal) -> tuple[float, float, float]:
+        """Return all torques but friction, rad/s², the inertia they act on, relative to the head's, and the servo's."""
         theta, omega = state[0], state[1]
         damping = 1.0
         for dynamics, place, _ in self._damping:
             damping *= dynamics.damping_factor(state[place])
         feedback, lever, torque, inertia = self.mechanism.terms(theta, omega, damping)
-        torque += lever * self.servo.torque(mode.sector, drive(t) - feedback) + self.disturbance(t)
+        servo = lever * self.servo.torque(mode.sector, drive(t) - feedback, omega)
+        torque += servo + self.disturbance(t)
         for dynamics, place, edge in self._torques:
             torque += dynamics.torque(theta, omega, state[place], edge is not None and mode.above[edge])
-        return torque, inertia
+        return torque, inertia, servo
 
     def disturbance(self, t: float) -> float:
         """Return the torques that depend on time alone, rad/s²."""
@@ -117,7 +118,7 @@ class System:
         """Return the mode of a state; `sense` is kept where the state does not determine it."""
         error = drive(t) - self.mechanism.terms(state[0], 0.0, 1.0).feedback
         above = tuple(dynamics.edge(state[0]) > 0 for dynamics, _, _ in self._edges)
-        mode = Mode(self.servo.sector(error), above, sense or 1)
+        mode = Mode(self.servo.sector(error, state[1]), above, sense or 1)
         return self._with_sense(t, state, mode, drive) if self.reverses else mode
 
     @cached_property
@@ -140,18 +141,18 @@ class System:
         if self.servo.kinks:
             error = drive(t) - self.mechanism.terms(state[0], 0.0, 1.0).feedback
             if mode.sector > 0:
-                margins[0] = error - self.servo.kinks[mode.sector - 1] + SLOP
+                margins[0] = error - self.servo.kink(mode.sector - 1, state[1]) + SLOP
             if mode.sector < len(self.servo.kinks):
-                margins[1] = self.servo.kinks[mode.sector] - error + SLOP
+                margins[1] = self.servo.kink(mode.sector, state[1]) - error + SLOP
         for number, (dynamics, _, _) in enumerate(self._edges):
             distance = dynamics.edge(state[0])
             margins[2 + number] = (distance if mode.above[number] else -distance) + SLOP
         if self.reverses and mode.sense:
             margins[-2] = mode.sense * state[1] + SLOP
         elif self.friction and not mode.sense:
-            torque = self.torque(t, state, mode, drive)[0]
-            margins[-2] = torque + self.friction.breakaway(-1) + TORQUE_SLOP
-            margins[-1] = self.friction.breakaway(+1) - torque + TORQUE_SLOP
+            torque, _, servo = self.torque(t, state, mode, drive)
+            margins[-2] = torque + self.friction.breakaway(-1, servo) + TORQUE_SLOP
+            margins[-1] = self.friction.breakaway(+1, servo) - torque + TORQUE_SLOP
         return margins
 
     def beyond(self, end: int, t: float, state: State, mode: Mode, drive: Signal) -> tuple[Mode, State]:
@@ -171,9 +172,9 @@ class System:
         """Set a mode's sense to that of the motion; at standstill, to that of the motion that begins."""
         if state[1] != 0.0:
             return mode._replace(sense=1 if state[1] > 0 else -1)
-        torque = self.torque(t, state, mode, drive)[0]
+        torque, _, servo = self.torque(t, state, mode, drive)
         if self.friction:
-            return mode._replace(sense=self.friction.sense(torque))
+            return mode._replace(sense=self.friction.sense(torque, servo))
         return mode if torque == 0.0 else mode._replace(sense=1 if torque > 0 else -1)
 
     def _with(self, method: str) -> tuple[Acting, ...]:

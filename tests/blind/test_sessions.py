@@ -6,7 +6,7 @@ import pytest
 from anglecam.effects import effect
 from anglecam.identification.output_error import fit_output_error
 from anglecam.models.plant import Plant
-from benchmarks.blind.drawn import ALL, OUTSIDE, draw, magnified
+from benchmarks.blind.drawn import ALL, NUMBERED, OUTSIDE, draw, magnified
 from benchmarks.blind.drawn_films import film_spec, write_case
 from benchmarks.blind.films import read_case
 from benchmarks.blind.judged import true_values
@@ -41,6 +41,10 @@ def test_an_effect_is_scaled_to_the_specified_residual():
     assert residual_deg(found, SEED) == pytest.approx(0.025, rel=0.02)
 
 
+def test_every_effect_has_a_number_for_its_draws():
+    assert sorted(NUMBERED) == sorted(ALL)
+
+
 @pytest.mark.parametrize("name", ALL)
 def test_magnifying_an_effect_and_back_restores_it(name):
     keys = draw(name, SEED)[name]
@@ -62,7 +66,7 @@ def test_a_fit_of_the_true_effect_recovers_the_reported_number(name):
     assert first.in_file_unit(fit.parameters[3])[0] == pytest.approx(value, rel=0.01)
 
 
-@pytest.mark.parametrize("name", ["constant_torque", "slack_spring"])
+@pytest.mark.parametrize("name", ["constant_torque", "detent"])
 def test_a_drawn_film_is_written_as_a_case_that_reads_back(name, tmp_path):
     write_case(name, SEED, tmp_path)
     case = read_case(tmp_path / f"{name}-{SEED}")

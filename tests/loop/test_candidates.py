@@ -24,6 +24,7 @@ from anglecam.loop.stepwise import Task, assess, rank_candidates
 from anglecam.models.plant import Plant
 from benchmarks.blind.drawn import draw
 from benchmarks.blind.sessions import HELD_OUT, session
+from support.starts import first_start
 
 
 @pytest.mark.parametrize(("seed", "torque"), [(5, 0.896), (7, 0.798)])
@@ -101,7 +102,7 @@ def test_between_effects_closer_than_the_cameras_uncertainty_only_strong_evidenc
 def test_a_converged_fit_gains_nothing_when_it_is_repeated():
     gravity = effect("gravity_geometry")
     fitted, _ = split_records(session(draw(gravity.id, 4), seed=4), HELD_OUT)
-    start = [26.0, 524.0, 508.0, *(p.starts[0] for p in gravity.parameters)]
+    start = [26.0, 524.0, 508.0, *first_start(gravity)]
     found = further = fit_output_error(Plant((gravity,)), fitted, [np.array(start)])
     for _ in range(4):
         further = fit_output_error(further.model, fitted, [further.parameters], nuisance=further.nuisance)

@@ -55,8 +55,8 @@ def test_the_stribeck_curve_is_fitted_with_all_parameters():
     assert np.degrees(fit.parameters[-1]) == pytest.approx(3.0, rel=0.05)
 
 
-def test_the_residual_test_detects_a_slack_spring_after_the_most_similar_gravity_is_fitted():
-    slack = {"slack_spring": {"stiffness": 9.1, "slack_deg": -0.27}}
+def test_the_residual_test_detects_a_one_sided_spring_after_the_most_similar_gravity_is_fitted():
+    slack = {"one_sided_spring": {"stiffness": 9.1, "slack_deg": -0.27}}
     fitted, _ = split_records(session(slack, seed=1), HELD_OUT)
     near = np.array([26.1, 622.9, 435.6, math.radians(4625.0), math.radians(40.6)])
     fit = fit_output_error(Plant((effect("gravity_geometry"),)), fitted, [near])

@@ -15,6 +15,7 @@ from anglecam.effects import LEDGER, Effect, Parameter, effect, ledger_of
 from anglecam.models.added_acceleration import added_acceleration
 from anglecam.models.integrator import integrator_of
 from anglecam.models.plant import Plant
+from support.starts import first_start
 
 A, B, C = 26.0, 524.0, 508.0
 TIME = np.arange(0.0, 5.0, 1 / 30)
@@ -23,7 +24,7 @@ RATIO, FREQUENCY, DAMPING = 0.3, 40.0, 3.0
 
 
 @njit
-def _second_mass(theta, omega, v, abc, states, parameters):
+def _second_mass(time, theta, omega, v, abc, states, parameters):
     """Return ÿ and the reaction on the load of a mass at y on a spring and a damper."""
     push = parameters[1] ** 2 * (theta - states[0]) + parameters[2] * (omega - states[1])
     return (states[1], push), -parameters[0] * push
@@ -35,7 +36,7 @@ def _moves_along(theta, omega, v, abc, parameters):
 
 
 @njit
-def _lagging_drive(theta, omega, v, abc, states, parameters):
+def _lagging_drive(time, theta, omega, v, abc, states, parameters):
     """Replace the drive c·v by c·x with τ·ẋ = v − x."""
     return ((v - states[0]) / parameters[0],), abc[2] * (states[0] - v)
 
@@ -140,7 +141,7 @@ def test_two_effects_with_states_act_together(integrator):
 @pytest.mark.parametrize("effects", [(), ("coulomb_friction",), ("dead_zone", "quadratic_drag", "backlash"), LEDGER])
 def test_an_effect_added_to_the_ledger_leaves_every_other_prediction_bit_for_bit(integrator, effects):
     entries = tuple(effect(e) if isinstance(e, str) else e for e in effects)
-    parameters = np.concatenate([[A, B, C], *([p.starts[0] for p in e.parameters] for e in entries)])
+    parameters = np.concatenate([[A, B, C], *(first_start(e) for e in entries)])
     angles = [
         plant.predict(parameters, TIME, COMMAND, np.array([0.1, 0.5]))
         for plant in (Plant(entries), Plant(entries, integrator=integrator))

@@ -13,11 +13,13 @@ from anglecam.data.command import Command
 from anglecam.data.runs import runs_of
 from anglecam.effects import LEDGER, effect
 from anglecam.effects.effect import PORTS
+from anglecam.loop.screen import starts_of
 from anglecam.models.compiled_effects import STEPPED_PORTS
 from anglecam.models.plant import Plant
 from support.motion import Plant as TruePlant
 from support.motion import Recording, command_rows, move
 from support.series import session
+from support.starts import SEEN, first_start
 
 TIME = np.arange(0.0, 8.0, 1 / 30)
 
@@ -103,17 +105,18 @@ def test_every_entry_of_the_ledger_is_complete():
         assert all((entry.summary, entry.equation, entry.relaxes, entry.separating_experiment, entry.source))
         assert sum(getattr(entry, port) is not None for port in PORTS) == 1
         assert (entry.states > 0) == (entry.port in ("lag", "dynamics"))
-        assert entry.parameters[0].starts
+        tried = starts_of(entry, SEEN)
+        assert all(start[0] != entry.null[0] for start in tried)
+        assert all(np.all((entry.bounds[0] <= start) & (start <= entry.bounds[1])) for start in tried)
         for p in entry.parameters:
             assert p.symbol in entry.equation
             assert p.lower <= p.null <= p.upper
-            assert all(p.lower <= start <= p.upper for start in p.starts)
 
 
 @pytest.mark.parametrize("ids", [(), ("coulomb_friction",), ("rolling_shutter", "pivot_offset"), ("backlash",)])
 def test_several_runs_are_those_that_follow_one_another(ids):
     effects = tuple(effect(name) for name in ids)
-    parameters = np.array([26.0, 524.0, 508.0, *(p.starts[0] for e in effects for p in e.parameters)])
+    parameters = np.array([26.0, 524.0, 508.0, *(x for e in effects for x in first_start(e))])
     plant, view = Plant(effects), View(0.3, 120.0, (10.0, 40.0))
     records = [replace(one, view=view) for one in session(TruePlant(), 0)]
     first = np.array([[0.01 * i, 0.1] for i in range(len(records))])
@@ -128,7 +131,7 @@ def test_several_runs_are_those_that_follow_one_another(ids):
 @pytest.mark.parametrize("name", [None, "coulomb_friction", "dead_zone", "stiffening_spring"])
 def test_a_run_that_is_told_of_a_near_one_is_the_same(name):
     effects = () if name is None else (effect(name),)
-    parameters = np.array([26.0, 524.0, 508.0, *(p.starts[0] for e in effects for p in e.parameters)])
+    parameters = np.array([26.0, 524.0, 508.0, *(x for e in effects for x in first_start(e))])
     runs, first = runs_of(session(TruePlant(), 0)), np.zeros((5, 2))
     plant = Plant(effects)
     near = plant.predict_all(parameters, runs, first)[1]

@@ -36,10 +36,10 @@ EVERYTHING = {
     "gravity_geometry": {"strength": 190, "gravity_deg": 45},
     "linkage_geometry": {"share": 0.8},
     "constant_torque": {"torque": 14},
-    "slack_spring": {"stiffness": 100, "slack_deg": 3},
-    "flexible_appendage": {"frequency_hz": 6},
+    "one_sided_spring": {"stiffness": 100, "slack_deg": 3},
+    "elastic_coupling": {"frequency_hz": 6},
     "periodic_disturbance": {"amplitude": 6, "frequency_hz": 1.7, "phase": 0.4},
-    "warming_damping": {"share": 0.5, "work": 5},
+    "time_varying_parameter": {"share": 0.5, "time_s": 2},
 }
 NOT_OF_A_NECK = ("dead_zone", "gravity_geometry", "linkage_geometry")
 

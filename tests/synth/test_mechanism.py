@@ -207,7 +207,7 @@ def test_with_a_pivot_offset_the_marker_is_on_the_bearing_and_off_the_axis():
 
 
 def test_the_antenna_turns_about_its_hinge_on_the_head():
-    parts = build(spec(effects={"flexible_appendage": {"frequency_hz": 4}}))
+    parts = build(spec(effects={"elastic_coupling": {"frequency_hz": 4}}))
     assert {part.body for part in parts if part.name.startswith("antenna")} == {"appendage", "head"}
     rest, swung = (poses(Rig(), 0.2, appendage)["appendage"] for appendage in (0.0, 0.3))
     np.testing.assert_allclose(rest[:3, 3], swung[:3, 3], atol=1e-12)
@@ -230,7 +230,7 @@ def test_the_number_of_triangles_is_bounded_and_every_part_has_a_pose(rig):
     wanted = spec(
         rig=rig,
         scene={"lamp_px": [600, 40], "occluders": [{"from_s": 1, "for_s": 1}], "distractor": {"at_px": [560, 400]}},
-        effects={"flexible_appendage": {"frequency_hz": 4}},
+        effects={"elastic_coupling": {"frequency_hz": 4}},
     )
     camera = camera_of(wanted)
     parts = build(wanted) + props(wanted, camera)

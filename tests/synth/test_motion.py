@@ -49,7 +49,7 @@ def test_a_released_head_rests_until_its_release_and_then_swings_about_zero():
     [
         ({}, lambda th: 0.0),
         ({"stiffening_spring": {"k3": 3000.0}}, lambda th: 750.0 * th**4),
-        ({"slack_spring": {"stiffness": 400.0, "slack_deg": 2.0}}, lambda th: slack_energy(th, 400.0, 2.0)),
+        ({"one_sided_spring": {"stiffness": 400.0, "slack_deg": 2.0}}, lambda th: slack_energy(th, 400.0, 2.0)),
         ({"constant_torque": {"torque": 12.0}}, lambda th: -12.0 * th),
     ],
 )
@@ -99,7 +99,7 @@ def test_a_constant_torque_has_moved_the_head_before_the_film_begins():
 
 
 def test_a_motion_is_defined_a_second_before_and_after_for_times_of_any_shape():
-    motion = let_go({"flexible_appendage": {"frequency_hz": 5.0}}, 12.0, 3.0)
+    motion = let_go({"elastic_coupling": {"frequency_hz": 5.0}}, 12.0, 3.0)
     grid = np.linspace(-1.0, 4.0, 60).reshape(3, 4, 5)
     assert motion.angle(grid).shape == motion.speed(grid).shape == motion.appendage(grid).shape == (3, 4, 5)
     assert motion.angle(-1.0) == pytest.approx(math.radians(12.0), abs=0)

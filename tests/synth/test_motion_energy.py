@@ -51,10 +51,10 @@ def arriving(spec: Spec, rows: np.ndarray) -> np.ndarray:
 def load_energy(spec: Spec, theta: np.ndarray, omega: np.ndarray, psi: np.ndarray, swing: np.ndarray) -> np.ndarray:
     """Return the energy stored by effects, per inertia of the head."""
     e = spec.effects
-    own = 2 * math.pi * e.flexible_appendage.frequency_hz
-    energy = e.flexible_appendage.inertia_share * ((omega + swing) ** 2 + own**2 * psi**2) / 2
+    own = 2 * math.pi * e.elastic_coupling.frequency_hz
+    energy = e.elastic_coupling.inertia_share * ((omega + swing) ** 2 + own**2 * psi**2) / 2
     energy += e.stiffening_spring.k3 * theta**4 / 4 - e.constant_torque.torque * theta
-    energy += e.slack_spring.stiffness / 2 * np.maximum(theta - math.radians(e.slack_spring.slack_deg), 0) ** 2
+    energy += e.one_sided_spring.stiffness / 2 * np.maximum(theta - math.radians(e.one_sided_spring.slack_deg), 0) ** 2
     if e.gravity_geometry:
         neutral = math.radians(e.gravity_geometry.gravity_deg)
         weight = np.cos(neutral + theta) + theta * math.sin(neutral) + theta**2 / 2 * math.cos(neutral)
@@ -70,8 +70,8 @@ def load_power(spec: Spec, omega: np.ndarray, swing: np.ndarray) -> np.ndarray:
     level = level + (dry.breakaway - level) * np.exp(-((omega / math.radians(dry.stribeck_deg_per_s)) ** 2))
     power = -level * np.abs(omega) - e.quadratic_drag.q * np.abs(omega) ** 3
     power += shake.amplitude * np.sin(2 * math.pi * shake.frequency_hz * TIMES + shake.phase) * omega
-    own = 2 * math.pi * e.flexible_appendage.frequency_hz
-    return power - e.flexible_appendage.inertia_share * 2 * e.flexible_appendage.damping_ratio * own * swing**2
+    own = 2 * math.pi * e.elastic_coupling.frequency_hz
+    return power - e.elastic_coupling.inertia_share * 2 * e.elastic_coupling.damping_ratio * own * swing**2
 
 
 def assert_balanced(energy: np.ndarray, power: np.ndarray) -> None:
@@ -102,7 +102,7 @@ def test_energy_is_balanced_with_all_effects_on_the_base_model(kind):
         assert (np.abs(asked) > LIMIT).any()
         assert (np.abs(error) < width).any()
         assert (omega == 0).any()
-    damping = a * (1 - EVERYTHING["warming_damping"]["share"] * warm)
+    damping = a * (1 - EVERYTHING["time_varying_parameter"]["share"] * warm)
     energy = omega**2 / 2 + (1 - share) * b * theta**2 / 2 + load_energy(spec, theta, omega, psi, swing)
     assert_balanced(energy, (servo - damping * omega) * omega + load_power(spec, omega, swing))
 
@@ -133,6 +133,6 @@ def test_energy_is_balanced_with_all_effects_on_the_neck_and_a_heavy_rotor():
     stored = springs.rate * (behind**2 + before**2) / 2 + weight + p.rotor_inertia * gamma(theta) * omega**2 / 2
     energy = omega**2 / 2 + stored / inertia + load_energy(spec, theta, omega, psi, swing)
 
-    oil = p.damping * (1 - EVERYTHING["warming_damping"]["share"] * warm)
+    oil = p.damping * (1 - EVERYTHING["time_varying_parameter"]["share"] * warm)
     lost = (oil + motor * gamma(theta)) * omega**2 + p.rotor_inertia * gamma(theta, 1) * omega**3 / 2
     assert_balanced(energy, servo * omega - lost / inertia + load_power(spec, omega, swing))

@@ -22,6 +22,7 @@ from anglecam.loop.next_experiment.design import separating_experiment, write_co
 from anglecam.loop.policy import DEFAULT
 from anglecam.loop.screen import Forecast
 from anglecam.models.plant import Plant
+from support.starts import first_start
 from synth.motion import move
 from synth.motion.command import command_rows
 from synth.spec import Spec, read_spec
@@ -81,9 +82,8 @@ def fit_each(records: list[Record], ids: list[str], phi: float = 0.0) -> list[Fi
     base = fit_output_error(plant, records, [s[: plant.base_count] for s in start_parameters(records)], phi=phi)
 
     def fit(name: str) -> Fit:
-        start = effect(name).null
-        start[0] = effect(name).parameters[0].starts[0]
-        return fit_with(base, records, Forecast(effect(name), start, start, 0.0))
+        start = first_start(effect(name))
+        return fit_with(base, records, Forecast(effect(name), start, start, start, 0.0))
 
     return [fit(name) for name in ids]
 

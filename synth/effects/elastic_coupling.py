@@ -1,4 +1,4 @@
-"""A flexible appendage: something on the head that swings, for example an antenna, and shakes the head in turn.
+"""An elastic coupling: something flexible on the head that swings, such as an antenna, and shakes the head in turn.
 
 Its angle ψ is measured from the head. It turns about the head's axis of rotation, held to the head by a spring and a
 damper. With I its inertia and J the head's,
@@ -19,10 +19,10 @@ from synth.effects.effect import Dynamics, Effect, StateVariable
 from synth.section import NotNegative, Positive
 
 
-class FlexibleAppendage(Effect):
+class ElasticCoupling(Effect):
     """An oscillator on the head."""
 
-    id: ClassVar[str] = "flexible_appendage"
+    id: ClassVar[str] = "elastic_coupling"
     order: ClassVar[int] = 200
     states: ClassVar[tuple[StateVariable, ...]] = (
         StateVariable("psi", "rad"),
@@ -42,7 +42,7 @@ class FlexibleAppendage(Effect):
         return _Oscillator(rate**2, 2 * self.damping_ratio * rate, self.inertia_share)
 
 
-EFFECT = FlexibleAppendage
+EFFECT = ElasticCoupling
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,184 @@
+"""Works out `Seen` of a fitted plant: its motion, and what a torque of any shape would explain of a residual.
+
+A torque τ(t) changes the angle of the linear plant by the e of ë + a·ė + b·e = τ. Whitened and without the part that
+the fit's parameters can follow, e is compared with the residual by least squares.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numba import njit
+from scipy.linalg import expm
+
+from anglecam.data.record import Record
+from anglecam.data.typing import Floats
+from anglecam.effects.seen import Seen
+from anglecam.identification.fit import Fit
+from anglecam.identification.joined import join
+from anglecam.loop.refit import plant_of
+
+STEP = 0.008
+"""s, between the instants at which a torque is given; it is taken for linear between them."""
+AT_ONCE = 64
+"""Columns of torques that are handled at a time, which limits the memory."""
+
+
+def seen_of(fit: Fit, records: Sequence[Record]) -> Seen:
+    """Return what a fitted plant shows.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of a `Plant`, on ``records``.
+    records : sequence of Record
+        The fitted recordings.
+
+    Returns
+    -------
+    Seen
+        Motion and residual.
+    """
+    plant = plant_of(fit)
+    times = [_instants(record.time) for record in records]
+    motion = [
+        plant.run(fit.parameters, time, record.command, nuisance[: plant.states])
+        for time, record, nuisance in zip(times, records, fit.nuisance, strict=True)
+    ]
+    levels = [np.zeros(len(t)) if r.command is None else r.command.at(t) for t, r in zip(times, records, strict=True)]
+    angle, rate = np.concatenate(motion).T
+    command = np.concatenate(levels)
+    abc = np.zeros(3)
+    abc[: plant.base_count] = fit.parameters[: plant.base_count]
+    a, b, c = abc.tolist()
+
+    def explained(torques: Sequence[Floats]) -> tuple[Floats, Floats]:
+        return _explained(fit, records, times, torques)
+
+    return Seen(
+        a,
+        b,
+        c,
+        float(angle.min()),
+        float(angle.max()),
+        float(np.abs(rate).max()),
+        float(np.abs(command).max()),
+        float(np.abs(c * command - b * angle).max()),
+        max(float(r.time[-1] - r.time[0]) for r in records),
+        float(np.median([r.interval for r in records])),
+        tuple(times),
+        tuple(states[:, 0] for states in motion),
+        explained,
+    )
+
+
+def _instants(time: Floats) -> Floats:
+    """Return evenly spaced instants from the first frame to the last, about `STEP` apart."""
+    return np.linspace(time[0], time[-1], math.ceil((time[-1] - time[0]) / STEP) + 1)
+
+
+def largest_shares(
+    fit: Fit, records: Sequence[Record], times: Sequence[Floats], torques: Sequence[Floats], residuals: Floats
+) -> Floats:
+    """Return the share of each residual's energy that the best of several pairs of torques explains.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of a `Plant`, on ``records``.
+    records : sequence of Record
+        The fitted recordings.
+    times : sequence of (n,) ndarray
+        `Seen.times` of the fit.
+    torques : sequence of (n, 2k) ndarray
+        For each recording: k pairs of columns.
+    residuals : (N, m) ndarray
+        Whitened residuals without the part that the fit's parameters can follow.
+
+    Returns
+    -------
+    (m,) ndarray
+        Largest over the pairs.
+    """
+    found = np.zeros(residuals.shape[1])
+    for change, whole in _changes(fit, records, times, torques):
+        one, two = change[:, 0::2], change[:, 1::2]
+        one = one * _inverse(np.linalg.norm(one, axis=0), whole[0::2])
+        two = two - one * np.sum(one * two, axis=0)
+        two = two * _inverse(np.linalg.norm(two, axis=0), whole[1::2])
+        explained = (one.T @ residuals) ** 2 + (two.T @ residuals) ** 2
+        found = np.maximum(found, explained.max(axis=0))
+    energy = np.sum(residuals**2, axis=0)
+    return np.minimum(found / np.where(energy > 0.0, energy, 1.0), 1.0)
+
+
+def _inverse(length: Floats, whole: Floats) -> Floats:
+    """Return 1/length; 0 for what is only the rounding error of a column as long as ``whole``."""
+    kept = length > 1e-3 * whole
+    return np.where(kept, 1.0 / np.where(kept, length, 1.0), 0.0)
+
+
+def _changes(
+    fit: Fit, records: Sequence[Record], times: Sequence[Floats], torques: Sequence[Floats]
+) -> Iterator[tuple[Floats, Floats]]:
+    """Yield `AT_ONCE` torques' changes of the whitened angles that the fit cannot follow, and the norms of all of it.
+
+    A change that is not finite is zero.
+    """
+    joined = join(records, fit.phi)
+    for begin in range(0, torques[0].shape[1], AT_ONCE):
+        blocks = [
+            _response(t, torque[:, begin : begin + AT_ONCE], record.time, *fit.parameters[:2])
+            for t, torque, record in zip(times, torques, records, strict=True)
+        ]
+        change = joined.whiten(np.concatenate(blocks))
+        change[:, ~np.all(np.isfinite(change), axis=0)] = 0.0
+        yield fit.slopes.without_followed(change), np.linalg.norm(change, axis=0)
+
+
+def _explained(
+    fit: Fit, records: Sequence[Record], times: Sequence[Floats], torques: Sequence[Floats]
+) -> tuple[Floats, Floats]:
+    """Return the best multiples (k, 2) of k pairs of torques, and the shares of the residual's energy, (k,)."""
+    left = fit.slopes.without_followed(fit.white)
+    energy = float(left @ left)
+    multiples, shares = [], []
+    for change, whole in _changes(fit, records, times, torques):
+        both, one, two = left @ change, change[:, 0::2], change[:, 1::2]
+        # a little more on the diagonal, so that a pair which the fit can follow explains nothing
+        more = 1e-6 * np.maximum(whole[0::2], whole[1::2]) ** 2 + 1e-300
+        p, q, r = np.sum(one**2, axis=0) + more, np.sum(one * two, axis=0), np.sum(two**2, axis=0) + more
+        found = np.stack([r * both[0::2] - q * both[1::2], p * both[1::2] - q * both[0::2]]) / (p * r - q**2)
+        multiples.append(found.T)
+        shares.append((found[0] * both[0::2] + found[1] * both[1::2]) / energy if energy > 0.0 else 0.0 * p)
+    return np.nan_to_num(np.concatenate(multiples)), np.nan_to_num(np.concatenate(shares))
+
+
+def _response(time: Floats, torque: Floats, frames: Floats, a: float, b: float) -> Floats:
+    """Return the change of the angle at the frames, (n, k), by (m, k) torques at evenly spaced instants."""
+    h = float(time[1] - time[0])
+    # the state and a torque that is linear over a step, under the matrix exponential
+    matrix = np.zeros((4, 4))
+    matrix[0, 1], matrix[1, :3], matrix[2, 3] = 1.0, (-b, -a, 1.0), 1.0 / h
+    with np.errstate(over="ignore", invalid="ignore"):
+        angle = _filtered(np.ascontiguousarray(expm(h * matrix)[:2]), torque)
+    place = np.clip((frames - time[0]) / h, 0.0, len(time) - 1.0)
+    i = np.minimum(place.astype(int), len(time) - 2)
+    part = (place - i)[:, None]
+    return (1.0 - part) * angle[i] + part * angle[i + 1]
+
+
+@njit(nogil=True, cache=True)
+def _filtered(step: Floats, torque: Floats) -> Floats:
+    """Return the angles, (m, k), from rest; ``step`` maps angle, rate, torque and its rise to the next two."""
+    m, k = torque.shape
+    angle, rate = np.zeros((m, k)), np.zeros(k)
+    for i in range(1, m):
+        for j in range(k):
+            now, rise = torque[i - 1, j], torque[i, j] - torque[i - 1, j]
+            before, speed = angle[i - 1, j], rate[j]
+            angle[i, j] = step[0, 0] * before + step[0, 1] * speed + step[0, 2] * now + step[0, 3] * rise
+            rate[j] = step[1, 0] * before + step[1, 1] * speed + step[1, 2] * now + step[1, 3] * rise
+    return angle
