@@ -32,12 +32,15 @@ def _load(time: float, theta: float, omega: float, abc: Values, parameters: Valu
 
 
 def _starts(seen: Seen) -> list[Values]:
-    """Start with stops just inside the range of the motion, above, below and on both sides."""
+    """Start with stops just inside the range of the motion, on both sides, above and below.
+
+    Both come first: a fit can move a stop out of the range, but not in from where it has no effect.
+    """
     high, low = max(seen.high, 1e-3), min(seen.low, -1e-3)
     return [
         (times * seen.stiffness, above / (share * high), below / (share * low), DISSIPATION)
         for share, times in ((0.85, 4.0), (0.96, 20.0), (0.6, 2.0))
-        for above, below in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
+        for above, below in ((1.0, 1.0), (1.0, 0.0), (0.0, 1.0))
     ]
 
 

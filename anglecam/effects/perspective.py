@@ -53,7 +53,7 @@ def _observe(time: Floats, angle: Floats, parameters: Floats, view: View) -> Flo
 
 def _starts(seen: Seen) -> list[Values]:
     """Start with the directions and mark heights of `camera_tilt`, from a near camera."""
-    return [(0.3, axis, 0.25, height) for height in (0.5, -0.5) for axis in (0.8, 1.6, 2.4, 0.0)]
+    return [(0.3, axis, 0.25, height) for height in (0.5, -0.5) for axis in (0.0, 0.8, 1.6, 2.4)]
 
 
 def _needs(view: View) -> bool:

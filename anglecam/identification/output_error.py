@@ -25,7 +25,8 @@ from anglecam.identification.variable_projection import fit_nuisance, fit_shared
 from anglecam.models.model import Model
 
 TRIAL_EVALUATIONS = 8
-"""Evaluations of each of several starts before only the best of them is continued."""
+"""Evaluations of each of several starts before only the best `CONTINUED` of them are continued."""
+CONTINUED = 2
 MAX_EVALUATIONS = 60
 """Most evaluations of a fit."""
 _BLAS = ThreadpoolController()
@@ -70,13 +71,16 @@ def fit_output_error(
 def fit_best_start(
     model: Model, records: Sequence[Record], starts: Sequence[Floats], nuisance: Sequence[Floats], phi: float
 ) -> Fit:
-    """Fit as `fit_output_error` does, but continue only the start that is best after a few steps.
+    """Fit as `fit_output_error` does, but continue only the starts that are best after a few steps.
 
     For models whose fits are slow; a few steps find the deepest minimum almost as reliably.
     """
-    trials = _fit_all(model, records, starts, nuisance, phi, False, TRIAL_EVALUATIONS)
-    best = min(trials, key=lambda fit: fit.cost)
-    return fit_output_error(model, records, [best.parameters], nuisance=best.nuisance, phi=phi)
+    trials = sorted(_fit_all(model, records, starts, nuisance, phi, False, TRIAL_EVALUATIONS), key=lambda fit: fit.cost)
+    fits = [
+        fit_output_error(model, records, [trial.parameters], nuisance=trial.nuisance, phi=phi)
+        for trial in trials[:CONTINUED]
+    ]
+    return min(fits, key=lambda fit: fit.cost)
 
 
 def _fit_all(
