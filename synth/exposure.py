@@ -1,11 +1,8 @@
 """Exposure of a frame: the light is an integral over time, here a weighted sum over a few instants.
 
-With a global shutter the instants are the middles of equal parts of the exposure (midpoint rule).
-
-With a rolling shutter row y of a frame taken at t is open for the exposure E around t + row_time·(y − middle row). The
-picture is assumed to change linearly between instants, so an instant's weight in a row is the integral of a hat
-function over the time for which the row is open. Hat functions preserve means: the mean time of every row is exact for
-any number of instants.
+Row y of a frame taken at t is open for the exposure E around t + row_time·(y − middle row). The picture is assumed to
+change linearly between instants, so an instant's weight in a row is the integral of a hat function over the time for
+which the row is open. Hat functions preserve means: the mean time of every row is exact for any number of instants.
 """
 
 from __future__ import annotations
@@ -22,11 +19,6 @@ Light = NDArray[np.float32]
 
 STILL_PX = 0.1
 """If the mark moves less than this during the exposure, a single instant is drawn, px."""
-
-
-MIDPOINT_LONGER = math.sqrt(2.0)
-"""How much longer the parts of the midpoint rule are than the distances between the instants of a rolling shutter: its
-error is half as large and grows with the square of the length."""
 
 
 @dataclass(frozen=True)
@@ -71,8 +63,7 @@ def instants(shutter: Shutter, taken: float, path_px: float, step_px: float) -> 
     path_px : float
         Distance the mark moves in the picture during the exposure, px.
     step_px : float
-        Largest distance between two instants of a rolling shutter, px; those of a global one are up to
-        `MIDPOINT_LONGER` as far apart.
+        Largest distance between two instants, px.
 
     Returns
     -------
@@ -81,10 +72,6 @@ def instants(shutter: Shutter, taken: float, path_px: float, step_px: float) -> 
     """
     if path_px <= STILL_PX:
         return Instants(np.array([taken]), np.ones((1, 1)))
-    if shutter.row_time_s == 0.0:
-        parts = max(2, math.ceil(path_px / (MIDPOINT_LONGER * step_px)))
-        middles = taken + shutter.exposure_s * ((np.arange(parts) + 0.5) / parts - 0.5)
-        return Instants(middles, np.full((parts, 1), 1.0 / parts))
     steps = max(1, math.ceil(path_px / step_px))
     times = taken + shutter.span_s * (np.arange(steps + 1) / steps - 0.5)
     spacing = shutter.span_s / steps
