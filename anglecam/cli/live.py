@@ -53,8 +53,8 @@ def live(
     ] = None,
 ) -> None:
     """Measure while filming: each angle as it comes, the recording, and the files that `measure` makes of it."""
-    from anglecam.io.command_csv import COMMAND_ENDING, read_command
-    from anglecam.io.session import recording_name, rig_beside
+    from anglecam.io.command_csv import COMMAND_ENDING
+    from anglecam.io.session import command_of, recording_name, rig_beside
     from anglecam.video.live_source import open_live
     from anglecam.workflow.live import measure_live
 
@@ -65,7 +65,7 @@ def live(
         if command is None and film is not None:
             beside = film.with_name(recording_name(film) + COMMAND_ENDING)
             command = beside if beside.is_file() else None
-        commanded = None if command is None else read_command(command)
+        commanded = None if command is None else command_of(command, declared)
         opened = open_live(source)
         with progress_bars() as bars, _stopped_by_signals(opened):
             display = _Display(bars)

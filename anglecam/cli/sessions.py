@@ -61,7 +61,7 @@ def close(
     """Find what the model lacks: loop.json, report.html and, where it helps, the command to play next."""
     from anglecam.report.session_tables import loop_table, model_table
     from anglecam.workflow.session import loop_input, require_recordings
-    from anglecam.workflow.session_results import write_closed
+    from anglecam.workflow.session_results import REPORT, write_closed
 
     opened = read_session(session)
     require_recordings(opened, hold_out or ())
@@ -86,7 +86,8 @@ def close(
     screen.print(loop_table(closed.verdict, closed.experiment))
     for line in closed.missing:
         errors.print(printable(f"{session}: {line}"), soft_wrap=True)
-    screen.print(f"report: {out / 'report.html'}", soft_wrap=True)
+    if (out / REPORT).exists():
+        screen.print(f"report: {out / REPORT}", soft_wrap=True)
     end(measured.problems)
 
 

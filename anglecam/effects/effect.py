@@ -162,6 +162,11 @@ class Effect:
     not depend on the residual. `starts` finds the best pairs; the residual test finds them in noise, too."""
     needs: Callable[[View], bool] = field(default=lambda view: True, repr=False)
     """Whether a view contains what the effect is computed from."""
+    in_one_swing: bool = True
+    """Whether a single free swing can show it. There the amplitude is a function of time, so that what changes with
+    time cannot be distinguished from what depends on the amplitude."""
+    possible: Callable[[Values, Values], bool] = field(default=lambda parameters, abc: True, repr=False)
+    """(parameters, (a, b, c)) → whether they describe this effect at all; a fit elsewhere is some other cause."""
 
     def with_fixed(self, values: Mapping[str, float]) -> Effect:
         """Return the effect with some parameters fixed: ``values`` by name, SI; itself if none of them is named."""

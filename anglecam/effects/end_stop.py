@@ -44,6 +44,11 @@ def _starts(seen: Seen) -> list[Values]:
     ]
 
 
+def _possible(parameters: Values, abc: Values) -> bool:
+    """Return whether the stop is stiffer than the body's own springs; what yields more is no stop."""
+    return parameters[0] > abs(abc[1])
+
+
 EFFECT = Effect(
     id="end_stop",
     station="load",
@@ -62,4 +67,5 @@ EFFECT = Effect(
     kinked=True,
     load=_load,
     starts=_starts,
+    possible=_possible,
 )

@@ -33,6 +33,8 @@ HELD = 1e-12
 """rad; error that a parameter makes when it leaves its start by its magnitude. It holds a parameter on which the
 prediction does not depend: without it the Jacobian is rank-deficient, and SciPy's step is as long as the trust region
 allows."""
+NEXT_TO = 1e-4
+"""Distance from a bound, in magnitudes of a parameter, from which the parameter is moved onto the bound."""
 SHORTENED = (0.25, 0.05, 0.01)
 """Shares of a step of the nuisance parameters that are tried, one after another, where the whole step gains nothing."""
 
@@ -74,7 +76,7 @@ def fit_shared(model: Model, joined: Joined, begin: Point, most: int) -> tuple[P
     joined : Joined
         The recordings.
     begin : Point
-        Where to start; its cost must be finite.
+        Where to start, within the bounds; its cost must be finite.
     most : int
         Most trial steps.
 
@@ -85,16 +87,15 @@ def fit_shared(model: Model, joined: Joined, begin: Point, most: int) -> tuple[P
     Slopes
         The derivatives there.
     """
-    inside = np.clip(begin.parameters, np.nextafter(model.lower, np.inf), np.nextafter(model.upper, -np.inf))
-    here, slopes, steps = _fit_by_trust_region(model, joined, point_at(model, joined, inside, begin.own), most)
+    here, slopes, steps = _fit_by_trust_region(model, joined, begin, most)
     while steps < most:
         # with a kinked prediction a recording may have refused every whole step: let it go on alone
         alone, slopes = fit_nuisance(model, joined, here, most, slopes)
         if not here.cost - alone.cost > _settled_gain(joined) * alone.cost:
-            return alone, slopes
+            return _onto_bounds(model, joined, alone, slopes)
         here, slopes, more = _fit_by_trust_region(model, joined, alone, most - steps)
         steps += more
-    return here, slopes
+    return _onto_bounds(model, joined, here, slopes)
 
 
 def fit_nuisance(
@@ -178,6 +179,19 @@ def _fit_by_trust_region(model: Model, joined: Joined, begin: Point, most: int) 
         callback=settled,
     )
     return here, slopes, found.nfev
+
+
+def _onto_bounds(model: Model, joined: Joined, here: Point, slopes: Slopes) -> tuple[Point, Slopes]:
+    """Move parameters next to a bound onto it, where that costs nothing; the interior steps never reach a bound."""
+    near = NEXT_TO * model.scales
+    moved = np.where(here.parameters - model.lower < near, model.lower, here.parameters)
+    moved = np.where(model.upper - here.parameters < near, model.upper, moved)
+    if np.array_equal(moved, here.parameters):
+        return here, slopes
+    there = _follow(model, joined, here, slopes, moved)
+    if there.cost > (1.0 + _settled_gain(joined)) * here.cost:
+        return here, slopes
+    return there, joined.slopes(model, there.parameters, there.own, there.predicted)
 
 
 def _follow(model: Model, joined: Joined, here: Point, slopes: Slopes, parameters: Floats) -> Point:

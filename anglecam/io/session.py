@@ -61,10 +61,13 @@ class Session:
 def command_beside(source: Path, rig: Rig | None = None) -> Command | None:
     """Read the command file in a recording's folder that has its name; ``None`` if there is none."""
     path = (source.resolve() if source.is_dir() else source).with_name(recording_name(source) + COMMAND_ENDING)
-    if not path.exists():
-        return None
+    return command_of(path, Rig() if rig is None else rig) if path.exists() else None
+
+
+def command_of(path: Path, rig: Rig) -> Command:
+    """Read a command file whose rows mean what the rig declares."""
     command = read_command(path)
-    return command.sampled() if rig is not None and rig.command.hold == "linear" else command
+    return command.sampled() if rig.command.hold == "linear" else command
 
 
 def recording_name(source: Path) -> str:

@@ -94,9 +94,12 @@ def fit_candidates(
     Returns
     -------
     list of Candidate
-        Strongest evidence first, then those that were not cross-validated, best fit first.
+        Strongest evidence first, then those that were not cross-validated, best fit first; without effects whose
+        fitted parameters are not possible.
     """
     fits = map_in_threads(lambda one: fit_with(base, fitted, one, camera=camera, policy=policy), tried)
+    possible = [(one, fit) for one, fit in zip(tried, fits, strict=True) if is_possible(fit)]
+    tried, fits = [one for one, _ in possible], [fit for _, fit in possible]
     gains = [log_likelihood_gain(base.cost, fit.cost, len(base.white)) for fit in fits]
     best_gains = sorted(gains, reverse=True)[: policy.screen.fewest_fitted - 1]
     smallest = policy.candidates.smallest_gain_share
@@ -321,8 +324,17 @@ def find_rivals(
     return {
         other.effect.id: fit
         for other, fit, gap in zip(others, fits, gaps, strict=True)
-        if (gap <= widest or rms_difference(fit, best) <= camera) and other.effect.id != effect.id
+        if is_possible(fit) and (gap <= widest or rms_difference(fit, best) <= camera) and other.effect.id != effect.id
     }
+
+
+def is_possible(fit: Fit) -> bool:
+    """Return whether the parameters of a plant's last effect describe that effect; see `Effect.possible`."""
+    plant, effect = plant_of(fit), effects_of(fit)[-1]
+    abc = np.zeros(3)
+    abc[: plant.base_count] = fit.parameters[: plant.base_count]
+    own = effect.complete(fit.parameters[len(fit.parameters) - len(effect.parameters) :])
+    return effect.possible(tuple(own.tolist()), tuple(abc.tolist()))
 
 
 def rms_difference(one: Fit, other: Fit) -> float:

@@ -107,6 +107,7 @@ def write_closed(
     result = verdict_as_dict(verdict, experiment)
     title, page = session.directory.resolve().name, out / REPORT
     problems = [*map(str, measured.problems), *missing]
+    page.unlink(missing_ok=True)  # an older report would contradict the verdict
     attempt(
         REPORT,
         lambda: write_report(page, title, verdict, result, experiment, measured.series, models, problems),

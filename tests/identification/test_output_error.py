@@ -113,7 +113,7 @@ def test_sigma_of_a_parameter_correlated_with_one_at_its_bound_includes_the_dist
     columns = np.column_stack([np.sin(time), np.sin(1.05 * time)])
     unbounded = sigma * np.sqrt(np.linalg.inv(columns.T @ columns)[0, 0])
     model, relaxed, fixed = TwoAlike(), [], []
-    for _ in range(240):
+    for _ in range(200):
         angle = exact + sigma * rng.standard_normal(len(time))
         measured = Record("one", time, angle, None, zero_known=True, sigma=np.full(len(time), sigma))
         fit = fit_output_error(model, [measured], [np.array([1.0, 0.5])], nuisance=[np.zeros(2)])

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+from anglecam.loop.close import close_records
 from support.real import REAL, ROOT
 
 sys.path.append(str(ROOT / "benchmarks"))
@@ -57,3 +58,11 @@ def test_a_wide_swing_shows_the_sine_of_gravity_and_then_drag():
     b, gravity = fits[-1][1].parameters[1:3]
     assert b == pytest.approx(64.2, rel=0.005)
     assert gravity == pytest.approx(b, rel=0.005)  # all of the stiffness is the weight's
+
+
+@pendulum_here
+def test_the_loop_finds_gravity_and_drag_of_a_real_pendulum_and_no_other_effect():
+    records = real_data.records_of(real_data.write_pendulum, REAL / "single-pendulum")
+    verdict = close_records(records)
+    assert [accepted.effect.id for accepted in verdict.accepted] == ["gravity_geometry", "quadratic_drag"]
+    assert np.degrees(verdict.after_held_out.rmse) < 0.025

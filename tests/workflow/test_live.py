@@ -159,8 +159,22 @@ def test_where_nothing_is_learnt_the_recording_is_measured(truth, tmp_path):
     assert (tmp_path / "random.avi").read_bytes() == truth.clip.read_bytes()
     statuses = (tmp_path / "random.live.csv").read_text()
     assert statuses.count("learning") == len(truth.time_s)
-    # on a busy machine the film may end before an attempt to learn does; the error above then names the cause
     assert all("random.avi" in cause for cause in causes if cause is not None)
+
+
+def test_while_nothing_is_learnt_the_cause_is_shown(truth, tmp_path):
+    writer, causes = _Writer(truth.clip, tmp_path / "head"), []
+    rig = Rig(pivot=_rig().pivot, mouth=RigMark(rgb=(20, 250, 20)))
+
+    def show(row, cause) -> None:
+        causes.append(cause)
+        if cause is not None:
+            writer.learnt.set()
+
+    with pytest.raises(AnglecamError, match="head"):
+        measure_live(open_live(str(tmp_path / "head")), tmp_path, rig, None, show)
+    assert causes[-1] is not None
+    assert "head" in causes[-1]
 
 
 def test_a_range_of_frames_is_refused(truth, tmp_path):

@@ -1,0 +1,36 @@
+"""An effect is offered only where recordings can show it, and stands only with parameters that describe it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from anglecam.effects import effect
+from anglecam.identification.output_error import fit_output_error
+from anglecam.loop.candidates import is_possible
+from anglecam.loop.stepwise import applicable
+from anglecam.models.plant import Plant
+from support.motion import Plant as TruePlant
+from support.series import session
+
+
+def test_a_single_free_swing_is_not_asked_what_changes_with_time():
+    one, other = (replace(record, command=None) for record in session(TruePlant(), 0)[:2])
+    driven = session(TruePlant(), 0)[:1]
+    assert "time_varying_parameter" not in {e.id for e in applicable([one])}
+    windows = [one.between(0.0, 2.0), one.between(2.0, 4.0)]
+    assert "time_varying_parameter" not in {e.id for e in applicable(windows)}
+    assert "time_varying_parameter" in {e.id for e in applicable([one, other])}
+    assert "time_varying_parameter" in {e.id for e in applicable(driven)}
+
+
+@pytest.mark.parametrize(("stiffness", "possible"), [(0.8, False), (500.0, False), (2000.0, True)])
+def test_what_yields_more_than_the_bodys_own_springs_is_no_stop(stiffness, possible):
+    records = session(TruePlant(), 0)[:1]
+    fit = fit_output_error(Plant(), records, [np.array([26.0, 524.0, 508.0])])
+    stopped = Plant((effect("end_stop"),))
+    at = replace(fit, model=stopped, parameters=np.array([26.0, 524.0, 508.0, stiffness, 5.0, -5.0, 0.3]))
+    assert is_possible(at) is possible
+    assert is_possible(replace(at, model=Plant((effect("dead_time"),)), parameters=np.array([26.0, 524.0, 508.0, 0.1])))
