@@ -68,4 +68,5 @@ EFFECT = Effect(
     load=_load,
     starts=_starts,
     searched=_searched,
+    in_free_swing=False,
 )

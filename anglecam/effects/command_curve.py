@@ -67,4 +67,5 @@ EFFECT = Effect(
     source="Giri, Bai (eds.), Block-oriented Nonlinear System Identification, 2010, ch. 1: Hammerstein systems",
     rank=-1,
     command=_bend,
+    in_free_swing=False,
 )

@@ -162,9 +162,9 @@ class Effect:
     not depend on the residual. `starts` finds the best pairs; the residual test finds them in noise, too."""
     needs: Callable[[View], bool] = field(default=lambda view: True, repr=False)
     """Whether a view contains what the effect is computed from."""
-    in_one_swing: bool = True
-    """Whether a single free swing can show it. There the amplitude is a function of time, so that what changes with
-    time cannot be distinguished from what depends on the amplitude."""
+    in_free_swing: bool = True
+    """Whether it is looked for in free swings. There angle, speed, amplitude and time run together, so that an effect
+    with a flexible shape takes the place of another one, or of an error of the measurement."""
     possible: Callable[[Values, Values], bool] = field(default=lambda parameters, abc: True, repr=False)
     """(parameters, (a, b, c)) → whether they describe this effect at all; a fit elsewhere is some other cause."""
 

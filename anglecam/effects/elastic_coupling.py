@@ -94,4 +94,5 @@ EFFECT = Effect(
     initial=_initial,
     starts=_starts,
     searched=_searched,
+    in_free_swing=False,
 )

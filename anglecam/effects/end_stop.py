@@ -68,4 +68,5 @@ EFFECT = Effect(
     load=_load,
     starts=_starts,
     possible=_possible,
+    in_free_swing=False,
 )

@@ -41,4 +41,5 @@ EFFECT = Effect(
     source="Armstrong-Hélouvry, Control of Machines with Friction, 1991, sec. 3.3; Dowson, History of Tribology, 1979",
     kinked=True,
     friction=_friction,
+    in_free_swing=False,
 )

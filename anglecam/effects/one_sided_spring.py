@@ -47,4 +47,5 @@ EFFECT = Effect(
     kinked=True,
     load=_load,
     starts=_starts,
+    in_free_swing=False,
 )

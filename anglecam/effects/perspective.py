@@ -78,4 +78,5 @@ EFFECT = Effect(
     observation=_observe,
     starts=_starts,
     needs=_needs,
+    in_free_swing=False,
 )

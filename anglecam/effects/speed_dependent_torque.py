@@ -55,4 +55,5 @@ EFFECT = Effect(
     rank=2,
     servo=_servo,
     starts=_starts,
+    in_free_swing=False,
 )

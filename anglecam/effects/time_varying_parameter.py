@@ -38,5 +38,5 @@ EFFECT = Effect(
     separating_experiment="the same steps at the start and at the end of one long recording",
     source="Stachowiak, Batchelor, Engineering Tribology, 4th ed., 2013, sec. 2.3",
     load=_load,
-    in_one_swing=False,
+    in_free_swing=False,
 )

@@ -242,12 +242,10 @@ def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> fl
 def applicable(records: Sequence[Record]) -> list[Effect]:
     """List the effects that recordings can show.
 
-    A free swing has no command, a single one cannot distinguish time from amplitude, and an angle series without pixels
-    has no rows. An effect that changes the angle as a
-    wrong zero does is listed only if the zero is declared.
+    A free swing has no command and distinguishes little, and an angle series without pixels has no rows. An effect that
+    changes the angle as a wrong zero does is listed only if the zero is declared.
     """
     driven = any(r.command is not None for r in records)
-    several = driven or len({r.name for r in records}) > 1
     known = all(r.zero_known for r in records)
     fixed = {} if known else {p.name: p.null for e in LEDGER for p in e.parameters if p.mimics_zero_offset}
     upright = next((r.mass_from_upright for r in records if r.mass_from_upright is not None), None)
@@ -258,6 +256,6 @@ def applicable(records: Sequence[Record]) -> list[Effect]:
         for e in (entry.with_fixed(fixed) for entry in LEDGER)
         if e.parameters
         and (driven or e.port not in ("command", "lag", "servo"))
-        and (several or e.in_one_swing)
+        and (driven or e.in_free_swing)
         and all(e.needs(r.view) for r in records)
     ]

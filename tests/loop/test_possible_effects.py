@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anglecam.effects import effect
+from anglecam.effects import LEDGER, effect
 from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.candidates import is_possible
 from anglecam.loop.stepwise import applicable
@@ -16,13 +16,13 @@ from support.motion import Plant as TruePlant
 from support.series import session
 
 
-def test_a_single_free_swing_is_not_asked_what_changes_with_time():
-    one, other = (replace(record, command=None) for record in session(TruePlant(), 0)[:2])
+def test_in_free_swings_no_effect_with_a_flexible_shape_is_looked_for():
+    free = [replace(record, command=None) for record in session(TruePlant(), 0)[:2]]
     driven = session(TruePlant(), 0)[:1]
-    assert "time_varying_parameter" not in {e.id for e in applicable([one])}
-    windows = [one.between(0.0, 2.0), one.between(2.0, 4.0)]
-    assert "time_varying_parameter" not in {e.id for e in applicable(windows)}
-    assert "time_varying_parameter" in {e.id for e in applicable([one, other])}
+    flexible = {e.id for e in LEDGER if not e.in_free_swing}
+    assert "time_varying_parameter" in flexible
+    assert not flexible & {e.id for e in applicable(free)}
+    assert "gravity_geometry" in {e.id for e in applicable(free)}
     assert "time_varying_parameter" in {e.id for e in applicable(driven)}
 
 

@@ -18,6 +18,9 @@ emps_here = pytest.mark.skipif(not (REAL / "emps").is_dir(), reason="the EMPS re
 pendulum_here = pytest.mark.skipif(not (REAL / "single-pendulum").is_dir(), reason="the pendulum is not here")
 
 
+ball_here = pytest.mark.skipif(not (REAL / "pendulum-red-ball").is_dir(), reason="the film of the ball is not here")
+
+
 @pytest.fixture(scope="module")
 def drive():
     records = real_data.records_of(real_data.write_emps, REAL / "emps")
@@ -66,3 +69,10 @@ def test_the_loop_finds_gravity_and_drag_of_a_real_pendulum_and_no_other_effect(
     verdict = close_records(records)
     assert [accepted.effect.id for accepted in verdict.accepted] == ["gravity_geometry", "quadratic_drag"]
     assert np.degrees(verdict.after_held_out.rmse) < 0.025
+
+
+@ball_here
+def test_the_loop_finds_gravity_in_the_film_of_a_ball_on_a_thread_and_no_other_effect():
+    verdict = close_records(real_data.records_of(real_data.link_film, REAL / "pendulum-red-ball"))
+    assert [accepted.effect.id for accepted in verdict.accepted] == ["gravity_geometry"]
+    assert np.degrees(verdict.after_held_out.rmse) < 0.6
