@@ -24,7 +24,7 @@ EFFECT = Effect(
     summary="The measured angle drifts at a steady rate that no torque explains.",
     equation="y = θ + d·t",
     relaxes="Fig. 7: the camera stands still",
-    parameters=(Parameter("drift_deg_per_s", "d", 0.0, -0.1, 0.1, (0.002, -0.002), math.degrees(1.0)),),
+    parameters=(Parameter("drift_deg_per_s", "d", 0.0, -0.1, 0.1, (0.002, -0.002), math.degrees(1.0), swing_power=1),),
     aliases=("constant_torque",),
     separating_experiment="a minute of rest, with an object in the picture that is fixed to the ground",
     source="JCGM 100:2008, F.2.4",

@@ -48,7 +48,9 @@ EFFECT = Effect(
     equation="θ̈ = c·P_w[u] − a·θ̇ − b·θ with the play operator P_w",
     relaxes="Eqs. (3), (9): gears and joints are exact",
     parameters=(
-        Parameter("half_width_deg", "w", 0.0, 0.0, math.radians(15.0), (0.003, 0.01, 0.03), math.degrees(1.0)),
+        Parameter(
+            "half_width_deg", "w", 0.0, 0.0, math.radians(15.0), (0.003, 0.01, 0.03), math.degrees(1.0), swing_power=1
+        ),
     ),
     aliases=("dead_zone", "coulomb_friction"),
     separating_experiment=(

@@ -2,8 +2,8 @@
 
     θ̈ = c·u − a·θ̇ − b·θ + C·sin(n·θ + ψ)
 
-n is the number of periods in one turn of the body. With few periods over the range of the motion the torque is close to
-a polynomial in the angle, which a spring can have as well.
+n is the number of periods in one turn of the body. With less than one period over the range of the motion the torque is
+close to a polynomial in the angle, which a spring has as well.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter, Values
 from anglecam.effects.seen import Seen, sines_and_cosines
 
-FEWEST, MOST = 0.75, 16.0
+FEWEST, MOST = 1.0, 16.0
 """Periods over the range of the motion between which the residual is searched."""
 PER_PERIOD = 5
 """Numbers that are tried for each period more over the range."""
@@ -49,6 +49,11 @@ def _starts(seen: Seen) -> list[Values]:
     ]
 
 
+def _possible(parameters: Values, abc: Values, motion: Values) -> bool:
+    """Return whether a whole period is seen; a part of one is any curved torque."""
+    return parameters[1] * (motion[1] - motion[0]) >= math.tau
+
+
 EFFECT = Effect(
     id="cogging",
     station="actuator",
@@ -56,7 +61,7 @@ EFFECT = Effect(
     equation="θ̈ = c·u − a·θ̇ − b·θ + C·sin(n·θ + ψ)",
     relaxes="Eqs. (5), (6): the motor's torque does not depend on its angle",
     parameters=(
-        Parameter("cogging_deg_per_s2", "C", 0.0, 0.0, 2000.0, to_file=math.degrees(1.0)),
+        Parameter("cogging_deg_per_s2", "C", 0.0, 0.0, 2000.0, to_file=math.degrees(1.0), swing_power=1),
         Parameter("periods_per_turn", "n", 36.0, 1.0, 3000.0),
         Parameter(
             "cogging_phase_deg", "ψ", 0.0, -2.0 * math.tau, 2.0 * math.tau, to_file=math.degrees(1.0), circular=True
@@ -68,5 +73,6 @@ EFFECT = Effect(
     load=_load,
     starts=_starts,
     searched=_searched,
+    possible=_possible,
     in_free_swing=False,
 )

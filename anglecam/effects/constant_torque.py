@@ -37,6 +37,7 @@ EFFECT = Effect(
             (1.0, -1.0, 20.0, -20.0),
             math.degrees(1.0),
             mimics_zero_offset=True,
+            swing_power=1,
         ),
     ),
     aliases=("coulomb_friction",),

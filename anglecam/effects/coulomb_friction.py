@@ -36,9 +36,18 @@ EFFECT = Effect(
     ),
     relaxes="Eq. (22): damping is viscous only",
     parameters=(
-        Parameter("friction_deg_per_s2", "F", 0.0, 0.0, 500.0, (0.3, 3.0, 15.0), SI_TO_FILE),
+        Parameter("friction_deg_per_s2", "F", 0.0, 0.0, 500.0, (0.3, 3.0, 15.0), SI_TO_FILE, swing_power=1),
         Parameter(
-            "asymmetry_deg_per_s2", "D", 0.0, -250.0, 250.0, (0.0,), SI_TO_FILE, staged=True, mimics_zero_offset=True
+            "asymmetry_deg_per_s2",
+            "D",
+            0.0,
+            -250.0,
+            250.0,
+            (0.0,),
+            SI_TO_FILE,
+            staged=True,
+            mimics_zero_offset=True,
+            swing_power=1,
         ),
         Parameter(
             "breakaway_excess_deg_per_s2",
@@ -49,6 +58,7 @@ EFFECT = Effect(
             (0.03, 0.1, 0.3, 0.6, 1.0, 1.7, 3.0, 5.0),
             SI_TO_FILE,
             staged=True,
+            swing_power=1,
         ),
         Parameter(
             "stribeck_speed_deg_per_s",
@@ -60,6 +70,7 @@ EFFECT = Effect(
             SI_TO_FILE,
             staged=True,
             is_speed=True,
+            swing_power=1,
         ),
     ),
     aliases=("quadratic_drag", "backlash", "dead_zone", "load_dependent_friction"),

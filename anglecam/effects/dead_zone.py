@@ -30,7 +30,11 @@ EFFECT = Effect(
     summary="The servo does not answer position errors below a certain size.",
     equation="θ̈ = c·dz(e) − a·θ̇ with e = u − (b/c)·θ and dz(e) = sgn e·max(|e| − w, 0)",
     relaxes="Eq. (5), Table 2: the servo resolves every command",
-    parameters=(Parameter("threshold_deg", "w", 0.0, 0.0, math.radians(15.0), (0.003, 0.01, 0.03), math.degrees(1.0)),),
+    parameters=(
+        Parameter(
+            "threshold_deg", "w", 0.0, 0.0, math.radians(15.0), (0.003, 0.01, 0.03), math.degrees(1.0), swing_power=1
+        ),
+    ),
     aliases=("backlash", "coulomb_friction"),
     separating_experiment="small steps around one level, from both sides: in a dead zone the body rests at any angle",
     source="Tao, Kokotović, Adaptive Control of Systems with Actuator and Sensor Nonlinearities, 1996",

@@ -76,11 +76,42 @@ class Parameter:
     """Whether it moves the body as a wrong zero of the angle does, so that it is determined only if zero is known."""
     is_speed: bool = False
     """Whether it is a speed of the body, which much slower recordings cannot determine."""
+    swing_power: int = 0
+    """Power of the motion's width with which the value in files grows where the effect keeps its share of the motion:
+    1 for a friction torque, −2 for a cubic stiffness; 0 where it does not scale, as for a direction in space."""
 
     @property
     def unit(self) -> str:
         """Unit in files, parsed from the name: ``friction_deg_per_s2`` → ``deg/s2``; empty for a pure number."""
         return split_unit(self.name)[1]
+
+    @property
+    def time_power(self) -> int:
+        """Power of the time unit in the value that files state: 1 for ``tau_s``, −2 for ``k3_per_s2``."""
+        over, _, under = self.unit.partition("/")
+        powers = {"s": 1, "s2": 2, "Hz": -1}
+        return powers.get(over, 0) - powers.get(under, 0)
+
+    def at_scale(self, rate: float, swing: float) -> Parameter:
+        """Return the parameter with wider bounds and larger starts where a rig requires them.
+
+        Parameters
+        ----------
+        rate : float
+            How many times as fast the plant is as those that bounds and starts were set for; 1 if it is one of them.
+        swing : float
+            How many times as wide the motion is.
+
+        Returns
+        -------
+        Parameter
+            With bounds and starts multiplied by the factor, at least 1, by which the value grows. Smaller values are
+            within the bounds, and the screen tries small shares of every start.
+        """
+        factor = rate**-self.time_power * swing**self.swing_power
+        factor = max(1.0, 1.0 / factor if self.inverse else factor)
+        starts = tuple(factor * start for start in self.starts)
+        return replace(self, lower=factor * self.lower, upper=factor * self.upper, starts=starts)
 
     def in_file_unit(self, value: float, sigma: float = 0.0) -> tuple[float, float]:
         """Convert a value and its standard uncertainty from SI to the unit in files; an absent limit is infinite."""
@@ -165,8 +196,9 @@ class Effect:
     in_free_swing: bool = True
     """Whether it is looked for in free swings. There angle, speed, amplitude and time run together, so that an effect
     with a flexible shape takes the place of another one, or of an error of the measurement."""
-    possible: Callable[[Values, Values], bool] = field(default=lambda parameters, abc: True, repr=False)
-    """(parameters, (a, b, c)) → whether they describe this effect at all; a fit elsewhere is some other cause."""
+    possible: Callable[[Values, Values, Values], bool] = field(default=lambda values, abc, motion: True, repr=False)
+    """(parameters, (a, b, c), (lowest, highest angle, rad)) → whether they describe this effect at all; a fit elsewhere
+    is some other cause."""
 
     def with_fixed(self, values: Mapping[str, float]) -> Effect:
         """Return the effect with some parameters fixed: ``values`` by name, SI; itself if none of them is named."""
@@ -174,6 +206,12 @@ class Effect:
         if not fixed:
             return self
         return replace(self, parameters=tuple(p for p in self.parameters if p.name not in values), fixed=fixed)
+
+    def at_scale(self, rate: float, swing: float) -> Effect:
+        """Return the effect with the bounds and starts that a rig requires; see `Parameter.at_scale`."""
+        if rate == 1.0 and swing == 1.0:
+            return self
+        return replace(self, parameters=tuple(p.at_scale(rate, swing) for p in self.parameters))
 
     def complete(self, fitted: Floats) -> Floats:
         """Insert the `fixed` parameters among the (k,) fitted parameters."""

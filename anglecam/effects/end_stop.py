@@ -44,9 +44,10 @@ def _starts(seen: Seen) -> list[Values]:
     ]
 
 
-def _possible(parameters: Values, abc: Values) -> bool:
-    """Return whether the stop is stiffer than the body's own springs; what yields more is no stop."""
-    return parameters[0] > abs(abc[1])
+def _possible(parameters: Values, abc: Values, motion: Values) -> bool:
+    """Return whether a stop is reached, and stiffer than the body's springs; what yields more is no stop."""
+    reached = parameters[1] * motion[1] > 1.0 or parameters[2] * motion[0] > 1.0
+    return reached and parameters[0] > abs(abc[1])
 
 
 EFFECT = Effect(
@@ -57,9 +58,9 @@ EFFECT = Effect(
     relaxes="Table 1, Fig. 4: the range of the linkage is not reached",
     parameters=(
         Parameter("stop_stiffness_per_s2", "k", 0.0, 0.0, 5e4),
-        Parameter("upper_stop_deg", "θ₊", 0.0, 0.0, 1e3, to_file=math.degrees(1.0), inverse=True),
-        Parameter("lower_stop_deg", "θ₋", 0.0, -1e3, 0.0, to_file=math.degrees(1.0), inverse=True),
-        Parameter("dissipation_s_per_rad", "χ", 0.0, 0.0, 10.0),
+        Parameter("upper_stop_deg", "θ₊", 0.0, 0.0, 1e3, to_file=math.degrees(1.0), inverse=True, swing_power=1),
+        Parameter("lower_stop_deg", "θ₋", 0.0, -1e3, 0.0, to_file=math.degrees(1.0), inverse=True, swing_power=1),
+        Parameter("dissipation_s_per_rad", "χ", 0.0, 0.0, 10.0, swing_power=-1),
     ),
     aliases=("one_sided_spring", "stiffening_spring", "torque_saturation"),
     separating_experiment="two slow stairs, one that ends just inside the supposed stop and one that goes beyond it",

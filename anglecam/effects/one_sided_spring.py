@@ -31,6 +31,11 @@ def _starts(seen: Seen) -> list[Values]:
     return [(side * size, low + share * (seen.high - low)) for share in shares for side in (1.0, -1.0)]
 
 
+def _possible(parameters: Values, abc: Values, motion: Values) -> bool:
+    """Return whether the spring is slack in a part of the motion; elsewhere it is a part of b."""
+    return motion[0] < parameters[1] < motion[1]
+
+
 EFFECT = Effect(
     id="one_sided_spring",
     station="load",
@@ -39,7 +44,7 @@ EFFECT = Effect(
     relaxes="Eqs. (18a), (25): the springs are stretched, and linear, at every angle",
     parameters=(
         Parameter("one_sided_stiffness_per_s2", "k", 0.0, -1e5, 1e5),
-        Parameter("slack_angle_deg", "θg", 0.0, -math.pi, math.pi, to_file=math.degrees(1.0)),
+        Parameter("slack_angle_deg", "θg", 0.0, -math.pi, math.pi, to_file=math.degrees(1.0), swing_power=1),
     ),
     aliases=("stiffening_spring", "gravity_geometry", "end_stop", "linkage_geometry"),
     separating_experiment="small steps well above the angle and well below it: the frequency of the swing differs",
@@ -47,5 +52,6 @@ EFFECT = Effect(
     kinked=True,
     load=_load,
     starts=_starts,
+    possible=_possible,
     in_free_swing=False,
 )

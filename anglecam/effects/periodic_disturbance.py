@@ -55,7 +55,7 @@ EFFECT = Effect(
     equation="θ̈ = c·u − a·θ̇ − b·θ + A·sin(2π·f·t + φ)",
     relaxes="Eq. (14): no torque acts on the head but the servo's, the springs' and the weight's",
     parameters=(
-        Parameter("amplitude_deg_per_s2", "A", 0.0, 0.0, 2000.0, to_file=math.degrees(1.0)),
+        Parameter("amplitude_deg_per_s2", "A", 0.0, 0.0, 2000.0, to_file=math.degrees(1.0), swing_power=1),
         Parameter("frequency_hz", "f", 1.0, 0.05, 50.0),
         Parameter("phase_deg", "φ", 0.0, -2.0 * math.tau, 2.0 * math.tau, to_file=math.degrees(1.0), circular=True),
     ),

@@ -23,7 +23,7 @@ EFFECT = Effect(
     summary="A resistance that grows with the square of speed slows fast motion more than slow motion.",
     equation="θ̈ = c·u − a·θ̇ − b·θ − q·θ̇·|θ̇|",
     relaxes="Eq. (22): damping is viscous only, proportional to speed",
-    parameters=(Parameter("q_per_rad", "q", null=0.0, lower=0.0, upper=200.0, starts=(0.05, 1.0)),),
+    parameters=(Parameter("q_per_rad", "q", null=0.0, lower=0.0, upper=200.0, starts=(0.05, 1.0), swing_power=-1),),
     aliases=("coulomb_friction", "torque_saturation"),
     separating_experiment="steps or free releases of two amplitudes, one at least three times the other",
     source="Batchelor, An Introduction to Fluid Dynamics, 1967, sec. 5.11",

@@ -47,7 +47,11 @@ EFFECT = Effect(
     summary="The servo turns no faster than a fixed number of degrees a second, however large the command.",
     equation="|v̇| ≤ r in θ̈ = c·v − a·θ̇ − b·θ",
     relaxes="Eq. (6): the amplifier gives any voltage at any speed",
-    parameters=(Parameter("rate_deg_per_s", "r", 0.0, 0.0, 20.0, (0.02, 0.1, 0.5), math.degrees(1.0), inverse=True),),
+    parameters=(
+        Parameter(
+            "rate_deg_per_s", "r", 0.0, 0.0, 20.0, (0.02, 0.1, 0.5), math.degrees(1.0), inverse=True, swing_power=1
+        ),
+    ),
     aliases=("torque_saturation", "actuator_lag"),
     separating_experiment="steps of two heights, one at least three times the other: a limit slows only the larger",
     source="the paper, Fig. 12; HS-225MG data sheet: 0.11 s for 60°",

@@ -44,8 +44,12 @@ EFFECT = Effect(
     equation="−T·(1 + θ̇/ω0) ≤ c·u − b·θ ≤ T·(1 − θ̇/ω0)",
     relaxes="Eq. (6), Fig. 12: an ideal amplifier gives any voltage at any speed",
     parameters=(
-        Parameter("stall_torque_deg_per_s2", "T", 0.0, 0.0, 1.0, to_file=math.degrees(1.0), inverse=True),
-        Parameter("no_load_speed_deg_per_s", "ω0", 0.0, 0.0, 5.0, to_file=math.degrees(1.0), inverse=True),
+        Parameter(
+            "stall_torque_deg_per_s2", "T", 0.0, 0.0, 1.0, to_file=math.degrees(1.0), inverse=True, swing_power=1
+        ),
+        Parameter(
+            "no_load_speed_deg_per_s", "ω0", 0.0, 0.0, 5.0, to_file=math.degrees(1.0), inverse=True, swing_power=1
+        ),
     ),
     aliases=("torque_saturation", "rate_limit", "quadratic_drag"),
     separating_experiment=(

@@ -23,7 +23,7 @@ EFFECT = Effect(
     summary="The spring becomes stiffer, or softer, with increasing angle.",
     equation="θ̈ = c·u − a·θ̇ − b·θ − k3·θ³",
     relaxes="Eqs. (18a), (25): the spring's torque is linear in the angle",
-    parameters=(Parameter("k3_per_s2", "k3", null=0.0, lower=-1e5, upper=1e5, starts=(200.0, -200.0)),),
+    parameters=(Parameter("k3_per_s2", "k3", null=0.0, lower=-1e5, upper=1e5, starts=(200.0, -200.0), swing_power=-2),),
     aliases=("gravity_geometry", "linkage_geometry", "one_sided_spring", "command_curve"),
     separating_experiment="the same steps with the mount turned by 90°: gravity turns with it, the spring does not",
     source="Nayfeh, Mook, Nonlinear Oscillations, 1979, sec. 2.3",

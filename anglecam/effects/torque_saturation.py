@@ -30,7 +30,17 @@ EFFECT = Effect(
     equation="|c·u − s·b·θ| ≤ T",
     relaxes="Eq. (6), Fig. 12: an ideal amplifier gives any voltage",
     parameters=(
-        Parameter("limit_deg_per_s2", "T", 0.0, 0.0, 1.0, (0.005, 0.01, 0.02, 0.05), math.degrees(1.0), inverse=True),
+        Parameter(
+            "limit_deg_per_s2",
+            "T",
+            0.0,
+            0.0,
+            1.0,
+            (0.005, 0.01, 0.02, 0.05),
+            math.degrees(1.0),
+            inverse=True,
+            swing_power=1,
+        ),
         Parameter("servo_share", "s", 1.0, 0.0, 1.0, (0.3,)),
     ),
     aliases=("rate_limit", "quadratic_drag", "speed_dependent_torque", "end_stop"),

@@ -98,7 +98,7 @@ def fit_candidates(
         fitted parameters are not possible.
     """
     fits = map_in_threads(lambda one: fit_with(base, fitted, one, camera=camera, policy=policy), tried)
-    possible = [(one, fit) for one, fit in zip(tried, fits, strict=True) if is_possible(fit)]
+    possible = [(one, fit) for one, fit in zip(tried, fits, strict=True) if is_possible(fit, fitted)]
     tried, fits = [one for one, _ in possible], [fit for _, fit in possible]
     gains = [log_likelihood_gain(base.cost, fit.cost, len(base.white)) for fit in fits]
     best_gains = sorted(gains, reverse=True)[: policy.screen.fewest_fitted - 1]
@@ -324,17 +324,21 @@ def find_rivals(
     return {
         other.effect.id: fit
         for other, fit, gap in zip(others, fits, gaps, strict=True)
-        if is_possible(fit) and (gap <= widest or rms_difference(fit, best) <= camera) and other.effect.id != effect.id
+        if is_possible(fit, records)
+        and (gap <= widest or rms_difference(fit, best) <= camera)
+        and other.effect.id != effect.id
     }
 
 
-def is_possible(fit: Fit) -> bool:
-    """Return whether the parameters of a plant's last effect describe that effect; see `Effect.possible`."""
+def is_possible(fit: Fit, records: Sequence[Record]) -> bool:
+    """Return whether the parameters of a plant's last effect describe that effect at all; see `Effect.possible`."""
     plant, effect = plant_of(fit), effects_of(fit)[-1]
+    first = len(fit.parameters) - len(effect.parameters)
     abc = np.zeros(3)
     abc[: plant.base_count] = fit.parameters[: plant.base_count]
-    own = effect.complete(fit.parameters[len(fit.parameters) - len(effect.parameters) :])
-    return effect.possible(tuple(own.tolist()), tuple(abc.tolist()))
+    predicted = np.concatenate([r.angle - left for r, left in zip(records, fit.residuals, strict=True)])
+    motion = float(predicted.min()), float(predicted.max())
+    return effect.possible(tuple(effect.complete(fit.parameters[first:]).tolist()), tuple(abc.tolist()), motion)
 
 
 def rms_difference(one: Fit, other: Fit) -> float:

@@ -22,10 +22,11 @@ from anglecam.identification.multiple_shooting import drifts, loses_step, window
 from anglecam.identification.noise import autoregression, noise_floor
 from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.loop.candidates import Candidate, find_rivals, fit_to_more, log_likelihood_gain, promising
-from anglecam.loop.cross_validation import Prediction, compare, predict_held_out, robust_sigma, split_records
+from anglecam.loop.cross_validation import compare, predict_held_out, robust_sigma, split_records
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_left, effects_of, plant_of, refit_with_last, refit_with_phi, refit_without
 from anglecam.loop.screen import changes, directions, forecasts
+from anglecam.loop.standing import error_beyond_noise, model_that_stands
 from anglecam.loop.stepwise import (
     Assessment,
     Task,
@@ -36,7 +37,15 @@ from anglecam.loop.stepwise import (
     smallest_structure,
 )
 from anglecam.loop.verdict import Accepted, Verdict
-from anglecam.models.plant import Plant
+from anglecam.models.plant import FASTEST, Plant
+
+VERDICTS = {
+    (False, False): "nothing_missing",
+    (True, False): "attributed",
+    (True, True): "partly_explained",
+    (False, True): "unexplained",
+}
+"""Verdict by (whether effects are named, whether structure remains that they do not explain)."""
 
 
 def close_records(
@@ -99,15 +108,18 @@ def _begin(
 ) -> tuple[Task, Fit]:
     """Fit the base model, in windows if a free run over whole recordings diverges."""
     fitted, predicted = split_records(records, held_out)
-    plant = Plant(driven=any(r.command is not None for r in fitted))
     progress("base model")
+    found = start_parameters(fitted)
+    plant = Plant(
+        driven=any(r.command is not None for r in fitted), fastest=max(FASTEST, *(math.sqrt(s[1]) for s in found))
+    )
     declared_starts = [s[: plant.base_count] for s in starts]
-    base = fit_output_error(plant, fitted, [*start_parameters(fitted), *declared_starts])
+    base = fit_output_error(plant, fitted, [*found, *declared_starts])
     floor = noise_floor(fitted)
     if drifts(base.parameters, fitted) or loses_step(base, fitted):
         fitted, predicted = windows(fitted, base.parameters), windows(predicted, base.parameters)
         base = fit_output_error(plant, fitted, [base.parameters, *declared_starts])
-    ledger = applicable([*fitted, *predicted])
+    ledger = applicable([*fitted, *predicted], plant.fastest / FASTEST)
     return Task(tuple(fitted), tuple(predicted), tuple(ledger), floor, rng, progress, policy), base
 
 
@@ -117,11 +129,12 @@ def _conclude(task: Task, first: Assessment, last: Assessment, candidates: Seque
     before_held_out, _ = predict_held_out(before, task.fitted, task.predicted, task.policy)
     noise = task.floor or replace(autoregression(last.fit.residuals, "residual"), sigma=last.fit.rmse)
     remains = _structure_remains(task, first, last, before)
-    # if structure remains no effect is named, so the final model is the base model
-    after, after_held_out = (before, before_held_out) if remains else (last.fit, last.held_out)
-    named = effects_of(after)
+    final = _model_that_stands(task, first, last) if remains else last
+    named = effects_of(final.fit)
+    # without an effect the final model is the base model
+    after, after_held_out = (final.fit, final.held_out) if named or not remains else (before, before_held_out)
     return Verdict(
-        "unexplained" if remains else "attributed" if named else "nothing_missing",
+        VERDICTS[bool(named), remains],
         tuple(Accepted(effect, _rivals(after, effect, task)) for effect in named),
         before,
         after,
@@ -142,7 +155,7 @@ def _structure_remains(task: Task, first: Assessment, last: Assessment, before: 
     """Return whether the final model leaves structure that no candidate explains."""
     policy = task.policy
     named, least = bool(effects_of(last.fit)), smallest_structure(task, first)
-    if _contradicted(task, last, least) or _gains_energy(last.fit, policy):
+    if _is_wrong(task, last, least):
         return True
     level = policy.verdict.false_unexplained_rate if named else policy.residual_test.false_alarm_rate
     if last.residual_test.p_value >= level or last.fit.rmse**2 <= task.camera**2 + least**2:
@@ -155,12 +168,22 @@ def _structure_remains(task: Task, first: Assessment, last: Assessment, before: 
     )
     # two measures of what remains: the error beyond the noise floor, and the finer one, what further causes would
     # explain of the log-likelihood; if the noise is unknown, the whole error counts
-    floor = task.floor.sigma if task.floor else 0.0
     return (
         not named
-        or _error_beyond(last.cross_validated, floor) > share * _error_beyond(first.cross_validated, floor)
+        or error_beyond_noise(task, last.cross_validated) > share * error_beyond_noise(task, first.cross_validated)
         or _further_gain_share(last, before) > share**2
     )
+
+
+def _model_that_stands(task: Task, first: Assessment, last: Assessment) -> Assessment:
+    """Return the model with the effects that stand although structure remains; the base model if it is wrong."""
+    final = model_that_stands(task, last)
+    return first if _is_wrong(task, final, smallest_structure(task, first)) else final
+
+
+def _is_wrong(task: Task, last: Assessment, least: float) -> bool:
+    """Return whether a model contradicts the recordings that it was not fitted to, or physics."""
+    return _contradicted(task, last, least) or _gains_energy(last.fit, task.policy)
 
 
 def _contradicted(task: Task, last: Assessment, least: float) -> bool:
@@ -182,11 +205,6 @@ def _gains_energy(fit: Fit, policy: Policy) -> bool:
     """Return whether a body without a command would gain energy: something that the model lacks drives it."""
     damping, sigma = float(fit.parameters[0]), float(np.nan_to_num(fit.sigma[0]))
     return not plant_of(fit).driven and damping < -policy.verdict.energy_gain_sigmas * sigma
-
-
-def _error_beyond(prediction: Prediction, noise: float) -> float:
-    """Return the RMS error of a prediction beyond the noise, rad."""
-    return math.sqrt(max(prediction.rmse**2 - noise**2, 0.0))
 
 
 def _further_gain_share(now: Assessment, before: Fit) -> float:

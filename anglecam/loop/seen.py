@@ -20,8 +20,8 @@ from anglecam.identification.fit import Fit
 from anglecam.identification.joined import join
 from anglecam.loop.refit import plant_of
 
-STEP = 0.008
-"""s, between the instants at which a torque is given; it is taken for linear between them."""
+STEP = 4.0 / 3.0
+"""Longest steps of the integrator between the instants at which a torque is given; it is linear between them."""
 AT_ONCE = 64
 """Columns of torques that are handled at a time, which limits the memory."""
 
@@ -42,7 +42,7 @@ def seen_of(fit: Fit, records: Sequence[Record]) -> Seen:
         Motion and residual.
     """
     plant = plant_of(fit)
-    times = [_instants(record.time) for record in records]
+    times = [_instants(record.time, STEP * plant.smooth_step) for record in records]
     motion = [
         plant.run(fit.parameters, time, record.command, nuisance[: plant.states])
         for time, record, nuisance in zip(times, records, fit.nuisance, strict=True)
@@ -74,9 +74,9 @@ def seen_of(fit: Fit, records: Sequence[Record]) -> Seen:
     )
 
 
-def _instants(time: Floats) -> Floats:
-    """Return evenly spaced instants from the first frame to the last, about `STEP` apart."""
-    return np.linspace(time[0], time[-1], math.ceil((time[-1] - time[0]) / STEP) + 1)
+def _instants(time: Floats, step: float) -> Floats:
+    """Return evenly spaced instants from the first frame to the last, at most ``step`` apart, s."""
+    return np.linspace(time[0], time[-1], math.ceil((time[-1] - time[0]) / step) + 1)
 
 
 def largest_shares(

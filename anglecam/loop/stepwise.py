@@ -33,7 +33,11 @@ from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_left, effects_of, refit_with_phi, refit_without
 from anglecam.loop.residual_test import ResidualTest, run_residual_test
 from anglecam.loop.screen import Change, Forecast, changes, directions, forecasts
+from anglecam.loop.size import sizes_determined
 from anglecam.threads import map_in_threads
+
+NARROW, WIDE = math.radians(5.0), math.radians(120.0)
+"""Ranges of motion, rad, between which bounds and starts of the effects hold as they stand."""
 
 
 @dataclass(frozen=True)
@@ -160,6 +164,9 @@ def add_effects(task: Task, first: Assessment, candidates: Sequence[Candidate]) 
                 break
             best = more[0]
         added = _add(task, best)
+        if not sizes_determined(added.fit, task.fitted, task.policy):
+            candidates = [one for one in candidates if one.effect.id != best.effect.id]
+            continue
         if _names(added) in visited:  # otherwise an effect could be replaced and added again without end
             break
         visited.append(_names(added))
@@ -239,8 +246,8 @@ def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> fl
     return min(phi, max(0.0, task.floor.phi + limits.noise_floor_phi_errors * task.floor.phi_error))
 
 
-def applicable(records: Sequence[Record]) -> list[Effect]:
-    """List the effects that recordings can show.
+def applicable(records: Sequence[Record], rate: float = 1.0) -> list[Effect]:
+    """List the effects that recordings can show, at the scale of a plant ``rate`` times as fast as usual.
 
     A free swing has no command and distinguishes little, and an angle series without pixels has no rows. An effect that
     changes the angle as a wrong zero does is listed only if the zero is declared.
@@ -251,9 +258,11 @@ def applicable(records: Sequence[Record]) -> list[Effect]:
     upright = next((r.mass_from_upright for r in records if r.mass_from_upright is not None), None)
     if upright is not None:
         fixed["gravity_deg"] = upright
+    width = max(float(np.ptp(r.angle)) for r in records)
+    swing = width / min(max(width, NARROW), WIDE)
     return [
         e
-        for e in (entry.with_fixed(fixed) for entry in LEDGER)
+        for e in (entry.with_fixed(fixed).at_scale(rate, swing) for entry in LEDGER)
         if e.parameters
         and (driven or e.port not in ("command", "lag", "servo"))
         and (driven or e.in_free_swing)

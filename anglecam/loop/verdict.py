@@ -34,7 +34,7 @@ class Verdict:
     """The result of the loop, with everything that supports it."""
 
     verdict: str
-    """``attributed``, ``nothing_missing`` or ``unexplained``."""
+    """``attributed``, ``nothing_missing``, ``partly_explained`` or ``unexplained``."""
     accepted: tuple[Accepted, ...]
     """Effects that were added, in the order in which they were added."""
     before: Fit

@@ -15,6 +15,8 @@ from anglecam.data.typing import Floats
 from anglecam.effects import Effect, Knots
 from anglecam.models.integrator import INTEGRATOR, Integrator
 
+FASTEST = 40.0
+"""Natural frequency, rad/s, up to which steps and bounds hold as they stand; for a faster plant they are scaled."""
 MAX_STEP = 0.006
 """Longest Runge-Kutta step, s. At the paper's natural frequency of 23 rad/s it keeps the error of a step response
 below 5e-5 degrees."""
@@ -38,6 +40,8 @@ class Plant:
     """Whether any recording has a command; a free swing does not determine c."""
     integrator: Integrator = field(default=INTEGRATOR, repr=False)
     """Compiled for a ledger that contains the plant's effects."""
+    fastest: float = FASTEST
+    """Natural frequency, rad/s, for which steps and bounds are set; at least `FASTEST`."""
 
     states = 2
     """Unknown initial states of a recording: angle (rad) and rate (rad/s)."""
@@ -56,14 +60,19 @@ class Plant:
     @property
     def lower(self) -> Floats:
         """Lower bounds, SI; wide enough for an unstable or very fast plant."""
-        base = [-100.0, -5000.0, -1e6][: self.base_count]
+        base = self._scaled([-100.0, -5000.0, -1e6])
         return np.array(base + [p.lower for e in self.effects for p in e.parameters])
 
     @property
     def upper(self) -> Floats:
         """Upper bounds, SI; below the integrator's limit of stability."""
-        base = [500.0, 1e5, 1e6][: self.base_count]
+        base = self._scaled([500.0, 1e5, 1e6])
         return np.array(base + [p.upper for e in self.effects for p in e.parameters])
+
+    def _scaled(self, bounds: Sequence[float]) -> list[float]:
+        """Return bounds of a, b, c for the natural frequency `fastest`."""
+        rate = self.fastest / FASTEST
+        return [bound * rate**power for bound, power in zip(bounds, (1, 2, 2), strict=True)][: self.base_count]
 
     @property
     def scales(self) -> Floats:
@@ -182,12 +191,17 @@ class Plant:
         )
 
     @property
+    def smooth_step(self) -> float:
+        """Longest step of the integrator where no torque has a kink, s."""
+        return MAX_STEP * FASTEST / self.fastest
+
+    @property
     def _max_step(self) -> float:
         """Longest step of the integrator, s."""
         ports = {e.port for e in self.effects}
         if ports & {"servo", "dynamics"} or any(e.kinked for e in self.effects):
-            return KINKED_STEP
-        return MAX_STEP if ports & {"load", "friction"} else EXACT
+            return KINKED_STEP * FASTEST / self.fastest
+        return self.smooth_step if ports & {"load", "friction"} else EXACT
 
     def _at(
         self, parameters: Floats, pairs: Sequence[tuple[Effect, Floats]], runs: Runs, exposed: Floats, first: Floats

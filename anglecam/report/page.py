@@ -27,7 +27,12 @@ from anglecam.report import loop_figures as figures
 from anglecam.report.path_figure import path_figure
 from anglecam.report.wording import plain, sentence, with_uncertainty
 
-COLOURS = {"attributed": "#1f6f8b", "nothing_missing": "#3d7a4a", "unexplained": "#b5651d"}
+COLOURS = {
+    "attributed": "#1f6f8b",
+    "nothing_missing": "#3d7a4a",
+    "unexplained": "#b5651d",
+    "partly_explained": "#8a6d1d",
+}
 ESTIMATORS = {"ekf": "extended Kalman filter", "oe2": "output error"}
 STATION_NOTES = {
     "command": "It acts on the command, before anything moves.",
@@ -163,7 +168,7 @@ def _figures(verdict: Verdict, experiment: Experiment | None, series: Sequence[A
     }
     if verdict.candidates:
         drawn["candidates"] = figures.candidate_figure(verdict.candidates, [a.effect.id for a in verdict.accepted])
-    if verdict.verdict == "unexplained":
+    if verdict.verdict in ("unexplained", "partly_explained"):
         drawn["residual_torque"] = figures.residual_torque_figure(
             estimate_residual_torque(verdict.after, verdict.fitted, verdict.noise)
         )

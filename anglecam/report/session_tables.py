@@ -42,6 +42,6 @@ def loop_table(verdict: Verdict, experiment: Experiment | None = None) -> Table:
     table.add_row("prediction error, ° RMS", f"{before:.4f} before, {after:.4f} after")
     table.add_row("noise floor, ° RMS", f"{np.degrees(verdict.noise.sigma):.4f} ({verdict.noise.source})")
     table.add_row("p-value of the base model's residual", f"{verdict.first_test.p_value:.3f}")
-    if verdict.verdict != "unexplained" and not verdict.last_test.passed:
+    if verdict.verdict in ("attributed", "nothing_missing") and not verdict.last_test.passed:
         table.add_row("remaining structure", "too small to be investigated further")
     return table

@@ -28,12 +28,13 @@ def sentence(verdict: Verdict) -> str:
             f"Something is missing: the error of the model on data that it was not fitted to is {before}, and none of "
             f"the effects that anglecam knows explains it with sufficient evidence."
         )
+    rest = "; what remains is more than noise, and no effect that anglecam knows explains it"
     first, *others = [_cause(a.effect, a.alias_set[1:]) for a in verdict.accepted]
     causes = "; ".join([first, *(cause[0].lower() + cause[1:] for cause in others)])
     this = "this" if len(verdict.accepted) == 1 else "these"
     return (
         f"{causes}; with {this} in the model, its error on data that it was not fitted to falls from {before} to "
-        f"{after}."
+        f"{after}{rest if verdict.verdict == 'partly_explained' else ''}."
     )
 
 

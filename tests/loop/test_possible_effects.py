@@ -32,5 +32,6 @@ def test_what_yields_more_than_the_bodys_own_springs_is_no_stop(stiffness, possi
     fit = fit_output_error(Plant(), records, [np.array([26.0, 524.0, 508.0])])
     stopped = Plant((effect("end_stop"),))
     at = replace(fit, model=stopped, parameters=np.array([26.0, 524.0, 508.0, stiffness, 5.0, -5.0, 0.3]))
-    assert is_possible(at) is possible
-    assert is_possible(replace(at, model=Plant((effect("dead_time"),)), parameters=np.array([26.0, 524.0, 508.0, 0.1])))
+    assert is_possible(at, records) is possible
+    delayed = replace(at, model=Plant((effect("dead_time"),)), parameters=np.array([26.0, 524.0, 508.0, 0.1]))
+    assert is_possible(delayed, records)
