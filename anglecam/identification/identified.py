@@ -11,6 +11,7 @@ from anglecam.data.record import Record
 from anglecam.data.step_figures import StepFigures
 from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit
+from anglecam.identification.multiple_shooting import loses_step, rms_motion
 
 DOUBTFUL_RESIDUAL = 3.0
 """Multiple of the angle's stated uncertainty; a model with a larger RMS residual lacks something, so that the stated
@@ -51,6 +52,12 @@ class Identified:
             doubts.append(
                 f"the model leaves a residual of {np.degrees(self.fit.rmse):.2g}°, {self.fit.rmse / noise:.0f} times"
                 f" the angle's uncertainty: it lacks something, and its ± do not hold; anglecam close searches for it"
+            )
+        elif not np.isfinite(noise) and loses_step(self.fit, self.fitted):
+            doubts.append(
+                f"the model leaves a residual of {np.degrees(self.fit.rmse):.2g}° of a motion of"
+                f" {np.degrees(rms_motion(self.fitted)):.2g}° RMS: unless the angle is so noisy, it lacks something,"
+                f" and its ± do not hold; anglecam close searches for it"
             )
         return tuple(doubts)
 
