@@ -155,7 +155,7 @@ def _from_release(record: Record) -> Record:
     `RELEASE_SHARE` leaves it, too, but comes back.
     """
     jitter = float(np.median(np.abs(np.diff(record.angle))))
-    if np.ptp(record.angle) < REST_RANGE_STEPS * jitter:
+    if np.ptp(record.angle) <= REST_RANGE_STEPS * jitter:
         raise InputError(f"{record.name}: no command, and nothing moves; there is no swing to fit")
     away = np.abs(record.angle - np.median(record.angle[:5])) / np.ptp(record.angle)
     swinging = int(np.argmax(away > SWINGING_SHARE))
