@@ -144,7 +144,7 @@ def fit_ekf(records: Sequence[Record], start: Floats, settings: EkfSettings) -> 
     """
     if settings.passes > 1 and settings.process_variance > 0.0:
         raise ValueError("passes beyond the first need a process variance of 0")
-    parameters = np.array(start, dtype=float)
+    parameters = np.clip(start, Plant().lower, Plant().upper)
     variance = np.array(settings.initial_variance)
     if not any(r.command is not None for r in records):
         parameters[2] = variance[4] = 0.0
