@@ -15,6 +15,8 @@ from anglecam.errors import InputError
 
 RELEASE_SHARE = 0.02
 """Share of the swing's range within which the angle counts as not yet released."""
+SWINGING_SHARE = 0.25
+"""Share of the swing's range beyond which it counts as released, whatever its noise and the hand's tremor."""
 REST_RANGE_STEPS = 10.0
 """Range of the angle in median steps from frame to frame, below which it is noise about a rest; white noise has 5 to
 8."""
@@ -147,13 +149,18 @@ def _view(series: AngleSeries, ok: NDArray[np.bool_]) -> View:
 
 
 def _from_release(record: Record) -> Record:
-    """Leave out the frames before the release of a free swing: the model does not include the hand that holds it."""
+    """Leave out the frames before the release of a free swing: the model does not include the hand that holds it.
+
+    The release is the last frame near the start before the angle leaves it for good. Noise or a tremor of more than
+    `RELEASE_SHARE` leaves it, too, but comes back.
+    """
     jitter = float(np.median(np.abs(np.diff(record.angle))))
-    if np.ptp(record.angle) < REST_RANGE_STEPS * jitter:
+    if np.ptp(record.angle) <= REST_RANGE_STEPS * jitter:
         raise InputError(f"{record.name}: no command, and nothing moves; there is no swing to fit")
-    start = np.median(record.angle[:5])
-    moved = np.abs(record.angle - start) > RELEASE_SHARE * np.ptp(record.angle)
-    first = int(np.argmax(moved))
+    away = np.abs(record.angle - np.median(record.angle[:5])) / np.ptp(record.angle)
+    swinging = int(np.argmax(away > SWINGING_SHARE))
+    near = np.flatnonzero(away[:swinging] <= RELEASE_SHARE)
+    first = int(near[-1]) + 1 if len(near) else 0
     if len(record.time) - first < MIN_FRAMES:
         raise InputError(f"{record.name}: no command, and the angle moves in too few frames to fit a free swing")
     return record.between(record.time[first], np.inf)

@@ -30,9 +30,10 @@ EFFECT = Effect(
     aliases=("actuator_lag", "clock_scale"),
     separating_experiment=(
         "a lamp in the picture that lights at the first command change separates delay from clock offset (without "
-        "one, the parameter is the sum of both, and a negative time means that the command's clock lags); "
+        "one, the parameter is the sum of both, and a negative time means that the command's time stamps are late); "
         "a chirp up to twice the natural frequency, filmed at 60 Hz or more, separates delay from lag"
     ),
     source="Ljung, System Identification, 2nd ed., 1999, sec. 4.2; the paper's Remarks on Fig. 14",
     command=_shift,
+    opposite="The body moves a fixed time before its command: the command's time stamps are late against the camera's.",
 )

@@ -196,6 +196,8 @@ class Effect:
     in_free_swing: bool = True
     """Whether it is looked for in free swings. There angle, speed, amplitude and time run together, so that an effect
     with a flexible shape takes the place of another one, or of an error of the measurement."""
+    opposite: str = ""
+    """What happens where the effect's size is below its null; empty if ``summary`` holds for both signs."""
     possible: Callable[[Values, Values, Values], bool] = field(default=lambda values, abc, motion: True, repr=False)
     """(parameters, (a, b, c), (lowest, highest angle, rad)) → whether they describe this effect at all; a fit elsewhere
     is some other cause."""

@@ -35,4 +35,5 @@ EFFECT = Effect(
     source="Meingast, Geyer, Sastry, OMNIVIS 2005",
     timing=_exposure_time,
     needs=_needs,
+    opposite="Each row of the picture is exposed before the row above, so that a mark lower down is recorded earlier.",
 )

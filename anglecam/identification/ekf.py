@@ -12,6 +12,7 @@ where the passes converge. They converge to the minimum of output error with whi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -29,6 +30,11 @@ SHRINKAGE = 0.1
 """Factor by which the initial standard deviations of the parameters shrink after a pass that ends with a worse fit."""
 FINAL_SPREAD = 100.0
 """Multiple of the initial standard deviations in the last pass, so that the stated covariance comes from the data."""
+LEAST_NOISE = 1e-6
+"""Least standard deviation of the noise, as a share of the swing. A frame's information is its inverse square, and in
+double precision little is left of the initial information beside 10¹² times as much."""
+RESOLUTION = math.radians(1e-6)
+"""rad; last decimal of an angle in a file, the least swing that is distinguished from none."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +70,8 @@ class EkfEstimate:
     passes: int
     """Passes made."""
     settled: bool
-    """Whether the last of several passes changed nothing; also True if only one pass was requested."""
+    """Whether the last of several passes changed nothing; also True if only one pass was requested. Otherwise
+    ``covariance`` is that of a pass whose initial variances were as small as its step had to be, and no uncertainty."""
 
     @property
     def innovations(self) -> tuple[Floats, ...]:
@@ -107,10 +114,10 @@ def settings_for(records: Sequence[Record], start: Floats, sigma: float) -> EkfS
     EkfSettings
         With Q = 0: the parameters are constant, and their stated covariance is that of an estimate.
     """
-    swing = max(float(np.ptp(r.angle)) for r in records)
+    swing = max(RESOLUTION, *(float(np.ptp(r.angle)) for r in records))
     rate = swing * float(np.sqrt(abs(start[1])))
     a, b, c = (float(max(abs(s), 1.0)) ** 2 for s in start)
-    return EkfSettings((swing**2, rate**2, a, b, c), 0.0, sigma**2, 30, swing**2)
+    return EkfSettings((swing**2, rate**2, a, b, c), 0.0, max(sigma, LEAST_NOISE * swing) ** 2, 30, swing**2)
 
 
 def fit_ekf(records: Sequence[Record], start: Floats, settings: EkfSettings) -> EkfEstimate:
@@ -137,7 +144,7 @@ def fit_ekf(records: Sequence[Record], start: Floats, settings: EkfSettings) -> 
     """
     if settings.passes > 1 and settings.process_variance > 0.0:
         raise ValueError("passes beyond the first need a process variance of 0")
-    parameters = np.array(start, dtype=float)
+    parameters = np.clip(start, Plant().lower, Plant().upper)
     variance = np.array(settings.initial_variance)
     if not any(r.command is not None for r in records):
         parameters[2] = variance[4] = 0.0
@@ -164,11 +171,17 @@ def _iterated(
     best, covariance = passed, np.diag(variance[SHARED])
     while True:
         ended, ended_covariance = _ended(passed)
-        ended_nuisance = [np.delete(state, SHARED) for state in smooth_first_states(passed)]
-        ended_cost = _cost(records, ended, ended_nuisance)
+        ended_cost = np.inf
+        if np.isfinite(ended_covariance).all():  # the pass did not diverge
+            ended_nuisance = [np.delete(state, SHARED) for state in smooth_first_states(passed)]
+            ended_cost = _cost(records, ended, ended_nuisance)
         moved = np.abs(ended - parameters)
-        settled = trust == FINAL_SPREAD and bool(np.all(moved <= SETTLED * np.sqrt(np.diag(ended_covariance))))
-        if settled or ended_cost <= cost:
+        settled = (
+            trust == FINAL_SPREAD
+            and bool(np.isfinite(ended_cost))
+            and bool(np.all(moved <= SETTLED * np.sqrt(np.diag(ended_covariance))))
+        )
+        if settled or (ended_cost <= cost and np.isfinite(ended_cost)):
             best, parameters, covariance, nuisance, cost = passed, ended, ended_covariance, ended_nuisance, ended_cost
             trust = min(FINAL_SPREAD, trust / SHRINKAGE)
         else:
@@ -221,7 +234,9 @@ def _free_run(record: Record, parameters: Floats, nuisance: Floats) -> Floats:
 
 
 def _cost(records: Sequence[Record], parameters: Floats, nuisance: Sequence[Floats]) -> float:
-    """Return the free run's sum of squared errors, rad²; infinite if it diverges."""
+    """Return the free run's sum of squared errors, rad²; infinite if it diverges or the plant is an impossible one."""
+    if not np.all((Plant().lower <= parameters) & (parameters <= Plant().upper)):
+        return np.inf
     total = 0.0
     for record, o in zip(records, nuisance, strict=True):
         run = _free_run(record, parameters, o)

@@ -22,6 +22,9 @@ from anglecam.models.model import Model
 
 CLUSTER_FRAMES = 15
 """Frames in a cluster of the cluster-robust covariance; errors further apart count as independent."""
+NARROW = 1e-4
+"""Standard deviations between two bounds within which a normal distribution is uniform; at `FARTHEST_BEYOND_BOUND`
+from its mean its density changes by 1 % over them."""
 FARTHEST_BEYOND_BOUND = 100.0
 """Standard deviations. The mean of a parameter that would lie further beyond its bound is moved to this distance, at
 which the parameter is practically known to be on the bound."""
@@ -92,6 +95,8 @@ class Fit:
 
     def _clustered(self, jacobian: Floats) -> Floats:
         """Multiply (N, k) values by the residuals' covariance within clusters, in units of their variance."""
+        if self._variance == 0.0:
+            return jacobian
         edges = np.cumsum([0, *(len(e) for e in self.residuals)])
         parts = [
             slice(i, min(i + CLUSTER_FRAMES, stop))
@@ -182,7 +187,10 @@ def _truncated(step: Floats, covariance: Floats, within: Sequence[tuple[int, flo
         if not sd > 0.0:
             continue
         mean = np.clip(step[at], lower - FARTHEST_BEYOND_BOUND * sd, upper + FARTHEST_BEYOND_BOUND * sd)
-        mean_within, variance_within = truncnorm.stats((lower - mean) / sd, (upper - mean) / sd, mean, sd)
+        if upper - lower < NARROW * sd:
+            mean_within, variance_within = 0.5 * (lower + upper), (upper - lower) ** 2 / 12.0
+        else:
+            mean_within, variance_within = truncnorm.stats((lower - mean) / sd, (upper - mean) / sd, mean, sd)
         slope = covariance[at] / sd**2
         step = step + slope * (mean_within - step[at])
         covariance = covariance - np.outer(slope, slope) * (sd**2 - variance_within)

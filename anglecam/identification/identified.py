@@ -11,6 +11,7 @@ from anglecam.data.record import Record
 from anglecam.data.step_figures import StepFigures
 from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit
+from anglecam.identification.multiple_shooting import loses_step, rms_motion
 
 DOUBTFUL_RESIDUAL = 3.0
 """Multiple of the angle's stated uncertainty; a model with a larger RMS residual lacks something, so that the stated
@@ -37,20 +38,32 @@ class Identified:
     """Response to a unit step of the command."""
     fitted: tuple[Record, ...]
     """The recordings that were fitted."""
+    settled: bool = True
+    """Whether the estimator settled. If it did not, ``covariance`` is NaN."""
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """Reasons why the parameters or their uncertainties are unreliable, one line each; empty if there are none."""
         at_bound = [name for name, sigma in zip(self.names, self.sigmas, strict=True) if not np.isfinite(sigma)]
         doubts = []
-        if at_bound:
+        if not self.settled:
+            doubts.append(
+                f"{self.estimator} did not settle: its parameters are the best that it reached, and have no uncertainty"
+            )
+        elif at_bound:
             doubts.append(f"{', '.join(at_bound)}: at a bound of the possible values, so without an uncertainty")
         stated = np.concatenate([r.sigma for r in self.fitted])
         noise = float(np.sqrt(np.mean(stated**2))) if np.all(np.isfinite(stated)) else np.nan
-        if self.fit.rmse > DOUBTFUL_RESIDUAL * noise:
+        if noise > 0.0 and self.fit.rmse > DOUBTFUL_RESIDUAL * noise:
             doubts.append(
                 f"the model leaves a residual of {np.degrees(self.fit.rmse):.2g}°, {self.fit.rmse / noise:.0f} times"
                 f" the angle's uncertainty: it lacks something, and its ± do not hold; anglecam close searches for it"
+            )
+        elif not noise > 0.0 and loses_step(self.fit, self.fitted):
+            doubts.append(
+                f"the model leaves a residual of {np.degrees(self.fit.rmse):.2g}° of a motion of"
+                f" {np.degrees(rms_motion(self.fitted)):.2g}° RMS: unless the angle is so noisy, it lacks something,"
+                f" and its ± do not hold; anglecam close searches for it"
             )
         return tuple(doubts)
 

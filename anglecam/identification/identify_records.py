@@ -84,8 +84,9 @@ def identify_records(
         )
     driven = any(r.command is not None for r in fitted)
     starts = start_parameters(fitted)
-    if "model" in rig.model_fields_set:
-        starts.insert(0, declared_start(rig)[: 3 if driven else 2])
+    if {"a", "b", "c"} & rig.model.model_fields_set:
+        declared = [key in rig.model.model_fields_set for key in "abc"]
+        starts.insert(0, np.where(declared, declared_start(rig), [*starts[0], 0.0][:3])[: len(starts[0])])
     second_order = fit_output_error(Plant(driven=driven), fitted, starts)
     estimate = chosen.fit(second_order, fitted, starts[0], neck)
     covariance = estimate.covariance
@@ -102,6 +103,7 @@ def identify_records(
         predict_output_error(run, held_out) if held_out else None,
         chosen.step_response(run) if driven else NO_STEP,
         tuple(fitted),
+        estimate.settled,
     )
 
 

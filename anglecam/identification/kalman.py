@@ -19,12 +19,15 @@ from anglecam.data.command import NO_COMMAND, Command
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.models.integrator import COMPILED, SOURCES, integrate
-from anglecam.models.plant import MAX_STEP
+from anglecam.models.plant import MAX_STEP, Plant
 
 SHARED = slice(2, 5)
 """Position of a, b, c in the state; the other states are nuisance parameters of the recording."""
 _STEPS = np.array([0.1, 1.0, 1.0, 10.0, 10.0])
 """Smallest magnitudes of θ, θ̇, a, b, c, SI, that scale the steps of difference quotients."""
+_FARTHEST = 100.0 * Plant().upper
+"""Magnitudes of a, b, c from which on the estimate has diverged; the integrator's steps are no longer than the plant's
+time constants, so that it would never end."""
 _NO_EFFECTS = COMPILED.table(())
 
 
@@ -105,6 +108,12 @@ class RunningFilter:
         self.ekf.x, self.ekf.P = mean.copy(), covariance.copy()
         self.ekf.R = np.array([[measurement_variance]])
 
+    @property
+    def diverged(self) -> bool:
+        """Whether the estimate is not finite, or too far away to be integrated."""
+        x, P = self.ekf.x, self.ekf.P
+        return not (np.isfinite(x).all() and np.isfinite(P).all() and (np.abs(x[SHARED]) < _FARTHEST).all())
+
     def predict(self, before: float, time: float, about: Floats | None = None) -> None:
         """Predict the state at ``time`` from that at ``before``, s; ``about`` is the state to linearise about."""
         origin = self.ekf.x if about is None else about
@@ -114,7 +123,11 @@ class RunningFilter:
         self.ekf.predict()
 
     def update(self, angle: float) -> None:
-        """Correct the state by a measured angle, rad."""
+        """Correct the state by a measured angle, rad; not finite where the filter states no variance for it."""
+        variance = (self._H @ self.ekf.P @ self._H.T + self.ekf.R).item()
+        if not 0.0 < variance < np.inf:
+            self.ekf.x = np.full_like(self.ekf.x, np.nan)
+            return
         self.ekf.update(np.array([angle]), HJacobian=lambda _: self._H, Hx=lambda x: self._H @ x)
 
 
@@ -153,18 +166,20 @@ def filter_record(
     n, s = len(record.time), len(mean)
     running = RunningFilter(mean, covariance, record.command, record.interval, process_variance, measurement_variance)
     ekf = running.ekf
-    state, prior, gain = np.empty((n, s)), np.empty((n, s)), np.empty((n, s))
-    posterior, prior_covariance = np.empty((n, s, s)), np.empty((n, s, s))
+    state, prior, gain = (np.full((n, s), np.nan) for _ in range(3))
+    posterior, prior_covariance = np.full((n, s, s), np.nan), np.full((n, s, s), np.nan)
     transition, process = np.zeros((n, s, s)), np.zeros((n, s, s))
     transition[0, SHARED, SHARED], process[0] = np.eye(3), covariance
     process[0, SHARED, :] = process[0, :, SHARED] = 0.0
-    innovation, variance = np.empty(n), np.empty(n)
+    innovation, variance = np.full(n, np.nan), np.full(n, np.nan)
     for i in range(n):
         if i > 0:
             running.predict(record.time[i - 1], record.time[i], None if about is None else about[i - 1])
             transition[i], process[i] = ekf.F, ekf.Q
         prior[i], prior_covariance[i] = ekf.x, ekf.P
         running.update(record.angle[i])
+        if running.diverged:
+            break
         state[i], posterior[i], gain[i] = ekf.x, ekf.P, ekf.K[:, 0]
         innovation[i], variance[i] = ekf.y[0], ekf.S[0, 0]
     return Filtered(

@@ -68,8 +68,13 @@ def drifts(plant_parameters: Floats, records: Sequence[Record]) -> bool:
 
 def loses_step(fit: Fit, records: Sequence[Record]) -> bool:
     """Return whether a fitted model's free run is out of step with the measured angles."""
+    return fit.rmse > OUT_OF_STEP * rms_motion(records)
+
+
+def rms_motion(records: Sequence[Record]) -> float:
+    """Return the RMS distance of the measured angles from each recording's mean, rad."""
     swing = np.concatenate([r.angle - r.angle.mean() for r in records])
-    return fit.rmse > OUT_OF_STEP * float(np.sqrt(np.mean(swing**2)))
+    return float(np.sqrt(np.mean(swing**2)))
 
 
 def windows(records: Sequence[Record], plant_parameters: Floats) -> list[Record]:

@@ -67,7 +67,7 @@ class RunningEkf:
         self._time = time
         ekf = self._filter.ekf
         variance = np.diag(ekf.P)[SHARED]
-        self._diverged = not (np.isfinite(ekf.x).all() and (variance >= 0.0).all())
+        self._diverged = self._filter.diverged or not (variance >= 0.0).all()
         if self._diverged:
             return RunningEstimate(_UNKNOWN, _UNKNOWN)
         return RunningEstimate(tuple(ekf.x[SHARED].tolist()), tuple(np.sqrt(variance).tolist()))

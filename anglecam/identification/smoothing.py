@@ -86,12 +86,20 @@ def _later_frames(passed: Sequence[Filtered]) -> list[list[tuple[Floats, Floats]
             vector = vector + (information @ one.gain[i] + towards) * one.innovation[i]
             information = information + weight
             F, Q = one.transition[i], one.process[i]
-            back = F.T @ np.linalg.inv(np.eye(s) + information @ Q) if Q.any() else F.T
+            back = F.T @ _inverse(np.eye(s) + information @ Q) if Q.any() else F.T
             information, vector = back @ information @ F, back @ vector
             information = 0.5 * (information + information.T)
         shared_information, shared_vector = information[SHARED, SHARED], vector[SHARED]
         result.append(later[::-1])
     return result[::-1]
+
+
+def _inverse(matrix: Floats) -> Floats:
+    """Return the inverse; NaN where a diverging pass has left nothing of the 1 in 1 + ΛQ."""
+    try:
+        return np.linalg.inv(matrix)
+    except np.linalg.LinAlgError:
+        return np.full_like(matrix, np.nan)
 
 
 def _combined(covariance: Floats, information: Floats) -> Floats:

@@ -33,6 +33,8 @@ HELD = 1e-12
 """rad; error that a parameter makes when it leaves its start by its magnitude. It holds a parameter on which the
 prediction does not depend: without it the Jacobian is rank-deficient, and SciPy's step is as long as the trust region
 allows."""
+INSIDE = 1e-10
+"""Least distance from a bound, relative to the bound or to 1, at which SciPy begins."""
 NEXT_TO = 1e-4
 """Distance from a bound, in magnitudes of a parameter, from which the parameter is moved onto the bound."""
 SHORTENED = (0.25, 0.05, 0.01)
@@ -145,6 +147,12 @@ def _fit_by_trust_region(model: Model, joined: Joined, begin: Point, most: int) 
     slopes = joined.slopes(model, here.parameters, here.own, here.predicted)
     costs, held = [here.cost], HELD / model.scales
     patience = 1 if isinstance(model, Plant) and not model.kinked else PATIENCE
+    margin = [INSIDE * np.maximum(1.0, np.abs(bound)) for bound in (model.lower, model.upper)]
+    inside = np.clip(here.parameters, model.lower + margin[0], model.upper - margin[1])
+    if not np.array_equal(inside, here.parameters):
+        latest = _follow(model, joined, here, slopes, inside)
+        if not np.isfinite(latest.cost):  # next to its bound the model diverges
+            return here, slopes, 1
 
     def errors(parameters: Floats) -> Floats:
         nonlocal latest
@@ -168,7 +176,7 @@ def _fit_by_trust_region(model: Model, joined: Joined, begin: Point, most: int) 
 
     found = least_squares(
         errors,
-        here.parameters,
+        inside,
         jac=jacobian,
         bounds=(model.lower, model.upper),
         x_scale="jac",

@@ -21,7 +21,7 @@ from anglecam.data.typing import Floats
 from anglecam.effects import Effect
 from anglecam.effects.seen import Seen
 from anglecam.identification.fit import Fit
-from anglecam.identification.joined import join
+from anglecam.identification.joined import RUNAWAY, join
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import plant_of
 from anglecam.loop.seen import seen_of
@@ -115,7 +115,7 @@ def changes(fit: Fit, records: Sequence[Record], effects: Sequence[Effect]) -> l
         starts = starts_of(effect, seen)
         for start in starts:
             change = predict(start) - base
-            if np.all(np.isfinite(change)):
+            if np.all(np.abs(change) < RUNAWAY):
                 found.append(Change(effect, start, change, starts[0]))
     return found
 

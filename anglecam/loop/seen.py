@@ -17,7 +17,7 @@ from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.effects.seen import Seen
 from anglecam.identification.fit import Fit
-from anglecam.identification.joined import join
+from anglecam.identification.joined import RUNAWAY, join
 from anglecam.loop.refit import plant_of
 
 STEP = 4.0 / 3.0
@@ -125,7 +125,7 @@ def _changes(
 ) -> Iterator[tuple[Floats, Floats]]:
     """Yield `AT_ONCE` torques' changes of the whitened angles that the fit cannot follow, and the norms of all of it.
 
-    A change that is not finite is zero.
+    A change that is not finite, or would not be when squared, is zero.
     """
     joined = join(records, fit.phi)
     for begin in range(0, torques[0].shape[1], AT_ONCE):
@@ -134,7 +134,7 @@ def _changes(
             for t, torque, record in zip(times, torques, records, strict=True)
         ]
         change = joined.whiten(np.concatenate(blocks))
-        change[:, ~np.all(np.isfinite(change), axis=0)] = 0.0
+        change[:, ~np.all(np.abs(change) < RUNAWAY, axis=0)] = 0.0
         yield fit.slopes.without_followed(change), np.linalg.norm(change, axis=0)
 
 
@@ -146,13 +146,15 @@ def _explained(
     energy = float(left @ left)
     multiples, shares = [], []
     for change, whole in _changes(fit, records, times, torques):
-        both, one, two = left @ change, change[:, 0::2], change[:, 1::2]
+        size = np.maximum(whole[0::2], whole[1::2])
+        size = np.where(size > 0.0, size, 1.0)
+        one, two = change[:, 0::2] / size, change[:, 1::2] / size
         # a little more on the diagonal, so that a pair which the fit can follow explains nothing
-        more = 1e-6 * np.maximum(whole[0::2], whole[1::2]) ** 2 + 1e-300
-        p, q, r = np.sum(one**2, axis=0) + more, np.sum(one * two, axis=0), np.sum(two**2, axis=0) + more
-        found = np.stack([r * both[0::2] - q * both[1::2], p * both[1::2] - q * both[0::2]]) / (p * r - q**2)
-        multiples.append(found.T)
-        shares.append((found[0] * both[0::2] + found[1] * both[1::2]) / energy if energy > 0.0 else 0.0 * p)
+        p, q, r = np.sum(one**2, axis=0) + 1e-6, np.sum(one * two, axis=0), np.sum(two**2, axis=0) + 1e-6
+        along = np.stack([left @ one, left @ two])
+        found = np.stack([r * along[0] - q * along[1], p * along[1] - q * along[0]]) / (p * r - q**2)
+        multiples.append((found / size).T)
+        shares.append(np.sum(found * along, axis=0) / energy if energy > 0.0 else 0.0 * p)
     return np.nan_to_num(np.concatenate(multiples)), np.nan_to_num(np.concatenate(shares))
 
 

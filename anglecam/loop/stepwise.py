@@ -82,7 +82,7 @@ def assess(task: Task, fit: Fit) -> Assessment:
     fit = refit_with_phi(fit, task.fitted, _noise_phi(task, fit, prediction_changes))
     effect_directions = directions(fit, task.fitted, prediction_changes, policy)
     held_out, cross_validated = predict_held_out(fit, task.fitted, task.predicted, policy)
-    smallest_rms = policy.stepwise.film_error_sigmas * task.camera
+    smallest_rms = max(policy.stepwise.numerical_error_rad, policy.stepwise.film_error_sigmas * task.camera)
     tested = run_residual_test(fit, task.fitted, effect_directions, task.rng, smallest_rms, policy)
     chosen = promising(forecasts(fit, effect_directions), policy)
     return Assessment(fit, held_out, cross_validated, tested, tuple(chosen))

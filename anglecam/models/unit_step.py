@@ -10,6 +10,10 @@ from anglecam.data.step_figures import HIGH, LOW, NO_STEP, StepFigures, first_cr
 from anglecam.data.typing import Floats
 from anglecam.models.model import Model
 
+MOST_STIFF = 1e6
+"""Ratio of the fastest pole to the slowest beyond which no response is simulated: the integrator's steps are no longer
+than the fastest time constant."""
+
 
 def step_figures(model: Model, parameters: Floats, poles: NDArray, steady_state: float) -> StepFigures:
     """Simulate the response to a unit step and return its figures.
@@ -28,10 +32,10 @@ def step_figures(model: Model, parameters: Floats, poles: NDArray, steady_state:
     Returns
     -------
     StepFigures
-        `NO_STEP` for a model that is unstable or has no steady state.
+        `NO_STEP` for a model that is unstable, has no steady state or takes too long to reach it.
     """
     slowest = -float(np.max(poles.real))
-    if slowest <= 0.0 or steady_state == 0.0:
+    if slowest * MOST_STIFF <= float(np.max(np.abs(poles))) or steady_state == 0.0:
         return NO_STEP
     time = np.linspace(0.0, 12.0 / slowest, 6001)
     step = Command(np.zeros(1), np.ones(1))

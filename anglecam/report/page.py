@@ -25,7 +25,7 @@ from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import NEXT_COMMAND, size_of
 from anglecam.report import loop_figures as figures
 from anglecam.report.path_figure import path_figure
-from anglecam.report.wording import plain, sentence, with_uncertainty
+from anglecam.report.wording import plain, sentence, summary_of, with_uncertainty
 
 COLOURS = {
     "attributed": "#1f6f8b",
@@ -239,7 +239,7 @@ def _effect_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any
         {
             "id": a.effect.id,
             "name": plain(a.effect.id),
-            "summary": a.effect.summary,
+            "summary": summary_of(a.effect, verdict.after),
             "equation": a.effect.equation,
             "fitted": [
                 {
@@ -253,8 +253,8 @@ def _effect_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any
             "relaxes": a.effect.relaxes,
             "station_note": STATION_NOTES[a.effect.station],
             "rivals": [
-                {"name": plain(name), "summary": effect(name).summary, "station": effect(name).station}
-                for name in a.rivals
+                {"name": plain(name), "summary": summary_of(effect(name), rival), "station": effect(name).station}
+                for name, rival in a.rivals.items()
             ],
             "aliases": [plain(name) for name in a.effect.aliases],
             "experiment": a.effect.separating_experiment,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anglecam.effects import Effect
+from anglecam.identification.fit import Fit
 from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import fitted_parameters
 
@@ -29,7 +30,7 @@ def sentence(verdict: Verdict) -> str:
             f"the effects that anglecam knows explains it with sufficient evidence."
         )
     rest = "; what remains is more than noise, and no effect that anglecam knows explains it"
-    first, *others = [_cause(a.effect, a.alias_set[1:]) for a in verdict.accepted]
+    first, *others = [_cause(a.effect, a.alias_set[1:], verdict.after) for a in verdict.accepted]
     causes = "; ".join([first, *(cause[0].lower() + cause[1:] for cause in others)])
     this = "this" if len(verdict.accepted) == 1 else "these"
     return (
@@ -72,9 +73,16 @@ def with_uncertainty(value: float, sigma: float, unit: str = "") -> str:
     return f"{value:.{digits}f} ± {sigma:.{digits}f}{unit}"
 
 
-def _cause(effect: Effect, others: tuple[str, ...]) -> str:
+def summary_of(effect: Effect, fit: Fit) -> str:
+    """Return what an effect does with the sign that a fit gives its size."""
+    size = effect.parameters[0]
+    value = dict(zip(fit.model.names, fit.parameters, strict=True)).get(size.name, size.null)
+    return effect.opposite if effect.opposite and value < size.null else effect.summary
+
+
+def _cause(effect: Effect, others: tuple[str, ...], fit: Fit) -> str:
     """Return an effect's summary, whether it is the camera's, and its rivals."""
-    cause = effect.summary.removesuffix(".")
+    cause = summary_of(effect, fit).removesuffix(".")
     if effect.station == "camera":
         cause += ", which is an effect of the camera and not of the mechanism"
     if others:

@@ -18,7 +18,7 @@ import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
@@ -156,13 +156,15 @@ def _serve(pipe, readers: Callable[[], dict[str, Reader]], most_bytes: int) -> N
         pipe.send((outcome.kind, outcome.said))
 
 
-def arguments(text: str | None) -> argparse.Namespace:
-    """Parse the command line of both programs."""
+def arguments(text: str | None, commands: Sequence[str] = (), keep: Path = Path("build/fuzz")) -> argparse.Namespace:
+    """Parse the command line of a program; ``--command`` chooses one of ``commands``, if there are any."""
     parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("cases", type=int, nargs="?", default=2000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
-    parser.add_argument("--keep", type=Path, default=Path("build/fuzz"), help="folder for files that are findings")
+    parser.add_argument("--keep", type=Path, default=keep, help="folder for files that are findings")
+    if commands:
+        parser.add_argument("--command", choices=commands, default=commands[0])
     return parser.parse_args()
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from anglecam.data.command import Command
 from anglecam.data.record import Record
+from anglecam.identification import ekf
 from anglecam.identification.ekf import PAPER, fit_ekf, settings_for
 from anglecam.identification.identify_records import identify_records
 from anglecam.identification.output_error import fit_output_error
@@ -142,3 +143,33 @@ def test_a_diverging_pass_is_rejected_and_the_filter_ends_at_the_result_of_outpu
     by_filter, by_output_error = (identify_records(records, Rig(), name) for name in ("ekf", "oe2"))
     assert by_filter.values == pytest.approx(by_output_error.values, rel=1e-4)
     assert np.all(np.isfinite(by_filter.sigmas))
+
+
+def test_a_filter_that_did_not_settle_states_no_uncertainty(monkeypatch):
+    monkeypatch.setattr(ekf, "SETTLED", 0.0)  # then no pass settles
+    model = identify_records(session(TruePlant(), 1, sigma_deg=0.2), Rig(), "ekf")
+    assert np.all(np.isnan(model.sigmas))
+    assert "did not settle" in model.doubts[0]
+
+
+def test_only_declared_values_replace_the_start_from_the_grid(monkeypatch):
+    records, seen = session(TruePlant(2.0, 40.0, 38.0), 1, sigma_deg=0.2), []
+    original = ekf.fit_ekf
+    monkeypatch.setattr(ekf, "fit_ekf", lambda r, start, settings: seen.append(start) or original(r, start, settings))
+    for model in ({}, {"gravity_deg": 90.0}, {"b": 41.0}):
+        identify_records(records, Rig.model_validate({"model": model}), "ekf")
+    assert seen[0] == pytest.approx(seen[1])
+    assert seen[2] == pytest.approx([seen[0][0], 41.0, seen[0][2]])
+
+
+@pytest.mark.parametrize("start", [[26.0, 1e12, 508.0], [-1e12, 524.0, 508.0]])
+def test_a_start_from_which_the_filter_diverges_ends(start):
+    estimate = fitted(session(TruePlant(), 0, sigma_deg=0.2)[:1], start)
+    assert np.all(np.isfinite(estimate.parameters))
+
+
+def test_angles_without_noise_or_motion_are_filtered():
+    exact = session(TruePlant(), 0, sigma_deg=0.0)[:1]
+    still = [replace(exact[0], angle=np.zeros(len(exact[0].time)))]
+    for records in (exact, still):
+        assert np.all(np.isfinite(fitted(records, TRUE, 0.0).parameters))

@@ -13,6 +13,7 @@ from anglecam.identification.estimators.oe2 import second_order_step
 from anglecam.identification.fit import Fit
 from anglecam.identification.noise import noise_floor
 from anglecam.identification.output_error import fit_output_error
+from anglecam.models.plant import Plant
 from anglecam.neck.large_angle import LargeAngleNeck
 
 
@@ -22,12 +23,14 @@ def _fit(second_order: Fit, records: Sequence[Record], start: Floats, neck: Larg
 
     noise = noise_floor(records)
     sigma = max(noise.sigma if noise else 0.0, second_order.rmse)
-    initial = start if len(start) == 3 else np.append(start, 0.0)
+    initial = np.clip(start if len(start) == 3 else np.append(start, 0.0), Plant().lower, Plant().upper)
     estimate = fit_ekf(records, initial, settings_for(records, initial, sigma))
     n = len(second_order.parameters)
     parameters, covariance = estimate.parameters[:n], estimate.covariance[:n, :n]
+    if not estimate.settled:
+        covariance = np.full((n, n), np.nan)
     free_run = fit_output_error(second_order.model, records, [parameters], nuisance=second_order.nuisance, fixed=True)
-    return Estimate(free_run, parameters, covariance, optimum=second_order)
+    return Estimate(free_run, parameters, covariance, second_order, estimate.settled)
 
 
 ESTIMATOR = Estimator(

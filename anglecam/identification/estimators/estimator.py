@@ -22,10 +22,12 @@ class Estimate:
     parameters: Floats
     """(p,) SI, in the order of ``free_run.model.names``."""
     covariance: Floats
-    """(p, p) SI, of random errors only."""
+    """(p, p) SI, of random errors only; NaN where they are not known."""
     optimum: Fit
     """Output-error fit whose sensitivities propagate systematic errors: where an estimator converges to the optimum of
     output error, a systematic error shifts its parameters as it shifts that optimum."""
+    settled: bool = True
+    """Whether an iteration ended where another step would change nothing."""
 
 
 class FitFunction(Protocol):

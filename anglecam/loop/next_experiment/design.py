@@ -254,7 +254,8 @@ def _slopes(plant: Plant, unknowns: Floats, record: Record) -> Floats:
     for j in range(p + plant.states):  # the derivative with respect to the zero is 1
         moved = unknowns.copy()
         moved[j] += steps[j]
-        slopes[:, j] = (_predict(plant, moved, record) - base) / steps[j]
+        with np.errstate(over="ignore", invalid="ignore"):  # a diverging model is left out later
+            slopes[:, j] = (_predict(plant, moved, record) - base) / steps[j]
     return slopes
 
 
@@ -290,7 +291,8 @@ def _fitted_distance(target: Record, model: _Foreseen, fit: Fit, known: Floats, 
     free = np.full(len(model.unknowns) - p, np.inf)
     lower, upper = np.append(plant.lower, -free), np.append(plant.upper, free)
     inside = np.clip(model.unknowns, np.nextafter(lower, np.inf), np.nextafter(upper, -np.inf))
-    # the plant may diverge at a trial step; its cost is then not finite and the step is rejected
-    with np.errstate(over="ignore", invalid="ignore"):
+    # the plant may diverge at a trial step; its cost is then not finite and the step is rejected. SciPy divides by a
+    # derivative that underflows where the gradient is nearly zero
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         found = least_squares(errors, inside, slopes, (lower, upper), x_scale="jac", ftol=1e-4, max_nfev=40)
     return float(np.sqrt(2.0 * found.cost))
