@@ -21,6 +21,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from anglecam.data.typing import Floats
 from anglecam.identification.joined import Joined, Predicted
 from anglecam.identification.slopes import Slopes
+from anglecam.models.curved_plant import CurvedPlant
 from anglecam.models.model import Model
 from anglecam.models.plant import Plant
 
@@ -143,14 +144,16 @@ def _fit_by_trust_region(model: Model, joined: Joined, begin: Point, most: int) 
     """Return the best point that whole steps reach, the derivatives there, and the number of steps tried."""
     here = latest = begin
     slopes = joined.slopes(model, here.parameters, here.own, here.predicted)
-    costs, held = [here.cost], HELD / model.scales
+    held = HELD / model.scales
+    bent = model.penalty if isinstance(model, CurvedPlant) else np.empty((0, len(held)))
+    costs = [here.cost + float(np.sum((bent @ here.parameters) ** 2))]
     patience = 1 if isinstance(model, Plant) and not model.kinked else PATIENCE
 
     def errors(parameters: Floats) -> Floats:
         nonlocal latest
         if not np.array_equal(parameters, latest.parameters):
             latest = _follow(model, joined, here, slopes, parameters)
-        return np.append(latest.white, held * (parameters - begin.parameters))
+        return np.concatenate([latest.white, held * (parameters - begin.parameters), bent @ parameters])
 
     def jacobian(parameters: Floats) -> Floats:
         """Return the derivatives at the point that was accepted, from which the next steps start."""
@@ -159,7 +162,7 @@ def _fit_by_trust_region(model: Model, joined: Joined, begin: Point, most: int) 
             errors(parameters)
             here = latest
             slopes = joined.slopes(model, here.parameters, here.own, here.predicted)
-        return np.concatenate([-slopes.projected, np.diag(held)])
+        return np.concatenate([-slopes.projected, np.diag(held), bent])
 
     def settled(intermediate_result: OptimizeResult) -> None:
         costs.append(2.0 * intermediate_result.cost)
