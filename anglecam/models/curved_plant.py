@@ -34,8 +34,10 @@ class Curve:
     """One or two."""
     basis: Floats = field(repr=False)
     """(k, m) Z: coefficients of the splines for each of the m parameters."""
-    penalty: Floats = field(repr=False)
-    """(r, m) rows that give, multiplied by the parameters, the errors (rad) that a bent curve counts as."""
+    bending: tuple[Floats, ...] = field(repr=False)
+    """For each axis (r, m) rows that give, multiplied by the parameters, how much the curve bends along it, rad/s²."""
+    smoothness: tuple[float, ...]
+    """λ for each axis, s⁴: the sum of squared bendings times λ counts as a sum of squared errors, rad²."""
 
     @property
     def over(self) -> tuple[str, ...]:
@@ -46,6 +48,11 @@ class Curve:
     def count(self) -> int:
         """Number of parameters."""
         return self.basis.shape[1]
+
+    @property
+    def penalty(self) -> Floats:
+        """(r, m) rows that give, multiplied by the parameters, the errors that a bent curve counts as, rad."""
+        return np.vstack([np.sqrt(size) * rows for size, rows in zip(self.smoothness, self.bending, strict=True)])
 
     def header(self, command: Command | None) -> Floats:
         """Return the curve's header for `anglecam.models.torque_curve.curve_at` under a command."""
@@ -63,7 +70,7 @@ def products(splines: Sequence[Floats]) -> Floats:
     """Return the products of the (n, k) values of splines along each axis, (n, k) or (n, k·l)."""
     first, *others = splines
     for other in others:
-        first = (first[:, :, None] * other[:, None, :]).reshape(len(first), -1)
+        first = (first[:, :, None] * other[:, None, :]).reshape(len(first), first.shape[1] * other.shape[1])
     return first
 
 

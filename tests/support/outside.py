@@ -106,17 +106,18 @@ CAUSES = {
 """By name."""
 
 
-def torque_of(name: str, seed: int) -> Torque:
-    """Return the torque of a session."""
-    return CAUSES[name].draw(np.random.default_rng([seed, list(CAUSES).index(name), 7]))
+def torque_of(name: str, seed: int, size: float = 1.0) -> Torque:
+    """Return the torque of a session, ``size`` times as large as it is drawn."""
+    drawn = CAUSES[name].draw(np.random.default_rng([seed, list(CAUSES).index(name), 7]))
+    return lambda th, om, u, ph, t: size * drawn(th, om, u, ph, t)
 
 
-def outside_session(name: str, seed: int, *, sigma_deg: float = 0.05) -> list[Record]:
+def outside_session(name: str, seed: int, *, size: float = 1.0, sigma_deg: float = 0.05) -> list[Record]:
     """Return records of steps, stairs, triangle, chirp and random steps, of which the last is meant to be held out.
 
     For a torque over the phase, the triangle is repeated every two seconds, and so are the held-out recording's steps.
     """
-    torque, rng = torque_of(name, seed), np.random.default_rng(seed)
+    torque, rng = torque_of(name, seed, size), np.random.default_rng(seed)
     kinds = ("steps", "stairs", "triangle", "chirp", "random")
     return [_record(kind, torque, CAUSES[name].over == ("phase",), rng, sigma_deg) for kind in kinds]
 

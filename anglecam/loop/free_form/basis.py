@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.linalg import null_space
 
@@ -12,9 +10,9 @@ from anglecam.loop.free_form.visited import Visited
 from anglecam.models.curved_plant import Curve
 from anglecam.models.torque_curve import ORDER, Axis
 
-ONE, TIME, TWO = 14, 26, 6
-"""Splines of a curve over one quantity, over the time, and along each axis of a curve over two. The penalty, not their
-number, determines how smooth the curve is."""
+ONE, TWO = 30, 8
+"""Splines of a curve over one quantity, and along each axis of a curve over two. The penalty, not their number,
+determines how smooth the curve is; fewer would leave a bias that the band does not contain."""
 
 
 def curve_over(visited: Visited, over: tuple[str, ...]) -> Curve:
@@ -33,15 +31,18 @@ def curve_over(visited: Visited, over: tuple[str, ...]) -> Curve:
     Returns
     -------
     Curve
-        Its penalty gives second differences of the coefficients, with λ = 1.
+        Its bending is that of second differences of the coefficients; λ is 1.
     """
     axes = tuple(_axis(visited, name, len(over)) for name in over)
-    wrapped = _each(axes, [_wrap(axis) for axis in axes])
-    bare = Curve(axes, wrapped, np.empty((0, wrapped.shape[1])))
-    along = sum(visited.followed(one, over).T @ one.acceleration(bare) for one in visited.stretches)
-    basis = wrapped @ null_space(np.asarray(along)) if np.size(along) else wrapped
-    bent = [_each(axes, [_second_differences(a.count) if a is axis else np.eye(a.count) for a in axes]) for axis in axes]
-    return replace(bare, basis=basis, penalty=np.vstack(bent) @ basis)
+    wrapped = _each([_wrap(axis) for axis in axes])
+    bare = Curve(axes, wrapped, (), ())
+    along = np.sum([visited.followed(one, over).T @ one.acceleration(bare) for one in visited.stretches], axis=0)
+    basis = wrapped @ null_space(along) if len(along) else wrapped
+    bending = [
+        _each([_second_differences(other.count) if other is axis else np.eye(other.count) for other in axes]) @ basis
+        for axis in axes
+    ]
+    return Curve(axes, basis, tuple(bending), (1.0,) * len(axes))
 
 
 def _axis(visited: Visited, name: str, count: int) -> Axis:
@@ -49,8 +50,7 @@ def _axis(visited: Visited, name: str, count: int) -> Axis:
     values = values[np.isfinite(values)]
     if name == "phase":
         return Axis(name, 0.0, 1.0, (ONE if count == 1 else TWO) + ORDER - 1)
-    splines = TWO if count > 1 else TIME if name == "time" else ONE
-    return Axis(name, float(values.min()), float(values.max()), splines)
+    return Axis(name, float(values.min()), float(values.max()), ONE if count == 1 else TWO)
 
 
 def _wrap(axis: Axis) -> Floats:
@@ -65,7 +65,7 @@ def _second_differences(count: int) -> Floats:
     return np.diff(np.eye(count), n=2, axis=0)
 
 
-def _each(axes: tuple[Axis, ...], matrices: list[Floats]) -> Floats:
+def _each(matrices: list[Floats]) -> Floats:
     """Return the Kronecker product of one matrix for each axis."""
     first, *others = matrices
     for other in others:

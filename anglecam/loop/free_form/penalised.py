@@ -10,6 +10,8 @@ Wood, J. R. Statist. Soc. B 73, 2011).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
@@ -22,8 +24,10 @@ RIDGE = 1e-9
 """Share of the mean curvature of the cost that is added to every parameter, for splines where no data are."""
 
 
-def smoothing(response: Floats, left: Floats, penalty: Floats, free: int) -> float:
-    """Return the λ that maximises the restricted likelihood.
+def smoothing(
+    response: Floats, left: Floats, roughness: Sequence[Floats], free: int, ratios: Sequence[float] = (1.0,)
+) -> tuple[float, ...]:
+    """Return the λ of each axis that maximise the restricted likelihood.
 
     Parameters
     ----------
@@ -31,29 +35,33 @@ def smoothing(response: Floats, left: Floats, penalty: Floats, free: int) -> flo
         R without the part that A can follow, rad per parameter.
     left : (N,) ndarray
         y without the part that A can follow, rad.
-    penalty : (m, m) ndarray
-        P.
+    roughness : sequence of (m, m) ndarray
+        P for one or two axes.
     free : int
         N less the rank of A.
+    ratios : sequence of float
+        Ratios of the second λ to the first that are tried, relative to those at which both axes count alike.
 
     Returns
     -------
-    float
-        λ.
+    tuple of float
+        λ for each axis.
     """
     gram, along, energy = response.T @ response, response.T @ left, float(left @ left)
-    unit = float(np.trace(gram) / np.trace(penalty))
-    ridge = RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram))
-    rank = int(np.linalg.matrix_rank(penalty, hermitian=True))
-    unbent = len(gram) - rank
-    best = (np.inf, unit)
-    for decade in np.arange(ROUGHEST, SMOOTHEST, 1.0 / PER_DECADE):
-        size = unit * 10.0**decade
-        factor = cho_factor(gram + ridge + size * penalty, lower=True)
-        remaining = max(energy - float(along @ cho_solve(factor, along)), 1e-12 * energy)
-        half_logdet = float(np.sum(np.log(np.diag(factor[0]))))
-        criterion = (free - unbent) * np.log(remaining) + 2.0 * half_logdet - rank * np.log(size)
-        best = min(best, (float(criterion), float(size)))
+    gram = gram + RIDGE * np.trace(gram) / len(gram) * np.eye(len(gram))
+    units = [float(np.trace(gram) / np.trace(one)) for one in roughness]
+    rank = int(np.linalg.matrix_rank(sum(u * one for u, one in zip(units, roughness, strict=True)), hermitian=True))
+    best = (np.inf, tuple(units))
+    for ratio in ratios if len(roughness) > 1 else (1.0,):
+        sizes = [unit * factor for unit, factor in zip(units, (ratio**-0.5, ratio**0.5), strict=False)]
+        penalty = np.sum([size * one for size, one in zip(sizes, roughness, strict=True)], axis=0)
+        bent = float(np.sum(np.log(np.linalg.eigvalsh(penalty)[len(gram) - rank :])))
+        for decade in np.arange(ROUGHEST, SMOOTHEST, 1.0 / PER_DECADE):
+            factor = cho_factor(gram + 10.0**decade * penalty, lower=True)
+            remaining = max(energy - float(along @ cho_solve(factor, along)), 1e-12 * energy)
+            both = 2.0 * float(np.sum(np.log(np.diag(factor[0]))))
+            criterion = (free - len(gram) + rank) * np.log(remaining) + both - bent - rank * decade * np.log(10.0)
+            best = min(best, (float(criterion), tuple(float(size * 10.0**decade) for size in sizes)))
     return best[1]
 
 
@@ -95,3 +103,10 @@ def predicted_left(
         solution = np.linalg.solve(gram - out.T @ out + bent, along - out.T @ residual[folds == fold])
         left[folds == fold] = residual[folds == fold] - out @ solution
     return left
+
+
+def solved(gram: Floats, along: Floats) -> Floats:
+    """Solve penalised normal equations, (m, m) and (m,); a direction that nothing determines stays near zero."""
+    scale = np.sqrt(np.diag(gram))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    return np.linalg.solve(gram / np.outer(scale, scale) + RIDGE * np.eye(len(gram)), along / scale) / scale

@@ -17,8 +17,8 @@ from anglecam.identification.fit import Fit
 from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.loop.cross_validation import NEVER_LEFT_OUT, Gain, Prediction, compare, fold_numbers, predict_held_out
 from anglecam.loop.free_form.basis import curve_over
-from anglecam.loop.free_form.penalised import predicted_left, smoothing
-from anglecam.loop.free_form.visited import Visited, visit
+from anglecam.loop.free_form.penalised import predicted_left, smoothing, solved
+from anglecam.loop.free_form.visited import Visited
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import plant_of
 from anglecam.models.curved_plant import Curve, CurvedPlant, curved
@@ -27,8 +27,10 @@ FITTED = 2
 """Curves over one quantity that are fitted by output error, best by linear regression first."""
 ROUNDS = 2
 """Most fits by output error of one curve, each with the smoothness that the last one calls for."""
+RATIOS = tuple(10.0**decade for decade in range(-3, 4))
+"""Ratios of the smoothness along two axes that are tried."""
 SAME_SMOOTHNESS = 2.0
-"""Factor of λ within which a fit is not repeated."""
+"""Factor of each λ within which a fit is not repeated."""
 
 
 @dataclass(frozen=True)
@@ -85,10 +87,9 @@ def screen(visited: Visited, policy: Policy = DEFAULT) -> list[Screened]:
         curve = curve_over(visited, over)
         response = fit.slopes.without_own(visited.responses(curve))
         free = fit.slopes.without_followed(response)
-        size = smoothing(free, left, curve.penalty.T @ curve.penalty, len(left) - fit.slopes.rank)
-        curve = replace(curve, penalty=np.sqrt(size) * curve.penalty)
+        curve = replace(curve, smoothness=smoothing(free, left, _roughness(curve), len(left) - fit.slopes.rank))
         roughness = curve.penalty.T @ curve.penalty
-        start = np.linalg.lstsq(free.T @ free + roughness, free.T @ left, rcond=1e-12)[0]
+        start = solved(free.T @ free + roughness, free.T @ left)
         error = predicted_left(known, response, own, roughness, folds)
         found.append(Screened(curve, start, _prediction(visited.records, error, folds)))
     return sorted(found, key=lambda one: one.predicted.cost)
@@ -111,15 +112,15 @@ def fit_curve(base: Fit, records: Sequence[Record], one: Screened) -> Fit:
         model = curved(plant_of(base), curve)
         fit = fit_output_error(model, records, [start], nuisance=nuisance, phi=base.phi)
         start, nuisance = fit.parameters, fit.nuisance
-        rougher = _smoothness_at(fit)
-        if max(rougher, 1.0 / rougher) < SAME_SMOOTHNESS:
+        smoothness = _smoothness_at(fit)
+        if np.allclose(np.log(smoothness), np.log(curve.smoothness), rtol=0.0, atol=np.log(SAME_SMOOTHNESS)):
             break
-        curve = replace(curve, penalty=np.sqrt(rougher) * curve.penalty)
+        curve = replace(curve, smoothness=smoothness)
     return fit
 
 
-def _smoothness_at(fit: Fit) -> float:
-    """Return the factor by which the best λ at a fit differs from the fit's."""
+def _smoothness_at(fit: Fit) -> tuple[float, ...]:
+    """Return the best λ of each axis at a fit."""
     curve, slopes = curve_of(fit), fit.slopes
     first = len(fit.parameters) - curve.count
     known, _ = np.linalg.qr(slopes.projected[:, :first])
@@ -127,13 +128,16 @@ def _smoothness_at(fit: Fit) -> float:
     response = response - known @ (known.T @ response)
     left = slopes.without_own(fit.white)
     left = left - known @ (known.T @ left) + response @ fit.parameters[first:]
-    return smoothing(response, left, curve.penalty.T @ curve.penalty, len(left) - slopes.rank + curve.count)
+    return smoothing(response, left, _roughness(curve), len(left) - slopes.rank + curve.count, RATIOS)
+
+
+def _roughness(curve: Curve) -> list[Floats]:
+    return [rows.T @ rows for rows in curve.bending]
 
 
 def search(
-    base: Fit,
-    held_out: Prediction,
-    fitted: Sequence[Record],
+    visited: Visited,
+    before: Prediction,
     predicted: Sequence[Record],
     rng: np.random.Generator,
     policy: Policy = DEFAULT,
@@ -142,12 +146,12 @@ def search(
 
     Parameters
     ----------
-    base : Fit
-        The model that leaves structure, on ``fitted``.
-    held_out : Prediction
-        Of the held-out recordings by ``base``, or of all frames by cross-validation if none is held out.
-    fitted, predicted : sequence of Record
-        Recordings to fit, and to predict only.
+    visited : Visited
+        Of the model that leaves structure, in the recordings that it was fitted to.
+    before : Prediction
+        Of the held-out recordings by that model, or of all frames by cross-validation if none is held out.
+    predicted : sequence of Record
+        The held-out recordings; may be empty.
     rng : numpy.random.Generator
         For bootstrap intervals.
     policy : Policy
@@ -158,7 +162,7 @@ def search(
     Found or None
         A curve over two quantities only if it predicts significantly better than any over one.
     """
-    screened = screen(visit(base, fitted), policy)
+    base, fitted, screened = visited.fit, visited.records, screen(visited, policy)
     single = [one for one in screened if len(one.curve.axes) == 1]
     pairs = [one for one in screened if len(one.curve.axes) == 2]
     tried = [_curved(base, one, fitted, policy) for one in single[:FITTED]]
@@ -171,7 +175,7 @@ def search(
     if predicted:
         unseen = predict_output_error(best.fit, predicted)
         after = Prediction(tuple(predicted), unseen.residuals, unseen.cost)
-    gain = compare(held_out, after, rng, policy)
+    gain = compare(before, after, rng, policy)
     return Found(best.fit, after, gain) if gain.lower_bound > 0.0 else None
 
 
