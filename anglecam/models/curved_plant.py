@@ -133,7 +133,9 @@ class CurvedPlant(Plant):
                 tuple(runs.commands[i] for i in which),
                 tuple(runs.views[i] for i in which),
             )
-            motion[frames] = super()._run(parameters, pairs, alone, first[which], None if near is None else near[frames])
+            motion[frames] = super()._run(
+                parameters, pairs, alone, first[which], None if near is None else near[frames]
+            )
         return motion
 
     def _table(self, parameters: Floats, pairs: Sequence[tuple[Effect, Floats]], runs: Runs) -> Floats:

@@ -10,7 +10,7 @@ from anglecam.loop.free_form.visited import Visited
 from anglecam.models.curved_plant import Curve
 from anglecam.models.torque_curve import ORDER, Axis
 
-ONE, TWO = 30, 8
+ONE, TWO = 30, 9
 """Splines of a curve over one quantity, and along each axis of a curve over two. The penalty, not their number,
 determines how smooth the curve is; fewer would leave a bias that the band does not contain."""
 

@@ -101,8 +101,8 @@ def _fitted_changes(base: Fit, records: Sequence[Record], candidates: Sequence[C
     found = []
     for one in candidates:
         values = one.fit.parameters[len(one.fit.parameters) - len(one.effect.parameters) :]
-        at_these = replace(one.effect, starts=lambda seen, values=values, effect=one.effect: [tuple(effect.complete(values))])
+        at_these = replace(
+            one.effect, starts=lambda seen, values=values, effect=one.effect: [tuple(effect.complete(values))]
+        )
         found += [c for c in changes(base, records, [at_these]) if np.allclose(c.start, values)]
     return found
-
-

@@ -1,6 +1,6 @@
 """Searches the quantities for a smooth torque that explains what a model leaves, and fits it with the plant.
 
-    every quantity and pair → linear regression, cross-validated → the best ones by output error, cross-validated → one
+every quantity and pair → linear regression, cross-validated → the best ones by output error, cross-validated → one
 """
 
 from __future__ import annotations
