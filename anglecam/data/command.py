@@ -67,7 +67,7 @@ class Command:
 
     @cached_property
     def cycle(self) -> tuple[float, float] | None:
-        """Period, s, and the instant at which the first one begins, s; ``None`` unless two or more follow each other."""
+        """Period and instant at which the first one begins, s; ``None`` unless two or more follow each other."""
         begin = self.first_change()
         if begin is None:
             return None

@@ -288,7 +288,7 @@ class VerdictPolicy:
 
 @dataclass(frozen=True)
 class FreeFormPolicy:
-    """A torque of free form, where structure remains; whether it predicts better is cross_validation.false_gain_rate."""
+    """A torque of free form; cross_validation.false_gain_rate decides whether it predicts better."""
 
     least_similarity: float = _threshold(
         0.7,

@@ -44,7 +44,7 @@ def _with_curve(effects: CompiledEffects) -> CompiledEffects:
 
     @njit
     def rows(table):  # type: ignore[no-untyped-def]  # compiled
-        return bare_rows(table[:last]) + (table[last:].reshape(-1),)  # noqa: RUF005  # numba joins tuples only so
+        return bare_rows(table[:last]) + (table[last:].reshape(-1),)  # numba joins tuples only so
 
     @njit(forceinline=True)
     def rates(time, theta, omega, extra, v, abc, rows):  # type: ignore[no-untyped-def]  # compiled

@@ -20,7 +20,6 @@ from anglecam.models.curved_integrator import WITH_LEDGER, WITHOUT_EFFECTS, tabl
 from anglecam.models.plant import MAX_STEP, Plant
 from anglecam.models.torque_curve import NO_AXIS, Axis
 
-
 UNBOUNDED = 1e9
 """rad/s²; no curve comes near it."""
 NO_CYCLE = (0.0, 0.0)

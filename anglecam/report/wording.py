@@ -55,8 +55,8 @@ def free_form_sentence(found: FreeForm) -> str:
     effects = ", ".join(plain(name) for name in found.resembles)
     causes = f"Effects with a similar shape: {effects}." if effects else "No effect of the ledger has such a shape."
     return (
-        f"The model lacks a torque that depends on the {over}; with a smooth function of it, the error on data that the "
-        f"model was not fitted to falls from {before} to {after}. {causes}"
+        f"The model lacks a torque that depends on the {over}; with a smooth function of it, the error on data that "
+        f"the model was not fitted to falls from {before} to {after}. {causes}"
     )
 
 

@@ -1,2 +1,1 @@
-"""The missing torque in free form: a smooth function of one or two quantities, where no effect of the ledger explains
-the residual."""
+"""The missing torque in free form, where no effect explains the residual: a smooth function of a quantity or two."""

@@ -1,4 +1,4 @@
-"""Penalised least squares of the residual on the responses to a curve: how smooth the curve is, and how well it predicts.
+"""Penalised least squares of the residual on the responses to a curve: how smooth it is, and how well it predicts.
 
     minimise |y − A·β − R·α|² + λ·αᵀPα
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from anglecam.data.record import Record
-from anglecam.data.typing import Floats
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.loop.candidates import Candidate

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -98,8 +98,8 @@ def screen(visited: Visited, policy: Policy = DEFAULT) -> list[Screened]:
 def _prediction(records: Sequence[Record], error: Floats, folds: Floats) -> Prediction:
     """Return the errors of the frames that were left out."""
     edges = np.cumsum([0, *(len(r.time) for r in records)])
-    kept = [folds[i:j] != NEVER_LEFT_OUT for i, j in zip(edges, edges[1:], strict=False)]
-    parts = [error[i:j][k] for i, j, k in zip(edges, edges[1:], kept, strict=False)]
+    kept = [folds[i:j] != NEVER_LEFT_OUT for i, j in pairwise(edges)]
+    parts = [error[i:j][k] for (i, j), k in zip(pairwise(edges), kept, strict=True)]
     tested = tuple(record.only(k) for record, k in zip(records, kept, strict=True))
     return Prediction(tested, tuple(parts), float(sum(e @ e for e in parts)))
 
