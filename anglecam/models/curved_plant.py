@@ -80,7 +80,7 @@ class CurvedPlant(Plant):
     curve: Curve = field(kw_only=True)
 
     @property
-    def names(self) -> tuple[str, ...]:  # type: ignore[override]
+    def names(self) -> tuple[str, ...]:
         """Parameters in their order."""
         return super().names + tuple(f"curve_{i + 1}_deg_per_s2" for i in range(self.curve.count))
 

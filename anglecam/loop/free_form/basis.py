@@ -69,5 +69,5 @@ def _each(matrices: list[Floats]) -> Floats:
     """Return the Kronecker product of one matrix for each axis."""
     first, *others = matrices
     for other in others:
-        first = np.kron(first, other)
+        first = np.asarray(np.kron(first, other), dtype=np.float64)
     return first

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from anglecam.data.record import Record
 from anglecam.effects import Effect
+from anglecam.effects.effect import Values
+from anglecam.effects.seen import Seen
 from anglecam.identification.fit import Fit
 from anglecam.loop.candidates import Candidate
 from anglecam.loop.cross_validation import Gain, Prediction
@@ -100,8 +102,11 @@ def _fitted_changes(base: Fit, records: Sequence[Record], candidates: Sequence[C
     found = []
     for one in candidates:
         values = one.fit.parameters[len(one.fit.parameters) - len(one.effect.parameters) :]
-        at_these = replace(
-            one.effect, starts=lambda seen, values=values, effect=one.effect: [tuple(effect.complete(values))]
-        )
+        at_these = replace(one.effect, starts=_only(tuple(one.effect.complete(values).tolist())))
         found += [c for c in changes(base, records, [at_these]) if np.allclose(c.start, values)]
     return found
+
+
+def _only(values: Values) -> Callable[[Seen], Sequence[Values]]:
+    """Return a function that starts an effect at given parameters."""
+    return lambda seen: [values]
