@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from anglecam.data.typing import Floats
 
+SAMPLE = 0.01
+"""s, between the instants at which a command is compared with itself to find its period."""
+REPEATED = 0.02
+"""Mean squared difference after a period, as a share of that between unrelated instants, up to which a command
+repeats itself."""
 PARTS = 8
 """Steps that stand for a straight line where a model takes held commands only."""
 
@@ -58,6 +64,26 @@ class Command:
         if len(changes) == 0:
             return None
         return float(self.time[changes[0] + (1 if self.slope is None else 0)])
+
+    @cached_property
+    def cycle(self) -> tuple[float, float] | None:
+        """Period and instant at which the first one begins, s; ``None`` unless two or more follow each other."""
+        begin = self.first_change()
+        if begin is None:
+            return None
+        level = self.at(np.arange(begin, self.time[-1], SAMPLE))
+        lags = np.arange(1, len(level) // 2 + 1)
+        energy = 2.0 * float(np.var(level))
+        if len(lags) == 0 or energy == 0.0:
+            return None
+        off = np.array([np.mean((level[lag:] - level[:-lag]) ** 2) for lag in lags]) / energy
+        unlike = np.maximum.accumulate(off) > 0.5  # a slow command resembles itself a moment later
+        found = np.flatnonzero(unlike & (off < REPEATED))
+        if len(found) == 0:
+            return None
+        apart = np.flatnonzero(np.diff(found) > 1)
+        first = found[: apart[0] + 1] if len(apart) else found
+        return float(lags[first[np.argmin(off[first])]]) * SAMPLE, begin
 
     def at(self, time: Floats) -> Floats:
         """Return the command, rad, at ``time`` (s); before the first row the first value holds."""

@@ -21,6 +21,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from anglecam.data.typing import Floats
 from anglecam.identification.joined import Joined, Predicted
 from anglecam.identification.slopes import Slopes
+from anglecam.models.curved_plant import CurvedPlant
 from anglecam.models.model import Model
 from anglecam.models.plant import Plant
 
@@ -145,7 +146,9 @@ def _fit_by_trust_region(model: Model, joined: Joined, begin: Point, most: int) 
     """Return the best point that whole steps reach, the derivatives there, and the number of steps tried."""
     here = latest = begin
     slopes = joined.slopes(model, here.parameters, here.own, here.predicted)
-    costs, held = [here.cost], HELD / model.scales
+    held = HELD / model.scales
+    bent = model.penalty if isinstance(model, CurvedPlant) else np.empty((0, len(held)))
+    costs = [here.cost + float(np.sum((bent @ here.parameters) ** 2))]
     patience = 1 if isinstance(model, Plant) and not model.kinked else PATIENCE
     margin = [INSIDE * np.maximum(1.0, np.abs(bound)) for bound in (model.lower, model.upper)]
     inside = np.clip(here.parameters, model.lower + margin[0], model.upper - margin[1])
@@ -158,7 +161,7 @@ def _fit_by_trust_region(model: Model, joined: Joined, begin: Point, most: int) 
         nonlocal latest
         if not np.array_equal(parameters, latest.parameters):
             latest = _follow(model, joined, here, slopes, parameters)
-        return np.append(latest.white, held * (parameters - begin.parameters))
+        return np.concatenate([latest.white, held * (parameters - begin.parameters), bent @ parameters])
 
     def jacobian(parameters: Floats) -> Floats:
         """Return the derivatives at the point that was accepted, from which the next steps start."""
@@ -167,7 +170,7 @@ def _fit_by_trust_region(model: Model, joined: Joined, begin: Point, most: int) 
             errors(parameters)
             here = latest
             slopes = joined.slopes(model, here.parameters, here.own, here.predicted)
-        return np.concatenate([-slopes.projected, np.diag(held)])
+        return np.concatenate([-slopes.projected, np.diag(held), bent])
 
     def settled(intermediate_result: OptimizeResult) -> None:
         costs.append(2.0 * intermediate_result.cost)

@@ -23,6 +23,7 @@ from anglecam.identification.noise import autoregression, noise_floor
 from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.loop.candidates import Candidate, find_rivals, fit_to_more, log_likelihood_gain, promising
 from anglecam.loop.cross_validation import compare, predict_held_out, robust_sigma, split_records
+from anglecam.loop.free_form.result import find_free_form
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_left, effects_of, plant_of, refit_with_last, refit_with_phi, refit_without
 from anglecam.loop.screen import changes, directions, forecasts
@@ -95,7 +96,7 @@ def close_records(
             candidates = rank_candidates(task, first)
         last = add_effects(task, first, candidates)
         progress("verdict")
-        return _conclude(task, first, last, candidates)
+        return _with_free_form(task, _conclude(task, first, last, candidates))
 
 
 def _begin(
@@ -149,6 +150,25 @@ def _conclude(task: Task, first: Assessment, last: Assessment, candidates: Seque
         task.predicted,
         task.policy,
     )
+
+
+def _with_free_form(task: Task, verdict: Verdict) -> Verdict:
+    """Look for a torque of free form where the final model leaves structure."""
+    if verdict.verdict in ("attributed", "nothing_missing"):
+        return verdict
+    task.progress("free form")
+    left = effects_left(task.ledger, verdict.after)
+    found = find_free_form(
+        verdict.after,
+        verdict.after_held_out,
+        task.fitted,
+        task.predicted,
+        left,
+        [one for one in verdict.candidates if one.effect.id in [effect.id for effect in left]],
+        task.rng,
+        task.policy,
+    )
+    return replace(verdict, free_form=found)
 
 
 def _structure_remains(task: Task, first: Assessment, last: Assessment, before: Fit) -> bool:

@@ -137,7 +137,7 @@ def predict_held_out(
 def _cross_validate(fit: Fit, records: Sequence[Record], policy: Policy) -> Prediction:
     """Predict every recording except its first frames, each fold by a fit to the other folds."""
     errors = [np.zeros(len(r.time)) for r in records]
-    fold_of, joined = [_folds(r, policy) for r in records], join(records, fit.phi)
+    fold_of, joined = [fold_numbers(r, policy) for r in records], join(records, fit.phi)
     for fold in range(policy.cross_validation.folds):
         train = [record.only(folds != fold) for record, folds in zip(records, fold_of, strict=True)]
         trained = fit_output_error(fit.model, train, [fit.parameters], nuisance=fit.nuisance, phi=fit.phi)
@@ -151,7 +151,7 @@ def _cross_validate(fit: Fit, records: Sequence[Record], policy: Policy) -> Pred
         return Prediction(tested, residuals, float(sum(e @ e for e in white)))
 
 
-def _folds(record: Record, policy: Policy) -> NDArray[np.int_]:
+def fold_numbers(record: Record, policy: Policy) -> NDArray[np.int_]:
     """Return the fold in which each frame is left out, (n,); `NEVER_LEFT_OUT` for the first frames."""
     count = policy.cross_validation.folds
     first = record.time[min(FIRST_FRAMES, len(record.time) - 1)]

@@ -309,6 +309,19 @@ class VerdictPolicy:
 
 
 @dataclass(frozen=True)
+class FreeFormPolicy:
+    """A torque of free form; cross_validation.false_gain_rate decides whether it predicts better."""
+
+    least_similarity: float = _threshold(
+        0.7,
+        "correlation",
+        "an effect resembles the torque if the changes that both make to the angles correlate at least so much",
+        "listing an effect that is not the cause, or leaving out one that is",
+        "not calibrated; the effect then shares half of the torque's change",
+    )
+
+
+@dataclass(frozen=True)
 class NextExperimentPolicy:
     """Which recording is proposed to distinguish the effects of an alias set."""
 
@@ -350,6 +363,7 @@ class Policy:
     cross_validation: CrossValidationPolicy = CrossValidationPolicy()
     stepwise: StepwisePolicy = StepwisePolicy()
     verdict: VerdictPolicy = VerdictPolicy()
+    free_form: FreeFormPolicy = FreeFormPolicy()
     next_experiment: NextExperimentPolicy = NextExperimentPolicy()
 
     def as_list(self) -> list[dict[str, Any]]:

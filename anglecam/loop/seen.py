@@ -42,7 +42,7 @@ def seen_of(fit: Fit, records: Sequence[Record]) -> Seen:
         Motion and residual.
     """
     plant = plant_of(fit)
-    times = [_instants(record.time, STEP * plant.smooth_step) for record in records]
+    times = [instants(record.time, STEP * plant.smooth_step) for record in records]
     motion = [
         plant.run(fit.parameters, time, record.command, nuisance[: plant.states])
         for time, record, nuisance in zip(times, records, fit.nuisance, strict=True)
@@ -74,7 +74,7 @@ def seen_of(fit: Fit, records: Sequence[Record]) -> Seen:
     )
 
 
-def _instants(time: Floats, step: float) -> Floats:
+def instants(time: Floats, step: float) -> Floats:
     """Return evenly spaced instants from the first frame to the last, at most ``step`` apart, s."""
     return np.linspace(time[0], time[-1], math.ceil((time[-1] - time[0]) / step) + 1)
 
@@ -130,7 +130,7 @@ def _changes(
     joined = join(records, fit.phi)
     for begin in range(0, torques[0].shape[1], AT_ONCE):
         blocks = [
-            _response(t, torque[:, begin : begin + AT_ONCE], record.time, *fit.parameters[:2])
+            torque_response(t, torque[:, begin : begin + AT_ONCE], record.time, *fit.parameters[:2])
             for t, torque, record in zip(times, torques, records, strict=True)
         ]
         change = joined.whiten(np.concatenate(blocks))
@@ -158,7 +158,7 @@ def _explained(
     return np.nan_to_num(np.concatenate(multiples)), np.nan_to_num(np.concatenate(shares))
 
 
-def _response(time: Floats, torque: Floats, frames: Floats, a: float, b: float) -> Floats:
+def torque_response(time: Floats, torque: Floats, frames: Floats, a: float, b: float) -> Floats:
     """Return the change of the angle at the frames, (n, k), by (m, k) torques at evenly spaced instants."""
     h = float(time[1] - time[0])
     # the state and a torque that is linear over a step, under the matrix exponential

@@ -10,6 +10,7 @@ from anglecam.identification.fit import Fit
 from anglecam.identification.noise import Noise
 from anglecam.loop.candidates import Candidate
 from anglecam.loop.cross_validation import Gain, Prediction
+from anglecam.loop.free_form.result import FreeForm
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.residual_test import ResidualTest
 
@@ -59,3 +60,6 @@ class Verdict:
     """Recordings that were predicted only; may be empty."""
     policy: Policy = DEFAULT
     """The thresholds that led to the verdict."""
+    free_form: FreeForm | None = None
+    """A torque that the final model lacks; ``None`` if no structure remains or no such torque improves the
+    prediction."""

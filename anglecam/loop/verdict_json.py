@@ -12,10 +12,21 @@ from anglecam.identification.output_error import predict_output_error
 from anglecam.identification.systematic import full_sigma
 from anglecam.loop.candidates import Candidate
 from anglecam.loop.cross_validation import predict_held_out
+from anglecam.loop.free_form.result import FreeForm
 from anglecam.loop.next_experiment.design import Experiment, separating_experiment, write_command
 from anglecam.loop.verdict import Verdict
 
+DEGREE = float(np.degrees(1.0))
 MODEL_NAMES = ("a_per_s", "b_per_s2", "c_per_s2")
+KEYS = {
+    "angle": "angle_deg",
+    "velocity": "velocity_deg_per_s",
+    "command": "command_deg",
+    "phase": "phase",
+    "time": "time_s",
+}
+"""Keys of the quantities that a torque of free form can depend on."""
+FACTORS = {"angle": DEGREE, "velocity": DEGREE, "command": DEGREE, "phase": 1.0, "time": 1.0}
 NEXT_COMMAND = "next.command.csv"
 
 
@@ -102,7 +113,23 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
             }
             for c in verdict.candidates
         ],
+        "free_form": None if verdict.free_form is None else free_form_as_dict(verdict.free_form),
         "policy": verdict.policy.as_list(),
+    }
+
+
+def free_form_as_dict(found: FreeForm) -> dict[str, Any]:
+    """Return a torque of free form as ``loop.json`` holds it."""
+    band = found.band
+    columns = [x * FACTORS[name] for name, x in zip(band.over, band.points, strict=True)]
+    keys = [*(KEYS[name] for name in band.over), "acceleration_deg_per_s2", "sigma", "visited"]
+    columns += [np.degrees(band.acceleration), np.degrees(band.sigma), band.visited]
+    return {
+        "over": list(band.over),
+        "rmse_deg": {"before": np.degrees(found.before.rmse), "after": np.degrees(found.after.rmse)},
+        "gain": {"ratio": found.gain.ratio, "interval_95": list(found.gain.interval_95)},
+        "curve": [dict(zip(keys, row, strict=True)) for row in np.column_stack(columns).tolist()],
+        "resembles": [{"id": name, "similarity": value} for name, value in found.resembles.items()],
     }
 
 

@@ -31,7 +31,7 @@ FADED = 12.0
 """Time constants after which 6e-6 of a lag's transient is left."""
 
 
-def _compile_run(effects: CompiledEffects):  # type: ignore[no-untyped-def]  # compiled
+def compile_run(effects: CompiledEffects):  # type: ignore[no-untyped-def]  # compiled
     """Return the compiled integrator of a ledger's effects."""
     rows_of, initial, advance = effects.rows, effects.initial, compile_advance(effects)
 
@@ -110,7 +110,7 @@ def integrator_of(ledger: Sequence[Effect]) -> Integrator:
         For example `anglecam.effects.LEDGER` and an effect that is being tried out.
     """
     compiled = compile_effects(ledger)
-    return Integrator(compiled, _compile_run(compiled))
+    return Integrator(compiled, compile_run(compiled))
 
 
 def hash_of_sources(*folders: Path) -> str:
@@ -125,7 +125,7 @@ SOURCES = hash_of_sources(Path(__file__).parent, Path(effects.__path__[0]), Path
 Numba's cache on disk is keyed by one file and by the variables that a function encloses. A function that is compiled
 once for all processes therefore encloses this hash, so that a change of any of these files compiles it anew."""
 COMPILED = compile_effects(LEDGER)
-_run = _compile_run(COMPILED)
+_run = compile_run(COMPILED)
 
 
 def _compile_once(code):  # type: ignore[no-untyped-def]  # compiled

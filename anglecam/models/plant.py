@@ -185,10 +185,14 @@ class Plant:
             np.stack([edges[number], edges[number + 1]], axis=1),
             lag,
             abc,
-            self.integrator.effects.table(pairs),
+            self._table(parameters, pairs, runs),
             self._max_step,
             _NOTHING_NEAR if near is None else near,
         )
+
+    def _table(self, parameters: Floats, pairs: Sequence[tuple[Effect, Floats]], runs: Runs) -> Floats:
+        """Return the parameter table for the integrator of runs."""
+        return self.integrator.effects.table(pairs)
 
     @property
     def smooth_step(self) -> float:

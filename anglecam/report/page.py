@@ -24,8 +24,9 @@ from anglecam.loop.stepwise import applicable
 from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import NEXT_COMMAND, size_of
 from anglecam.report import loop_figures as figures
+from anglecam.report.free_form_figure import free_form_figure
 from anglecam.report.path_figure import path_figure
-from anglecam.report.wording import plain, sentence, summary_of, with_uncertainty
+from anglecam.report.wording import free_form_sentence, plain, sentence, summary_of, with_uncertainty
 
 COLOURS = {
     "attributed": "#1f6f8b",
@@ -107,6 +108,7 @@ def write_report(
         colour=COLOURS[verdict.verdict],
         verdict=verdict,
         sentence=sentence(verdict),
+        free_form="" if verdict.free_form is None else free_form_sentence(verdict.free_form),
         errors=result["rmse_deg"],
         gain=verdict.gain,
         policy=verdict.policy,
@@ -172,6 +174,8 @@ def _figures(verdict: Verdict, experiment: Experiment | None, series: Sequence[A
         drawn["residual_torque"] = figures.residual_torque_figure(
             estimate_residual_torque(verdict.after, verdict.fitted, verdict.noise)
         )
+    if verdict.free_form is not None:
+        drawn["free_form"] = free_form_figure(verdict.free_form)
     if experiment is not None and experiment.command is not None and experiment.separated:
         drawn["experiment"] = figures.experiment_figure(experiment, verdict)
     return drawn

@@ -6,6 +6,7 @@ import numpy as np
 
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
+from anglecam.loop.free_form.result import FreeForm
 from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import fitted_parameters
 
@@ -36,6 +37,28 @@ def sentence(verdict: Verdict) -> str:
     return (
         f"{causes}; with {this} in the model, its error on data that it was not fitted to falls from {before} to "
         f"{after}{rest if verdict.verdict == 'partly_explained' else ''}."
+    )
+
+
+QUANTITIES = {
+    "angle": "angle",
+    "velocity": "velocity",
+    "command": "command",
+    "phase": "phase within the command's period",
+    "time": "time",
+}
+"""What a torque of free form can depend on, in words."""
+
+
+def free_form_sentence(found: FreeForm) -> str:
+    """Return what a torque of free form means, as one sentence and the causes with such a shape."""
+    over = " and on the ".join(QUANTITIES[name] for name in found.band.over)
+    before, after = (f"{np.degrees(p.rmse):.3g}°" for p in (found.before, found.after))
+    effects = ", ".join(plain(name) for name in found.resembles)
+    causes = f"Effects with a similar shape: {effects}." if effects else "No effect of the ledger has such a shape."
+    return (
+        f"The model lacks a torque that depends on the {over}; with a smooth function of it, the error on data that "
+        f"the model was not fitted to falls from {before} to {after}. {causes}"
     )
 
 

@@ -1,0 +1,51 @@
+"""A torque of free form against the true torque of causes that the ledger lacks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anglecam.identification.output_error import fit_output_error, predict_output_error
+from anglecam.loop.cross_validation import Prediction
+from anglecam.loop.free_form.result import find_free_form
+from anglecam.loop.verdict_json import free_form_as_dict
+from anglecam.models.plant import Plant
+from anglecam.report.free_form_figure import free_form_figure
+from anglecam.report.wording import free_form_sentence
+from support.motion import Plant as TruePlant
+from support.outside import CAUSES, A, B, C, outside_session
+from support.series import session
+
+
+def _found(records):
+    fitted, held = records[:-1], records[-1:]
+    base = fit_output_error(Plant(), fitted, [np.array([A, B, C])])
+    predicted = predict_output_error(base, held)
+    before = Prediction(tuple(held), predicted.residuals, predicted.cost)
+    return find_free_form(base, before, fitted, held, (), (), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("name", ["magnet", "chatter", "amplifier_step", "cam", "touch", "van_der_pol"])
+def test_a_cause_outside_the_ledger_is_found_over_what_it_depends_on(name):
+    records, exact = (outside_session(name, 0, sigma_deg=s)[-1] for s in (0.05, 0.0))
+    found = _found(outside_session(name, 0))
+    assert found.band.over == CAUSES[name].over
+    noise = records.angle - exact.angle
+    before, after = (np.sqrt(np.mean((p.residuals[0] - noise) ** 2)) for p in (found.before, found.after))
+    assert after < 0.3 * before
+    written = free_form_as_dict(found)
+    assert written["over"] == list(CAUSES[name].over)
+    assert written["rmse_deg"]["after"] < written["rmse_deg"]["before"]
+    assert all(row["sigma"] > 0.0 for row in written["curve"])
+    assert free_form_figure(found).startswith("<svg")
+    assert "lacks a torque that depends on the " in free_form_sentence(found)
+
+
+def test_nothing_is_found_where_nothing_is_missing():
+    assert _found(session(TruePlant(), 3)) is None
+
+
+def test_a_command_that_repeats_itself_has_its_period():
+    records = outside_session("cam", 0)
+    assert [r.command.cycle[0] for r in records] == pytest.approx([2.0] * 5, abs=0.02)
+    assert all(r.command.cycle is None for r in session(TruePlant(), 3))
