@@ -19,7 +19,7 @@ from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.multiple_shooting import drifts, loses_step, windows
-from anglecam.identification.noise import autoregression, noise_floor
+from anglecam.identification.noise import RESIDUAL, autoregression, noise_floor
 from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.loop.candidates import Candidate, find_rivals, fit_to_more, log_likelihood_gain, promising
 from anglecam.loop.cross_validation import Prediction, compare, predict_held_out, robust_sigma, split_records
@@ -115,7 +115,7 @@ def _conclude(task: Task, first: Assessment, last: Assessment, candidates: Seque
     # both models are compared with the AR(1) coefficient of the better model's residual
     before = refit_with_phi(first.fit, task.fitted, last.fit.phi)
     before_held_out, _ = predict_held_out(before, task.fitted, task.predicted, task.policy)
-    noise = task.floor or replace(autoregression(last.fit.residuals, "residual"), sigma=last.fit.rmse)
+    noise = task.noise_within(last.fit) or replace(autoregression(last.fit.residuals, RESIDUAL), sigma=last.fit.rmse)
     remains = _structure_remains(task, first, last, before)
     # if structure remains no effect is named, so the final model is the base model
     after, after_held_out = (before, before_held_out) if remains else (last.fit, last.held_out)
@@ -148,14 +148,15 @@ def _structure_remains(task: Task, first: Assessment, last: Assessment, before: 
     if last.residual_test.p_value >= level or last.fit.rmse**2 <= task.camera**2 + least**2:
         return False
     driven = any(r.command is not None for r in task.fitted)
+    noise = task.noise_within(last.fit)
     share = (
         policy.verdict.unexplained_share
-        if driven and task.floor is not None
+        if driven and noise is not None
         else policy.verdict.undriven_unexplained_share
     )
     # two measures of what remains: the error beyond the noise floor, and the finer one, what further causes would
     # explain of the log-likelihood; if the noise is unknown, the whole error counts
-    floor = task.floor.sigma if task.floor else 0.0
+    floor = noise.sigma if noise else 0.0
     return (
         not named
         or _error_beyond(last.cross_validated, floor) > share * _error_beyond(first.cross_validated, floor)

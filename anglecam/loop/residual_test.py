@@ -159,11 +159,27 @@ def _noise_draws(fit: Fit, records: Sequence[Record], rng: np.random.Generator) 
     before = math.sqrt(max(fit.rmse**2 - grid.sigma**2, 0.0)) if grid else math.inf
     if grid is None or before >= grid.step:
         return white, False
-    paths = [r.angle - e for r, e in zip(records, fit.residuals, strict=True)]
-    phase = grid.step * rng.uniform(-0.5, 0.5, DRAWS)
-    noisy = [path[:, None] + phase + e for path, e in zip(paths, joined.runs.split(before * white), strict=True)]
-    errors = [to - phase - path[:, None] for to, path in zip(grid.rounded(noisy), paths, strict=True)]
-    return joined.whiten(np.concatenate(errors)), True
+    import os
+    variant = os.environ.get("VARIANT", "A1")
+    path = joined.angle - np.concatenate(fit.residuals)
+    def quantised(paths):
+        return np.concatenate(grid.rounded(list(joined.runs.split(paths))))
+    e1 = rng.standard_normal((len(fit.white), DRAWS))
+    if variant[0] == "A":
+        kappa = float(variant[1:])
+        moved = kappa * fit.rmse * (e1 - fit.slopes.without_followed(e1))
+    elif variant[0] == "U":
+        moved = np.broadcast_to(grid.step * rng.uniform(-0.5, 0.5, DRAWS), e1.shape)
+    elif variant[0] == "B":
+        ph = float(variant[1:]) * grid.step * rng.uniform(-0.5, 0.5, DRAWS)
+        e = quantised(path[:, None] + ph + before * e1) - path[:, None] - ph
+        moved = e - fit.slopes.without_followed(e)
+    elif variant[0] == "C":
+        m0 = float(variant[1:]) * fit.rmse * (e1 - fit.slopes.without_followed(e1))
+        e = quantised(path[:, None] + m0 + before * e1) - path[:, None] - m0
+        moved = -(e - fit.slopes.without_followed(e))
+    exact = path[:, None] + moved
+    return joined.whiten(quantised(exact + before * white) - exact), True
 
 
 def _exponential_scale(p: Floats) -> tuple[float, float]:
