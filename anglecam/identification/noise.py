@@ -123,7 +123,7 @@ def _moves(angle: Floats) -> bool:
     e = angle - angle.mean()
     if not np.any(e):
         return False
-    if e[1:] @ e[:-1] > MOST_REST_PHI * (e @ e):
+    if autoregression([angle], "rest").phi > MOST_REST_PHI:
         return True
     few = np.column_stack([np.ones(len(e) - 2), e[1:-1]])
     many = np.column_stack([few, e[:-2], np.linspace(-1.0, 1.0, len(e) - 2)])

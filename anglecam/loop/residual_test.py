@@ -9,7 +9,8 @@ projects it out. So neither the number of tests nor their correlation has to be 
 Methods and their Application, 1997, sec. 4.2 and 4.4.
 
 The errors of a quantised angle follow the motion and are not white. The draws are then the errors of the predicted
-motion itself, rounded to the same grid at a random phase. They show how far each test's p-value is from the uniform
+motion itself, rounded to the same grid, each time with other
+parameters among those that the recordings leave possible. They show how far each test's p-value is from the uniform
 distribution that it has in white noise, and it is corrected by that.
 
 An effect with an unknown frequency is compared with the residual at many of them, and some frequency always fits noise
@@ -41,6 +42,8 @@ from anglecam.loop.torque_basis import torque_responses
 
 DRAWS = 999
 """Bootstrap draws; with the data's statistic among them p-values are multiples of 1/1000."""
+PHASES = 99
+"""Phases of the grid at which the size of the errors that a fit follows is estimated."""
 LEAST_P = 1e-300
 """Smaller p-values count as this one, so that they have a logarithm."""
 LAGS = 15
@@ -159,27 +162,22 @@ def _noise_draws(fit: Fit, records: Sequence[Record], rng: np.random.Generator) 
     before = math.sqrt(max(fit.rmse**2 - grid.sigma**2, 0.0)) if grid else math.inf
     if grid is None or before >= grid.step:
         return white, False
-    import os
-    variant = os.environ.get("VARIANT", "A1")
     path = joined.angle - np.concatenate(fit.residuals)
-    def quantised(paths):
+
+    def rounded(paths: Floats) -> Floats:
         return np.concatenate(grid.rounded(list(joined.runs.split(paths))))
-    e1 = rng.standard_normal((len(fit.white), DRAWS))
-    if variant[0] == "A":
-        kappa = float(variant[1:])
-        moved = kappa * fit.rmse * (e1 - fit.slopes.without_followed(e1))
-    elif variant[0] == "U":
-        moved = np.broadcast_to(grid.step * rng.uniform(-0.5, 0.5, DRAWS), e1.shape)
-    elif variant[0] == "B":
-        ph = float(variant[1:]) * grid.step * rng.uniform(-0.5, 0.5, DRAWS)
-        e = quantised(path[:, None] + ph + before * e1) - path[:, None] - ph
-        moved = e - fit.slopes.without_followed(e)
-    elif variant[0] == "C":
-        m0 = float(variant[1:]) * fit.rmse * (e1 - fit.slopes.without_followed(e1))
-        e = quantised(path[:, None] + m0 + before * e1) - path[:, None] - m0
-        moved = -(e - fit.slopes.without_followed(e))
-    exact = path[:, None] + moved
-    return joined.whiten(quantised(exact + before * white) - exact), True
+
+    def followed(values: Floats) -> Floats:
+        return values - fit.slopes.without_followed(values)
+
+    # the fit's parameters follow the rounding errors, which are less independent than white noise: the more so, the
+    # longer the motion rests. Errors at another phase in each recording show by how much
+    phase = grid.step * rng.uniform(-0.5, 0.5, (len(records), PHASES))[joined.runs.owner] + path[:, None]
+    size = np.linalg.norm(followed(joined.whiten(rounded(phase + before * white[:, :PHASES]) - phase)))
+    other = rng.standard_normal(white.shape)
+    scale = float(size / np.linalg.norm(followed(other[:, :PHASES])))
+    exact = path[:, None] + scale * followed(other)
+    return joined.whiten(rounded(exact + before * white) - exact), True
 
 
 def _exponential_scale(p: Floats) -> tuple[float, float]:
