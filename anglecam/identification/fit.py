@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
-from anglecam.identification.noise import autoregression
+from anglecam.identification.noise import RESIDUAL, autoregression
 from anglecam.identification.slopes import Slopes
 from anglecam.models.model import Model
 
@@ -61,7 +61,7 @@ class Fit:
     @property
     def residual_phi(self) -> float:
         """AR(1) coefficient, frame to frame, of the residuals."""
-        return autoregression(self.residuals, "residual").phi
+        return autoregression(self.residuals, RESIDUAL).phi
 
     @cached_property
     def sigma(self) -> Floats:

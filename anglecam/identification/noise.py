@@ -1,27 +1,44 @@
-"""Size and AR(1) coefficient of the angle's noise, estimated from data that no motion changes.
+"""Size and AR(1) coefficient of the angle's noise, estimated from data that no model explains.
 
 In a film that is the mark's distance from the pivot. It includes errors that a picture at rest hides: the pixel grid
-and the codec under a moving edge. In a series without a film it is the rest before the first command change, during
-which the mechanism may still be disturbed.
+and the codec under a moving edge. In a series without a film it is, in this order: the stated uncertainty, the step of
+a quantised angle, the rest before the first command change, and recordings of one command that were repeated. A rest
+counts only if the angle shows neither a trend nor a swing in it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
+from scipy import special
 
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
+from anglecam.identification.quantisation import quantisation
 
 DISTANCE = "distance from the pivot"
 """Source of noise estimated from the mark's distance from the pivot."""
 MEASURED = "stated by the measurement"
 """Source of noise whose size the measurement states and whose correlation the distance from the pivot shows."""
-MIN_REST_FRAMES = 6
-"""Fewest frames of a rest; a shorter rest does not determine the AR(1) coefficient."""
+QUANTISED = "step of the angles"
+"""Source of noise that is the rounding of the angles to a grid."""
+RESIDUAL = "residual of the model, which bounds it"
+"""Source where nothing but a model shows the noise: what the model leaves is noise, structure, or both."""
+MIN_REST_FRAMES = 8
+"""Fewest frames of a rest; a shorter one shows neither a trend nor a swing."""
+MOVING_RATE = 0.01
+"""Probability with which noise alone makes a rest count as motion."""
+MOST_REST_PHI = 0.9
+"""AR(1) coefficient above which the noise of a rest cannot be distinguished from slow motion."""
+REPEATED_START = 3.0
+"""Largest difference of two recordings in their first frames, in standard deviations of their difference, for them to
+have started alike."""
+UNKNOWN = math.inf
+"""Standard error of an AR(1) coefficient that nothing determines."""
 
 
 @dataclass(frozen=True)
@@ -33,14 +50,19 @@ class Noise:
     phi: float
     """AR(1) coefficient, frame to frame."""
     phi_error: float
-    """Standard error of ``phi``."""
+    """Standard error of ``phi``; `UNKNOWN` if nothing determines it."""
     source: str
-    """`DISTANCE`, `MEASURED`, ``rest``, ``stated`` or ``residual``."""
+    """`DISTANCE`, `MEASURED`, ``stated``, `QUANTISED`, ``rest``, ``repeated recordings`` or `RESIDUAL`."""
 
     @property
     def filmed(self) -> bool:
         """Whether the noise is a camera's, whose errors may follow the motion."""
         return self.source in (DISTANCE, MEASURED)
+
+    @property
+    def known(self) -> bool:
+        """Whether the noise was estimated apart from the model that is judged by it."""
+        return self.source != RESIDUAL
 
 
 def noise_floor(records: Sequence[Record]) -> Noise | None:
@@ -49,51 +71,89 @@ def noise_floor(records: Sequence[Record]) -> Noise | None:
     Parameters
     ----------
     records : sequence of Record
-        Recordings by one camera.
+        Recordings by one instrument.
 
     Returns
     -------
     Noise or None
-        The smaller of the stated uncertainty and the noise from the mark's distance: angles that registration of the
-        whole body gives are better than that distance shows. ``None`` if nothing determines the noise.
+        Of a film, the smaller of the stated uncertainty and the noise from the mark's distance: angles that
+        registration of the whole body gives are better than that distance shows. Otherwise the stated uncertainty, the
+        rounding error of a quantised angle (or the scatter of the rest, if that is larger), the rest, or the scatter
+        between repeated recordings, whichever is first available. ``None`` if nothing determines the noise.
     """
-    estimated, stated = motion_free_noise(records), stated_noise(records)
-    if estimated is None or stated is None:
-        return estimated or stated
-    if estimated.filmed and stated.sigma < estimated.sigma:
-        return replace(estimated, sigma=stated.sigma, source=MEASURED)
-    return estimated
-
-
-def motion_free_noise(records: Sequence[Record]) -> Noise | None:
-    """Estimate the noise from data that no motion changes.
-
-    Parameters
-    ----------
-    records : sequence of Record
-        Recordings by one camera.
-
-    Returns
-    -------
-    Noise or None
-        From the distance to the pivot if there are marks, otherwise from the rest; ``None`` if there is neither.
-    """
+    stated = stated_noise(records)
     scatters = [r.lever_scatter for r in records if r.lever_scatter is not None]
     if scatters:
-        return autoregression(scatters, DISTANCE)
-    rests = []
-    for record in records:
-        change = record.command.first_change() if record.command else None
-        if change is not None and (record.time < change).sum() >= MIN_REST_FRAMES:
-            rests.append(record.angle[record.time < change])
-    return autoregression(rests, "rest") if rests else None
+        estimated = autoregression(scatters, DISTANCE)
+        smaller = stated is not None and stated.sigma < estimated.sigma
+        return replace(estimated, sigma=stated.sigma, source=MEASURED) if stated and smaller else estimated
+    grid = quantisation(records)
+    scatter = _scatter(records)
+    if stated is not None:
+        # a quantised angle at rest shows no correlation of its noise
+        known = scatter is not None and grid is None
+        return replace(scatter, sigma=stated.sigma, source=stated.source) if scatter and known else stated
+    if grid is not None and (scatter is None or scatter.sigma <= grid.sigma):
+        return Noise(grid.sigma, 0.0, UNKNOWN, QUANTISED)
+    return scatter
+
+
+def _scatter(records: Sequence[Record]) -> Noise | None:
+    """Return the scatter at rest or, if there is no rest, between repeated recordings; ``None`` without either."""
+    rests = [rest for record in records if (rest := _rest(record)) is not None]
+    if rests:
+        return autoregression(rests, "rest")
+    differences = [difference / math.sqrt(2.0) for difference in _differences(records)]
+    return autoregression(differences, "repeated recordings") if differences else None
+
+
+def _rest(record: Record) -> Floats | None:
+    """Return the angles before the first command change, rad, if they are at rest."""
+    change = record.command.first_change() if record.command else None
+    angle = record.angle[:0] if change is None else record.angle[record.time < change]
+    return angle if len(angle) >= MIN_REST_FRAMES and not _moves(angle) else None
+
+
+def _moves(angle: Floats) -> bool:
+    """Return whether an angle shows more than AR(1) noise about a constant: a trend, a swing or a slow approach.
+
+    A trend and the angle before the last are no help in predicting AR(1) noise. They are of a swing, which a regression
+    on both and on the last angle predicts (F test).
+    """
+    e = angle - angle.mean()
+    if not np.any(e):
+        return False
+    if autoregression([angle], "rest").phi > MOST_REST_PHI:
+        return True
+    few = np.column_stack([np.ones(len(e) - 2), e[1:-1]])
+    many = np.column_stack([few, e[:-2], np.linspace(-1.0, 1.0, len(e) - 2)])
+    left = [float(np.sum((e[2:] - x @ np.linalg.lstsq(x, e[2:], rcond=None)[0]) ** 2)) for x in (few, many)]
+    free = len(many) - many.shape[1]
+    return float(special.fdtrc(2, free, (left[0] - left[1]) / 2.0 / max(left[1] / free, 1e-300))) < MOVING_RATE
+
+
+def _differences(records: Sequence[Record]) -> Iterator[Floats]:
+    """Yield the difference, rad, of every two recordings of one command that started alike, frame by frame."""
+    for one, other in combinations(records, 2):
+        if one.command is None or other.command is None or len(one.time) != len(other.time):
+            continue
+        if not (
+            np.array_equal(one.command.time, other.command.time)
+            and np.array_equal(one.command.angle, other.command.angle)
+            and np.allclose(one.time, other.time, rtol=0.0, atol=0.01 * one.interval)
+        ):
+            continue
+        difference = one.angle - other.angle
+        off = difference[:MIN_REST_FRAMES].mean() - difference.mean()
+        if abs(off) <= REPEATED_START * difference.std() / math.sqrt(MIN_REST_FRAMES):
+            yield difference
 
 
 def stated_noise(records: Sequence[Record]) -> Noise | None:
     """Return the RMS stated uncertainty as noise of unknown AR(1) coefficient; ``None`` where none is stated."""
     stated = np.concatenate([r.sigma for r in records])
     stated = stated[np.isfinite(stated)]
-    return Noise(float(np.sqrt(np.mean(stated**2))), 0.0, 1.0, "stated") if len(stated) else None
+    return Noise(float(np.sqrt(np.mean(stated**2))), 0.0, UNKNOWN, "stated") if len(stated) else None
 
 
 def autoregression(parts: Sequence[Floats], source: str) -> Noise:

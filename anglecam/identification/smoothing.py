@@ -97,7 +97,7 @@ def _later_frames(passed: Sequence[Filtered]) -> list[list[tuple[Floats, Floats]
 def _inverse(matrix: Floats) -> Floats:
     """Return the inverse; NaN where a diverging pass has left nothing of the 1 in 1 + ΛQ."""
     try:
-        return np.linalg.inv(matrix)
+        return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     except np.linalg.LinAlgError:
         return np.full_like(matrix, np.nan)
 

@@ -19,7 +19,7 @@ from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.multiple_shooting import drifts, loses_step, windows
-from anglecam.identification.noise import autoregression, noise_floor
+from anglecam.identification.noise import RESIDUAL, autoregression, noise_floor
 from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.loop.candidates import Candidate, find_rivals, fit_to_more, log_likelihood_gain, promising
 from anglecam.loop.cross_validation import compare, predict_held_out, robust_sigma, split_records
@@ -128,7 +128,7 @@ def _conclude(task: Task, first: Assessment, last: Assessment, candidates: Seque
     # both models are compared with the AR(1) coefficient of the better model's residual
     before = refit_with_phi(first.fit, task.fitted, last.fit.phi)
     before_held_out, _ = predict_held_out(before, task.fitted, task.predicted, task.policy)
-    noise = task.floor or replace(autoregression(last.fit.residuals, "residual"), sigma=last.fit.rmse)
+    noise = task.noise_within(last.fit) or replace(autoregression(last.fit.residuals, RESIDUAL), sigma=last.fit.rmse)
     remains = _structure_remains(task, first, last, before)
     final = _model_that_stands(task, first, last) if remains else last
     named = effects_of(final.fit)
@@ -181,16 +181,15 @@ def _structure_remains(task: Task, first: Assessment, last: Assessment, before: 
     if last.residual_test.p_value >= level or last.fit.rmse**2 <= task.camera**2 + least**2:
         return False
     driven = any(r.command is not None for r in task.fitted)
+    noise = task.noise_within(last.fit)
     share = (
-        policy.verdict.unexplained_share
-        if driven and task.floor is not None
-        else policy.verdict.undriven_unexplained_share
+        policy.verdict.unexplained_share if driven and noise is not None else policy.verdict.undriven_unexplained_share
     )
     # two measures of what remains: the error beyond the noise floor, and the finer one, what further causes would
     # explain of the log-likelihood; if the noise is unknown, the whole error counts
     return (
         not named
-        or error_beyond_noise(task, last.cross_validated) > share * error_beyond_noise(task, first.cross_validated)
+        or error_beyond_noise(last.cross_validated, noise) > share * error_beyond_noise(first.cross_validated, noise)
         or _further_gain_share(last, before) > share**2
     )
 

@@ -258,6 +258,13 @@ class StepwisePolicy:
         "an AR(1) coefficient that is too large because structure is taken for correlated noise",
         "not calibrated; the one-sided 95 % limit of a normal variable",
     )
+    noise_values_per_unknown: float = _threshold(
+        10.0,
+        "independent values for each fitted unknown",
+        "where nothing but the residual shows the AR(1) coefficient of the noise, it is at most so large that the "
+        "residual still has this many independent values",
+        "an AR(1) coefficient that is too large because structure is taken for correlated noise",
+    )
 
 
 @dataclass(frozen=True)
@@ -270,6 +277,12 @@ class VerdictPolicy:
         "once an effect was added, p-value of the residual test below which structure may remain; without an effect "
         "it is the residual test's false_alarm_rate",
         "how often noise alone withdraws an effect that was found",
+    )
+    noise_contradiction_ratio: float = _threshold(
+        1.5,
+        "times the final model's fitted RMS error",
+        "a larger estimate of the noise, other than a film's, is not used: the residual contains the noise",
+        "taking structure for noise because the noise was overestimated, for instance from motion at a rest",
     )
     contradiction_ratio: float = _threshold(
         3.0,

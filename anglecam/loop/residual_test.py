@@ -8,6 +8,11 @@ parametric bootstrap: white noise, from which the column space of the fit's Jaco
 projects it out. So neither the number of tests nor their correlation has to be known. Davison and Hinkley, Bootstrap
 Methods and their Application, 1997, sec. 4.2 and 4.4.
 
+The errors of a quantised angle follow the motion and are not white. The draws are then the errors of the predicted
+motion itself, rounded to the same grid, each time with other
+parameters among those that the recordings leave possible. They show how far each test's p-value is from the uniform
+distribution that it has in white noise, and it is corrected by that.
+
 An effect with an unknown frequency is compared with the residual at many of them, and some frequency always fits noise
 well. Every draw is therefore searched as the data are. From the draws follows with how many independent directions the
 best one competes, and by this number the p-value of the effect is corrected (Šidák, J. Am. Stat. Assoc. 62, 1967), so
@@ -27,6 +32,8 @@ from scipy import special
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit, whiten
+from anglecam.identification.joined import join
+from anglecam.identification.quantisation import quantisation
 from anglecam.identification.slopes import Slopes
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.screen import Direction
@@ -35,6 +42,10 @@ from anglecam.loop.torque_basis import torque_responses
 
 DRAWS = 999
 """Bootstrap draws; with the data's statistic among them p-values are multiples of 1/1000."""
+PHASES = 99
+"""Phases of the grid at which the size of the errors that a fit follows is estimated."""
+LEAST_P = 1e-300
+"""Smaller p-values count as this one, so that they have a logarithm."""
 LAGS = 15
 """Lags of the autocorrelation test, in frames."""
 
@@ -104,7 +115,7 @@ def run_residual_test(
         With a p-value from `DRAWS` bootstrap draws.
     """
     n, free = len(fit.white), len(fit.white) - fit.slopes.rank
-    draws = rng.standard_normal((n, DRAWS))
+    draws, quantised = _noise_draws(fit, records, rng)
     both = fit.slopes.without_followed(np.column_stack([fit.white, draws]))
     energy = np.sum(both**2, axis=0)
     energy[energy == 0.0] = 1.0
@@ -121,6 +132,8 @@ def run_residual_test(
         gains.append(gain - gain[1:].mean())
     p_each["autocorrelation"] = special.chdtrc(LAGS, _portmanteau(both, energy, records))
 
+    scales = {name: _exponential_scale(p[1:]) if quantised else (1.0, 1.0) for name, p in p_each.items()}
+    p_each = {name: _as_uniform(p, scales[name]) for name, p in p_each.items()}
     # under the null hypothesis the data are one more draw, so their smallest p-value is ranked among those of all draws
     smallest = np.min(list(p_each.values()), axis=0)
     p_value = np.mean(smallest <= smallest[0])
@@ -129,12 +142,61 @@ def run_residual_test(
     tests = tuple(StructureTest(name, float(p[0])) for name, p in p_each.items())
     detectable: dict[str, float] = {}
     for name, count in competing.items():
-        sigmas = -(special.ndtri(_corrected(critical, 1.0 / count)) + special.ndtri(rates.missed_detection_rate))
+        needed_p = _before_uniform(critical, scales[f"effect {name}"])
+        sigmas = -(special.ndtri(_corrected(needed_p, 1.0 / count)) + special.ndtri(rates.missed_detection_rate))
         needed = max(float(sigmas * np.sqrt(fit.cost / free)), smallest_rms * math.sqrt(n))
         detectable |= _detectable([one for one in effect_directions if one.effect.id == name], needed)
     largest = np.max(gains, axis=0)
     further_gain = max(0.0, float(largest[0] - largest[1:].mean()))
     return ResidualTest(float(p_value), tests, further_gain, competing, detectable, rates.false_alarm_rate)
+
+
+def _noise_draws(fit: Fit, records: Sequence[Record], rng: np.random.Generator) -> tuple[Floats, bool]:
+    """Return (N, DRAWS) whitened residuals that noise alone would leave, and whether they are those of a quantiser.
+
+    The scatter that the quantiser does not explain is white noise that acted before it. From a standard deviation of
+    one step on, such noise makes the quantiser's error white as well.
+    """
+    joined, grid = join(records, fit.phi), quantisation(records)
+    white = rng.standard_normal((len(fit.white), DRAWS))
+    before = math.sqrt(max(fit.rmse**2 - grid.sigma**2, 0.0)) if grid else math.inf
+    if grid is None or before >= grid.step:
+        return white, False
+    path = joined.angle - np.concatenate(fit.residuals)
+
+    def rounded(paths: Floats) -> Floats:
+        return np.concatenate(grid.rounded(list(joined.runs.split(paths))))
+
+    def followed(values: Floats) -> Floats:
+        return values - fit.slopes.without_followed(values)
+
+    # the fit's parameters follow the rounding errors, which are less independent than white noise: the more so, the
+    # longer the motion rests. Errors at another phase in each recording show by how much
+    phase = grid.step * rng.uniform(-0.5, 0.5, (len(records), PHASES))[joined.runs.owner] + path[:, None]
+    size = np.linalg.norm(followed(joined.whiten(rounded(phase + before * white[:, :PHASES]) - phase)))
+    other = rng.standard_normal(white.shape)
+    scale = float(size / np.linalg.norm(followed(other[:, :PHASES])))
+    exact = path[:, None] + scale * followed(other)
+    return joined.whiten(rounded(exact + before * white) - exact), True
+
+
+def _exponential_scale(p: Floats) -> tuple[float, float]:
+    """Return shape and scale of the gamma distribution with mean and variance of −log p; (1, 1) for uniform p."""
+    size = -np.log(np.maximum(p, LEAST_P))
+    mean, variance = float(np.mean(size)), float(np.var(size))
+    return (mean**2 / variance, variance / mean) if mean > 0.0 and variance > 0.0 else (1.0, 1.0)
+
+
+def _as_uniform(p: Floats, shape_and_scale: tuple[float, float]) -> Floats:
+    """Return p-values that are uniform where −log p has the gamma distribution of `_exponential_scale`."""
+    shape, scale = shape_and_scale
+    return p if shape == scale == 1.0 else np.asarray(special.gammaincc(shape, -np.log(np.maximum(p, LEAST_P)) / scale))
+
+
+def _before_uniform(p: float, shape_and_scale: tuple[float, float]) -> float:
+    """Return the p-value that `_as_uniform` turns into ``p``."""
+    shape, scale = shape_and_scale
+    return float(np.exp(-scale * special.gammainccinv(shape, p)))
 
 
 def _tested_effects(

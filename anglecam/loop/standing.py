@@ -12,6 +12,7 @@ import math
 
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
+from anglecam.identification.noise import Noise
 from anglecam.loop.cross_validation import Prediction, predict_held_out
 from anglecam.loop.refit import effects_of, refit_without
 from anglecam.loop.stepwise import Assessment, Task, assess
@@ -32,13 +33,13 @@ def model_that_stands(task: Task, last: Assessment) -> Assessment:
     Assessment
         Of the model with the effects that stand; ``last`` if all of them do.
     """
-    now = last
+    now, noise = last, task.noise_within(last.fit)
     while effects_of(now.fit):
         weakest, without = min(
             ((effect, _without(task, now.fit, effect)) for effect in effects_of(now.fit)),
-            key=lambda pair: error_beyond_noise(task, pair[1]),
+            key=lambda pair: error_beyond_noise(pair[1], noise),
         )
-        share = error_beyond_noise(task, now.held_out) / max(error_beyond_noise(task, without), 1e-300)
+        share = error_beyond_noise(now.held_out, noise) / max(error_beyond_noise(without, noise), 1e-300)
         if share <= task.policy.verdict.partly_explained_share:
             break
         task.progress(f"without {weakest.id}")
@@ -51,7 +52,7 @@ def _without(task: Task, fit: Fit, effect: Effect) -> Prediction:
     return held_out
 
 
-def error_beyond_noise(task: Task, prediction: Prediction) -> float:
+def error_beyond_noise(prediction: Prediction, noise: Noise | None) -> float:
     """Return the RMS error of a prediction beyond the noise, rad; all of it if the noise is unknown."""
-    floor = task.floor.sigma if task.floor else 0.0
-    return math.sqrt(max(prediction.rmse**2 - floor**2, 0.0))
+    sigma = noise.sigma if noise else 0.0
+    return math.sqrt(max(prediction.rmse**2 - sigma**2, 0.0))

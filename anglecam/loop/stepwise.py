@@ -18,7 +18,7 @@ from scipy import special
 from anglecam.data.record import Record
 from anglecam.effects import LEDGER, Effect
 from anglecam.identification.fit import Fit
-from anglecam.identification.noise import Noise, autoregression
+from anglecam.identification.noise import RESIDUAL, Noise, autoregression
 from anglecam.loop.candidates import (
     Candidate,
     fit_candidates,
@@ -59,6 +59,14 @@ class Task:
     def camera(self) -> float:
         """Stated standard uncertainty of a film's angle, rad; 0 for angle series from elsewhere."""
         return self.floor.sigma if self.floor and self.floor.filmed else 0.0
+
+    def noise_within(self, fit: Fit) -> Noise | None:
+        """Return the noise, or ``None`` if it is unknown or contradicted by the much smaller residual of a fit.
+
+        A film's stated uncertainty includes errors that are common to all frames, so it may exceed any residual.
+        """
+        most = self.policy.verdict.noise_contradiction_ratio * fit.rmse
+        return self.floor if self.floor and (self.floor.filmed or self.floor.sigma <= most) else None
 
 
 @dataclass(frozen=True)
@@ -231,7 +239,8 @@ def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> fl
 
     Structure that a model lacks makes its residual look correlated, and the residual of the best candidate looks least
     so. A rest, or the distance from the pivot, is independent of any model; its AR(1) coefficient limits how much of
-    the correlation can be noise.
+    the correlation can be noise. Without either, so many of the residual's values must be independent that noise can be
+    distinguished from structure at all.
     """
     limits = task.policy.stepwise
     likely = forecasts(fit, directions(fit, task.fitted, prediction_changes, task.policy))[: limits.noise_models]
@@ -240,10 +249,12 @@ def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> fl
         *map_in_threads(lambda one: fit_with(fit, task.fitted, one, staged=False, policy=task.policy), likely),
     ]
     best = min(fits, key=lambda one: one.cost)
-    phi = autoregression(best.residuals, "residual").phi
-    if task.floor is None:
-        return phi
-    return min(phi, max(0.0, task.floor.phi + limits.noise_floor_phi_errors * task.floor.phi_error))
+    phi = autoregression(best.residuals, RESIDUAL).phi
+    if task.floor is not None and math.isfinite(task.floor.phi_error):
+        return min(phi, max(0.0, task.floor.phi + limits.noise_floor_phi_errors * task.floor.phi_error))
+    # among N values of AR(1) noise, N·(1 − φ)/(1 + φ) are independent
+    least = limits.noise_values_per_unknown * best.slopes.rank / len(best.white)
+    return min(phi, max(0.0, (1.0 - least) / (1.0 + least)))
 
 
 def applicable(records: Sequence[Record], rate: float = 1.0) -> list[Effect]:

@@ -55,7 +55,7 @@ def prediction_figure(records: Sequence[Record], residuals: Sequence[Floats]) ->
     def draw(axes: Axes, i: int) -> None:
         record, error = records[worst[i]], residuals[worst[i]]
         axes.plot(record.time, np.degrees(record.angle), ".", color=MEASURED, ms=2.5, label="measured")
-        axes.plot(record.time, np.degrees(record.angle - error), color=BEFORE, lw=1.0, label="base model, free run")
+        axes.plot(record.time, np.degrees(record.angle - error), color=BEFORE, lw=1.0, label="base model")
 
     return _panels([names[i] for i in worst], draw, "angle, °")
 

@@ -15,7 +15,7 @@ from anglecam.effects import effect
 from anglecam.effects.unit_names import split_unit
 from anglecam.identification.identified import Identified
 from anglecam.io.files import write_atomically
-from anglecam.io.session import CORRECTED
+from anglecam.io.session import CORRECTED, SERIES_ENDING
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.refit import plant_of
 from anglecam.loop.residual_test import StructureTest
@@ -26,7 +26,16 @@ from anglecam.loop.verdict_json import NEXT_COMMAND, size_of
 from anglecam.report import loop_figures as figures
 from anglecam.report.free_form_figure import free_form_figure
 from anglecam.report.path_figure import path_figure
-from anglecam.report.wording import free_form_sentence, plain, sentence, summary_of, with_uncertainty
+from anglecam.report.wording import (
+    free_form_sentence,
+    free_run,
+    noise_in_words,
+    plain,
+    remaining_structure,
+    sentence,
+    summary_of,
+    with_uncertainty,
+)
 
 COLOURS = {
     "attributed": "#1f6f8b",
@@ -91,9 +100,7 @@ def write_report(
     # autoescape, because names of files and recordings come from the user; the SVG figures are marked as safe
     environment = Environment(loader=PackageLoader("anglecam.report", "."), autoescape=True, undefined=StrictUndefined)
     decimals = (
-        4
-        if verdict.noise.sigma == 0.0
-        else int(np.clip(1 - np.floor(np.log10(result["rmse_deg"]["noise_floor"])), 4, 6))
+        4 if verdict.noise.sigma == 0.0 else int(np.clip(1 - np.floor(np.log10(np.degrees(verdict.noise.sigma))), 4, 6))
     )
     environment.filters |= {
         "p": lambda p: f"{p:.3f}" if p >= 1e-3 else "< 0.001",
@@ -109,6 +116,9 @@ def write_report(
         verdict=verdict,
         sentence=sentence(verdict),
         free_form="" if verdict.free_form is None else free_form_sentence(verdict.free_form),
+        noise=noise_in_words(verdict),
+        remains=remaining_structure(verdict),
+        free_run=free_run(verdict),
         errors=result["rmse_deg"],
         gain=verdict.gain,
         policy=verdict.policy,
@@ -123,7 +133,9 @@ def write_report(
         drawn=figures.MOST_RECORDINGS,
         effects=_effect_rows(verdict, result),
         final=_final_rows(verdict, result),
-        corrected=CORRECTED if any(a.effect.station == "camera" for a in verdict.accepted) else "",
+        corrected=CORRECTED
+        if any((path.parent / CORRECTED / f"{s.name}{SERIES_ENDING}").exists() for s in series)
+        else "",
         experiment=experiment,
         next_command=NEXT_COMMAND,
         detectable=_detectable_rows(result),

@@ -11,7 +11,7 @@ from anglecam.identification.identified import Identified
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import NEXT_COMMAND
-from anglecam.report.wording import describe, free_form_sentence, sentence
+from anglecam.report.wording import describe, free_form_sentence, noise_in_words, remaining_structure, sentence
 
 
 def model_table(models: Sequence[Identified]) -> Table:
@@ -46,8 +46,8 @@ def loop_table(verdict: Verdict, experiment: Experiment | None = None) -> Table:
         table.add_row("missing torque", free_form_sentence(verdict.free_form))
     before, after = np.degrees(verdict.before_held_out.rmse), np.degrees(verdict.after_held_out.rmse)
     table.add_row("prediction error, ° RMS", f"{before:.4f} before, {after:.4f} after")
-    table.add_row("noise floor, ° RMS", f"{np.degrees(verdict.noise.sigma):.4f} ({verdict.noise.source})")
+    table.add_row("noise floor, ° RMS", noise_in_words(verdict))
     table.add_row("p-value of the base model's residual", f"{verdict.first_test.p_value:.3f}")
-    if verdict.verdict in ("attributed", "nothing_missing") and not verdict.last_test.passed:
-        table.add_row("remaining structure", "too small to be investigated further")
+    if remains := remaining_structure(verdict):
+        table.add_row("remaining structure", remains)
     return table

@@ -14,20 +14,26 @@ from anglecam.loop.verdict_json import fitted_parameters
 def sentence(verdict: Verdict) -> str:
     """Return the verdict as one sentence that a student understands."""
     before, after = (f"{np.degrees(p.rmse):.3g}°" for p in (verdict.before_held_out, verdict.after_held_out))
+    on = predicted_frames(verdict)
     if verdict.verdict == "nothing_missing" and not verdict.first_test.passed:
+        limit = (
+            f"it is no larger than errors of the measurement can be; the uncertainty of its angles is "
+            f"{np.degrees(verdict.noise.sigma):.3g}°"
+            if verdict.noise.filmed
+            else "it is no larger than numerical errors of models and files"
+        )
         return (
-            f"Nothing is missing that this measurement can show: the error of the model θ̈ = c·u − a·θ̇ − b·θ on data "
-            f"that it was not fitted to ({before}) is not noise alone, but it is no larger than errors of the "
-            f"measurement can be; the uncertainty of its angles is {np.degrees(verdict.noise.sigma):.3g}°."
+            f"Nothing is missing that this measurement can show: the error of the model θ̈ = c·u − a·θ̇ − b·θ on {on} "
+            f"({before}) is not noise alone, but {limit}."
         )
     if verdict.verdict == "nothing_missing":
         return (
-            f"Nothing is missing: the error of the model θ̈ = c·u − a·θ̇ − b·θ on data that it was not fitted to "
-            f"({before}) cannot be distinguished from noise."
+            f"Nothing is missing: the error of the model θ̈ = c·u − a·θ̇ − b·θ on {on} ({before}) cannot be "
+            f"distinguished from noise."
         )
     if verdict.verdict == "unexplained":
         return (
-            f"Something is missing: the error of the model on data that it was not fitted to is {before}, and none of "
+            f"Something is missing: the error of the model on {on} is {before}, and none of "
             f"the effects that anglecam knows explains it with sufficient evidence."
         )
     rest = "; what remains is more than noise, and no effect that anglecam knows explains it"
@@ -35,8 +41,8 @@ def sentence(verdict: Verdict) -> str:
     causes = "; ".join([first, *(cause[0].lower() + cause[1:] for cause in others)])
     this = "this" if len(verdict.accepted) == 1 else "these"
     return (
-        f"{causes}; with {this} in the model, its error on data that it was not fitted to falls from {before} to "
-        f"{after}{rest if verdict.verdict == 'partly_explained' else ''}."
+        f"{causes}; with {this} in the model, its error on {on} falls from {before} to {after}"
+        f"{rest if verdict.verdict == 'partly_explained' else ''}."
     )
 
 
@@ -60,6 +66,41 @@ def free_form_sentence(found: FreeForm) -> str:
         f"The model lacks a torque that depends on the {over}; with a smooth function of it, the error on data that "
         f"the model was not fitted to falls from {before} to {after}. {causes}"
     )
+
+
+def predicted_frames(verdict: Verdict) -> str:
+    """Return on which frames the prediction error was computed."""
+    if verdict.held_out:
+        return "the held-out recordings"
+    several = len({r.name for r in verdict.fitted}) > 1
+    return f"blocks of the recording{'s' if several else ''} that it was not fitted to"
+
+
+def free_run(verdict: Verdict) -> str:
+    """Return how far the predictions run freely: through whole recordings, or through windows of them."""
+    records = [*verdict.fitted, *verdict.held_out]
+    return "free run through windows" if len({r.name for r in records}) < len(records) else "free run"
+
+
+def noise_in_words(verdict: Verdict) -> str:
+    """Return the size of the angle's noise, °, and its source, or that it is unknown."""
+    size = f"{np.degrees(verdict.noise.sigma):.4f}"
+    return f"{size} ({verdict.noise.source})" if verdict.noise.known else f"unknown; at most {size}, the residual"
+
+
+def remaining_structure(verdict: Verdict) -> str:
+    """Return why the structure that the final model leaves is not investigated further; empty if it leaves none."""
+    test, limits = verdict.last_test, verdict.policy.stepwise
+    if verdict.verdict in ("unexplained", "partly_explained") or test.passed:
+        return ""
+    rate = limits.false_further_search_rate
+    if test.p_value >= rate:
+        return f"not certain: p = {test.p_value:.3f}; only below {rate:g} is a further effect searched"
+    if verdict.noise.filmed and verdict.after.rmse <= limits.film_error_sigmas * verdict.noise.sigma:
+        return "no larger than the angle's uncertainty; not investigated further"
+    if not verdict.noise.known:
+        return "significant; the noise is unknown, so its size cannot be judged"
+    return "significant, but small against the error of the base model; no further effect explains it"
 
 
 def plain(effect_id: str) -> str:

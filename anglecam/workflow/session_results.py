@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from anglecam.data.record import Record
+from anglecam.errors import InputError
 from anglecam.identification.export import fitted_model, transfer_as_dict, write_mat
 from anglecam.identification.identified import Identified
 from anglecam.identification.identify_records import identify_records
@@ -103,7 +104,7 @@ def write_closed(
     progress("report")
     experiment = attempt("the next experiment", lambda: next_experiment(verdict), missing)
     attempt(NEXT_COMMAND, lambda: write_next_command(experiment, out), missing)
-    attempt(CORRECTED, lambda: _write_corrected(shown, verdict, out / CORRECTED), missing)
+    attempt(CORRECTED, lambda: _write_corrected(shown, verdict, out / CORRECTED, missing), missing)
     result = verdict_as_dict(verdict, experiment)
     title, page = session.directory.resolve().name, out / REPORT
     problems = [*map(str, measured.problems), *missing]
@@ -135,10 +136,16 @@ def _write_model(model: Identified, out: Path, name: str) -> None:
     write_mat(exported, out / f"{name}.mat")
 
 
-def _write_corrected(shown: LoopInput, verdict: Verdict, folder: Path) -> None:
-    """Write the series without the camera's effects that the loop found, where it found any."""
+def _write_corrected(shown: LoopInput, verdict: Verdict, folder: Path, missing: list[str]) -> None:
+    """Write the series without the camera's effects that the loop found, where it found any; delete older ones."""
     for series, record in zip(shown.series, shown.records, strict=True):
-        right = correct_camera_effects(series, verdict.after, record.view)
+        path = folder / f"{series.name}{SERIES_ENDING}"
+        path.unlink(missing_ok=True)
+        try:
+            right = correct_camera_effects(series, verdict.after, record.view)
+        except InputError as cause:
+            missing.append(f"{CORRECTED}: {cause}")
+            continue
         if right is not None:
             make_folder(folder)
-            write_series(right, folder / f"{series.name}{SERIES_ENDING}")
+            write_series(right, path)

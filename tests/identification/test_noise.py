@@ -1,0 +1,74 @@
+"""The noise's size and correlation agree with the truth, whichever source they come from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from anglecam.identification.noise import QUANTISED, noise_floor
+from anglecam.identification.quantisation import quantisation
+from support.motion import Plant
+from support.series import session
+
+STEP = np.radians(360.0 / 4096)
+
+
+def rounded(records, step=STEP, decimals=None, offset=0.0):
+    found = [replace(r, angle=step * np.round(r.angle / step) + offset) for r in records]
+    if decimals is not None:
+        found = [replace(r, angle=np.radians(np.round(np.degrees(r.angle), decimals))) for r in found]
+    return found
+
+
+@pytest.mark.parametrize("decimals", [None, 2, 3, 4, 6])
+@pytest.mark.parametrize("offset", [0.0, 0.0123])
+def test_the_step_of_an_encoder_is_found_whatever_the_files_rounding(decimals, offset):
+    grid = quantisation(rounded(session(Plant(), 3, sigma_deg=0.01), decimals=decimals, offset=offset))
+    assert grid.step == pytest.approx(STEP, rel=1e-3)
+    assert grid.sigma == pytest.approx(STEP / np.sqrt(12.0), rel=1e-3)
+
+
+@pytest.mark.parametrize("decimals", [2, 4, 6])
+def test_the_decimals_of_a_file_are_not_the_noise(decimals):
+    records = [replace(r, angle=np.radians(np.round(np.degrees(r.angle), decimals))) for r in session(Plant(), 4)]
+    assert quantisation(records) is None
+    floor = noise_floor(records)
+    assert floor.source == "rest"
+    assert np.degrees(floor.sigma) == pytest.approx(0.05, rel=0.2)
+    assert noise_floor([r.between(1.0, np.inf) for r in records]) is None
+
+
+def test_a_quantised_rest_without_scatter_is_not_taken_for_no_noise():
+    floor = noise_floor(rounded(session(Plant(), 5, sigma_deg=0.0)))
+    assert floor.source == QUANTISED
+    assert floor.sigma == pytest.approx(STEP / np.sqrt(12.0), rel=1e-3)
+
+
+def test_the_stated_uncertainty_is_not_overruled_by_the_rest():
+    records = [replace(r, sigma=np.full(len(r.time), 2e-4)) for r in session(Plant(), 6)]
+    floor = noise_floor(records)
+    assert (floor.source, floor.sigma) == ("stated", pytest.approx(2e-4))
+    assert floor.phi == pytest.approx(noise_floor(session(Plant(), 6)).phi)
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [lambda t: 0.9 * np.sin(12.0 * t), lambda t: 0.02 * t, lambda t: 0.1 * np.exp(-3.0 * t)],
+    ids=["swing", "trend", "approach"],
+)
+def test_a_rest_in_motion_is_not_taken_for_noise(motion):
+    records = [replace(r, angle=r.angle + motion(r.time)) for r in session(Plant(), 7)]
+    assert noise_floor(records) is None
+
+
+def test_repeated_recordings_show_the_noise_where_there_is_no_rest():
+    cut = [[r.between(1.0, np.inf) for r in session(Plant(), 8, phi=phi)] for phi in (0.0,)]
+    first = cut[0]
+    rng = np.random.default_rng(0)
+    again = [replace(r, angle=r.angle + np.radians(0.05) * rng.standard_normal(len(r.time))) for r in first]
+    floor = noise_floor([*first, *again])
+    assert floor.source == "repeated recordings"
+    # the second time has the first one's noise and as much again, so half the difference's variance is half of it
+    assert np.degrees(floor.sigma) == pytest.approx(0.05 / np.sqrt(2.0), rel=0.1)
