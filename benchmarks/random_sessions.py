@@ -32,7 +32,7 @@ from benchmarks.fuzz.trial import DIED, FINDING, REFUSED, RESULT, Reader, Trial,
 
 SECONDS, MOST_BYTES = 120.0, 2048 * 2**20
 COMMANDS = ("close", "ekf", "oe2", "oe3")
-VERDICTS = ("attributed", "nothing_missing", "unexplained")
+VERDICTS = ("attributed", "nothing_missing", "partly_explained", "unexplained")
 LARGEST_DEG = 1e11
 """Of an angle that is written; a plant that runs away further stays there."""
 
