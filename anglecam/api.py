@@ -122,4 +122,6 @@ def close_loop(session: str | Path, hold_out: Sequence[str] = ()) -> Verdict:
     >>> close_loop(session).verdict
     'nothing_missing'
     """
-    return close_session(measure_session(read_session(Path(session))), hold_out=hold_out)
+    from anglecam.loop.close import with_free_form
+
+    return with_free_form(close_session(measure_session(read_session(Path(session))), hold_out=hold_out))

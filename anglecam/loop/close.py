@@ -96,7 +96,40 @@ def close_records(
             candidates = rank_candidates(task, first)
         last = add_effects(task, first, candidates)
         progress("verdict")
-        return _with_free_form(task, _conclude(task, first, last, candidates))
+        return _conclude(task, first, last, candidates)
+
+
+def with_free_form(verdict: Verdict, *, seed: int = 0) -> Verdict:
+    """Look for a torque of free form where the final model leaves structure.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        From `close_records`.
+    seed : int
+        Of the bootstrap.
+
+    Returns
+    -------
+    Verdict
+        With ``free_form`` where a smooth function improves the prediction significantly.
+    """
+    if verdict.verdict in ("attributed", "nothing_missing"):
+        return verdict
+    rate = plant_of(verdict.after).fastest / FASTEST
+    left = effects_left(applicable([*verdict.fitted, *verdict.held_out], rate), verdict.after)
+    with threadpool_limits(1, "blas"):
+        found = find_free_form(
+            verdict.after,
+            verdict.after_held_out,
+            verdict.fitted,
+            verdict.held_out,
+            left,
+            [one for one in verdict.candidates if one.effect.id in [effect.id for effect in left]],
+            np.random.default_rng(seed),
+            verdict.policy,
+        )
+    return replace(verdict, free_form=found)
 
 
 def _begin(
@@ -150,25 +183,6 @@ def _conclude(task: Task, first: Assessment, last: Assessment, candidates: Seque
         task.predicted,
         task.policy,
     )
-
-
-def _with_free_form(task: Task, verdict: Verdict) -> Verdict:
-    """Look for a torque of free form where the final model leaves structure."""
-    if verdict.verdict in ("attributed", "nothing_missing"):
-        return verdict
-    task.progress("free form")
-    left = effects_left(task.ledger, verdict.after)
-    found = find_free_form(
-        verdict.after,
-        verdict.after_held_out,
-        task.fitted,
-        task.predicted,
-        left,
-        [one for one in verdict.candidates if one.effect.id in [effect.id for effect in left]],
-        task.rng,
-        task.policy,
-    )
-    return replace(verdict, free_form=found)
 
 
 def _structure_remains(task: Task, first: Assessment, last: Assessment, before: Fit) -> bool:

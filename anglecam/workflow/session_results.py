@@ -17,6 +17,7 @@ from anglecam.io.rig import Rig
 from anglecam.io.series_csv import write_series
 from anglecam.io.session import CORRECTED, SERIES_ENDING
 from anglecam.loop.camera_correction import correct_camera_effects
+from anglecam.loop.close import with_free_form
 from anglecam.loop.cross_validation import split_records
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.verdict import Verdict
@@ -93,8 +94,10 @@ def write_closed(
     measured.split(hold_out)
     fitted, held_out = split_records(shown.records, [*session.rig.held_out, *hold_out])
     verdict = close_session(measured, hold_out=hold_out, shown=shown, progress=progress)
-    progress("extended Kalman filter")
     missing: list[str] = []
+    progress("free form")
+    verdict = attempt("free form", partial(with_free_form, verdict), missing) or verdict
+    progress("extended Kalman filter")
     models = []
     for estimator, name in (("ekf", "ekf"), ("oe2", "model")):
         model = attempt(
