@@ -150,7 +150,8 @@ def _fit_by_trust_region(model: Model, joined: Joined, begin: Point, most: int) 
     bent = model.penalty if isinstance(model, CurvedPlant) else np.empty((0, len(held)))
     costs = [here.cost + float(np.sum((bent @ here.parameters) ** 2))]
     patience = 1 if isinstance(model, Plant) and not model.kinked else PATIENCE
-    margin = [INSIDE * np.maximum(1.0, np.abs(bound)) for bound in (model.lower, model.upper)]
+    finite = [np.where(np.isfinite(bound), bound, 0.0) for bound in (model.lower, model.upper)]
+    margin = [INSIDE * np.maximum(1.0, np.abs(bound)) for bound in finite]
     inside = np.clip(here.parameters, model.lower + margin[0], model.upper - margin[1])
     if not np.array_equal(inside, here.parameters):
         latest = _follow(model, joined, here, slopes, inside)
