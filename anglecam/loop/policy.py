@@ -258,13 +258,6 @@ class StepwisePolicy:
         "an AR(1) coefficient that is too large because structure is taken for correlated noise",
         "not calibrated; the one-sided 95 % limit of a normal variable",
     )
-    noise_values_per_unknown: float = _threshold(
-        10.0,
-        "independent values for each fitted unknown",
-        "where nothing but the residual shows the AR(1) coefficient of the noise, it is at most so large that the "
-        "residual still has this many independent values",
-        "an AR(1) coefficient that is too large because structure is taken for correlated noise",
-    )
 
 
 @dataclass(frozen=True)

@@ -239,8 +239,7 @@ def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> fl
 
     Structure that a model lacks makes its residual look correlated, and the residual of the best candidate looks least
     so. A rest, or the distance from the pivot, is independent of any model; its AR(1) coefficient limits how much of
-    the correlation can be noise. Without either, so many of the residual's values must be independent that noise can be
-    distinguished from structure at all.
+    the correlation can be noise.
     """
     limits = task.policy.stepwise
     likely = forecasts(fit, directions(fit, task.fitted, prediction_changes, task.policy))[: limits.noise_models]
@@ -252,9 +251,7 @@ def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> fl
     phi = autoregression(best.residuals, RESIDUAL).phi
     if task.floor is not None and math.isfinite(task.floor.phi_error):
         return min(phi, max(0.0, task.floor.phi + limits.noise_floor_phi_errors * task.floor.phi_error))
-    # among N values of AR(1) noise, N·(1 − φ)/(1 + φ) are independent
-    least = limits.noise_values_per_unknown * best.slopes.rank / len(best.white)
-    return min(phi, max(0.0, (1.0 - least) / (1.0 + least)))
+    return phi
 
 
 def applicable(records: Sequence[Record], rate: float = 1.0) -> list[Effect]:
