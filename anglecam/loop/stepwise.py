@@ -36,7 +36,7 @@ from anglecam.loop.screen import Change, Forecast, changes, directions, forecast
 from anglecam.loop.size import sizes_determined
 from anglecam.threads import map_in_threads
 
-NARROW, WIDE = math.radians(5.0), math.radians(120.0)
+NARROW, WIDE = math.radians(20.0), math.radians(120.0)
 """Ranges of motion, rad, between which bounds and starts of the effects hold as they stand."""
 
 
