@@ -153,12 +153,15 @@ def _load_curve(
 
 
 def _command_curve(effect: Effect, values: Floats, records: Sequence[Record]) -> EffectCurve:
-    """Return the part of a command in which the effect changes the largest share of its range."""
+    """Return the part of a command in which the effect changes most of its range, or all of a short command."""
     runs = [(r, r.command, np.arange(r.time[0], r.time[-1], TICK)) for r in records if r.command is not None]
     pairs = [(r.name, t, c.at(t), _arriving(effect, values, c, t)) for r, c, t in runs]
     least = SMALLEST_RANGE * max(float(np.ptp(demanded)) for _, _, demanded, _ in pairs)
-    best: EffectCurve | None = None
-    most = 0.0
+
+    def curve(name: str, time: Floats, demanded: Floats, arriving: Floats) -> EffectCurve:
+        return EffectCurve(time, np.degrees(arriving), f"time in {name}, s", "command, °", np.degrees(demanded))
+
+    best, most = curve(*pairs[0]), 0.0
     for stretch in STRETCHES:
         size = round(stretch / TICK)
         for name, time, demanded, arriving in pairs:
@@ -168,13 +171,9 @@ def _command_curve(effect: Effect, values: Floats, records: Sequence[Record]) ->
                 both = np.concatenate([demanded[part], arriving[part]])
                 share = float(np.mean(np.abs(arriving - demanded)[part]) / max(np.ptp(both), least))
                 if move >= least and share > most:
-                    most = share
-                    drawn = np.degrees(arriving[part]), f"time in {name}, s", "command, °", np.degrees(demanded[part])
-                    best = EffectCurve(time[part], *drawn)
+                    best, most = curve(name, time[part], demanded[part], arriving[part]), share
         if most >= VISIBLE_SHARE:
             break
-    if best is None:
-        raise ValueError(f"{effect.id}: no command changes for long enough to draw the effect")
     return best
 
 

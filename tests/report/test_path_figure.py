@@ -45,6 +45,12 @@ def test_a_dead_time_is_drawn_with_its_length_on_a_scale_that_shows_it(records, 
     assert tau > 0.05 * np.ptp(curve.x)
 
 
+def test_the_whole_of_a_recording_is_drawn_that_is_shorter_than_any_stretch(records):
+    short = records[0].between(0.9, 0.95)
+    curve = _curve([replace(short, time=short.time - short.time[0])], "dead_time", 0.005)
+    assert np.ptp(curve.x) == pytest.approx(np.ptp(short.time), abs=2e-3)
+
+
 def test_friction_is_drawn_against_motion(records):
     curve = _curve(records, "coulomb_friction", np.radians(100.0))
     assert np.all(curve.y[curve.x > 1.0] == pytest.approx(-100.0))
