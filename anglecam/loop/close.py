@@ -196,9 +196,7 @@ def _structure_remains(task: Task, first: Assessment, last: Assessment, before: 
         return False
     driven = any(r.command is not None for r in task.fitted)
     noise = task.noise_within(last.fit)
-    share = (
-        policy.verdict.unexplained_share if driven and noise is not None else policy.verdict.undriven_unexplained_share
-    )
+    share = policy.verdict.unexplained_share if driven else policy.verdict.undriven_unexplained_share
     # two measures of what remains: the error beyond the noise floor, and the finer one, what further causes would
     # explain of the log-likelihood; if the noise is unknown, the whole error counts
     return (

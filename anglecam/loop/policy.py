@@ -294,8 +294,8 @@ class VerdictPolicy:
     undriven_unexplained_share: float = _threshold(
         0.75,
         "share of the base model's error beyond the noise",
-        "the same where nothing is commanded or the noise is unknown: most of what remains may then be something that "
-        "no model of a mechanism holds, such as the hand that released it",
+        "the same where nothing is commanded: most of what remains may then be something that no model of a mechanism "
+        "holds, such as the hand that released it",
         "withdrawing an effect because of a disturbance outside the mechanism",
     )
     partly_explained_share: float = _threshold(

@@ -8,10 +8,9 @@ parametric bootstrap: white noise, from which the column space of the fit's Jaco
 projects it out. So neither the number of tests nor their correlation has to be known. Davison and Hinkley, Bootstrap
 Methods and their Application, 1997, sec. 4.2 and 4.4.
 
-The errors of a quantised angle follow the motion and are not white. The draws are then the errors of the predicted
-motion itself, rounded to the same grid, each time with other
-parameters among those that the recordings leave possible. They show how far each test's p-value is from the uniform
-distribution that it has in white noise, and it is corrected by that.
+The errors of a quantised angle follow the motion and are not white. The draws are then the rounding errors of predicted
+motions, each with other parameters among those that the recordings leave possible. They show how far each test's
+p-value is from the uniform distribution that it has in white noise, and it is corrected by that.
 
 An effect with an unknown frequency is compared with the residual at many of them, and some frequency always fits noise
 well. Every draw is therefore searched as the data are. From the draws follows with how many independent directions the

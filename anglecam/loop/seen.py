@@ -42,11 +42,7 @@ def seen_of(fit: Fit, records: Sequence[Record]) -> Seen:
         Motion and residual.
     """
     plant = plant_of(fit)
-    times = [instants(record.time, STEP * plant.smooth_step) for record in records]
-    motion = [
-        plant.run(fit.parameters, time, record.command, nuisance[: plant.states])
-        for time, record, nuisance in zip(times, records, fit.nuisance, strict=True)
-    ]
+    times, motion = dense_motion(fit, records)
     levels = [np.zeros(len(t)) if r.command is None else r.command.at(t) for t, r in zip(times, records, strict=True)]
     angle, rate = np.concatenate(motion).T
     command = np.concatenate(levels)
@@ -74,9 +70,32 @@ def seen_of(fit: Fit, records: Sequence[Record]) -> Seen:
     )
 
 
-def instants(time: Floats, step: float) -> Floats:
-    """Return evenly spaced instants from the first frame to the last, at most ``step`` apart, s."""
-    return np.linspace(time[0], time[-1], math.ceil((time[-1] - time[0]) / step) + 1)
+def dense_motion(fit: Fit, records: Sequence[Record]) -> tuple[list[Floats], list[Floats]]:
+    """Run a fitted plant through its recordings.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of a `Plant`, on ``records``.
+    records : sequence of Record
+        The fitted recordings.
+
+    Returns
+    -------
+    times : list of (n,) ndarray
+        Evenly spaced instants from the first frame of each recording to the last, at most `STEP` steps apart, s.
+    motion : list of (n, 2) ndarray
+        Angle, rad, and rate, rad/s, at these instants.
+    """
+    plant = plant_of(fit)
+    step = STEP * plant.smooth_step
+    spans = [(r.time[0], r.time[-1]) for r in records]
+    times = [np.linspace(first, last, math.ceil((last - first) / step) + 1) for first, last in spans]
+    motion = [
+        plant.run(fit.parameters, time, record.command, nuisance[: plant.states])
+        for time, record, nuisance in zip(times, records, fit.nuisance, strict=True)
+    ]
+    return times, motion
 
 
 def largest_shares(

@@ -12,7 +12,7 @@ from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit
 from anglecam.identification.joined import join
 from anglecam.loop.refit import plant_of
-from anglecam.loop.seen import STEP, instants, torque_response
+from anglecam.loop.seen import dense_motion, torque_response
 from anglecam.models.curved_plant import Curve
 
 
@@ -94,12 +94,10 @@ def visit(fit: Fit, records: Sequence[Record]) -> Visited:
     Visited
         Its motion.
     """
-    plant, found = plant_of(fit), []
-    for record, nuisance in zip(records, fit.nuisance, strict=True):
-        time = instants(record.time, STEP * plant.smooth_step)
-        angle, velocity = plant.run(fit.parameters, time, record.command, nuisance[: plant.states]).T
-        quantities = {"angle": angle, "velocity": velocity}
-        if plant.driven:
+    found = []
+    for record, time, motion in zip(records, *dense_motion(fit, records), strict=True):
+        quantities = {"angle": motion[:, 0], "velocity": motion[:, 1]}
+        if plant_of(fit).driven:
             quantities["command"] = np.zeros(len(time)) if record.command is None else record.command.at(time)
         quantities |= {"phase": _phase(record, time), "time": time}
         found.append(Stretch(time, quantities))
