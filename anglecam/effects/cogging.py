@@ -2,8 +2,8 @@
 
     θ̈ = c·u − a·θ̇ − b·θ + C·sin(n·θ + ψ)
 
-n is the number of periods in one turn of the body. With less than one period over the range of the motion the torque is
-close to a polynomial in the angle, which a spring has as well.
+n is the number of periods in one turn of the body. With fewer than two periods over the range of the motion nothing
+repeats, and the torque is a curve that a spring can have as well.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter, Values
 from anglecam.effects.seen import Seen, sines_and_cosines
 
-FEWEST, MOST = 1.0, 16.0
+FEWEST, MOST = 2.0, 16.0
 """Periods over the range of the motion between which the residual is searched."""
 PER_PERIOD = 5
 """Numbers that are tried for each period more over the range."""
@@ -50,8 +50,8 @@ def _starts(seen: Seen) -> list[Values]:
 
 
 def _possible(parameters: Values, abc: Values, motion: Values) -> bool:
-    """Return whether a whole period is seen; a part of one is any curved torque."""
-    return parameters[1] * (motion[1] - motion[0]) >= math.tau
+    """Return whether the torque repeats itself within the motion; one period is any curved torque."""
+    return parameters[1] * (motion[1] - motion[0]) >= FEWEST * math.tau
 
 
 EFFECT = Effect(
