@@ -27,8 +27,11 @@ def progress_bars() -> Iterator[Progress]:
 
 
 def end(problems: Sequence[AnglecamError]) -> None:
-    """Print what went wrong, a line each, and leave with the contract's exit status."""
-    for problem in problems:
-        errors.print(str(problem))
+    """Print what went wrong, a line each, and leave with the contract's exit status.
+
+    A fault of a rig file that several clips share is printed once.
+    """
+    for line in dict.fromkeys(line for problem in problems for line in problem.args):
+        errors.print(line)
     if problems:
         raise typer.Exit(2 if any(isinstance(p, RigError) for p in problems) else 1)
