@@ -102,7 +102,7 @@ def _keys(section: type) -> Iterator[tuple[str, Any]]:
     if issubclass(section, BaseModel):
         yield from ((field.alias or name, field.annotation) for name, field in section.model_fields.items())
         yield from ((name, None) for name in getattr(section, "other_names", ()))
-    else:
+    elif dataclasses.is_dataclass(section):
         yield from ((field.name, None) for field in dataclasses.fields(section))
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -143,8 +143,8 @@ class AngleSeries:
         Returns
         -------
         xarray.Dataset
-            ``position`` (time, space, keypoints, individuals), px; angles, their uncertainty and bounds (time), degrees,
-            as the variables' names say; ``time``, s; ``frame`` and ``status`` (time).
+            ``position`` (time, space, keypoints, individuals), px; angles, their uncertainty and bounds (time),
+            degrees, as the variables' names say; ``time``, s; ``frame`` and ``status`` (time).
 
         Raises
         ------
@@ -154,15 +154,18 @@ class AngleSeries:
         n = len(self.time)
         columns = self.columns()
         points = [np.full((n, 2), np.nan) if p is None else p for p in (self.mark_px, self.pivot_px)]
-        over_time = {k: (("time",), v) for k, v in columns.items() if k.endswith("_deg") or k == "status"}
-        keypoints = {"keypoints": (("keypoints",), ["mouth", "pivot"]), "individuals": (("individuals",), ["head"])}
-        time = {"time": (("time",), self.time), "frame": (("time",), columns["frame"])}
-        dataset = xarray_dataset(
-            {"position": (("time", "space", "keypoints", "individuals"), np.stack(points, axis=-1)[..., None])}
-            | over_time,
-            time | {"space": (("space",), ["x", "y"])} | keypoints,
-            {"source_software": "anglecam", "name": self.name},
-        )
+        variables: dict[str, tuple[tuple[str, ...], Any]] = {
+            "position": (("time", "space", "keypoints", "individuals"), np.stack(points, axis=-1)[..., None]),
+            **{k: (("time",), v) for k, v in columns.items() if k.endswith("_deg") or k == "status"},
+        }
+        coordinates: dict[str, tuple[tuple[str, ...], Any]] = {
+            "time": (("time",), self.time),
+            "frame": (("time",), columns["frame"]),
+            "space": (("space",), ["x", "y"]),
+            "keypoints": (("keypoints",), ["mouth", "pivot"]),
+            "individuals": (("individuals",), ["head"]),
+        }
+        dataset = xarray_dataset(variables, coordinates, {"source_software": "anglecam", "name": self.name})
         dataset["position"].attrs["units"] = "pixel"
         return dataset
 

@@ -105,7 +105,7 @@ class Identified:
         }
 
     def to_pandas(self) -> pd.DataFrame:
-        """Return the parameters as a table by ``parameter``: ``value`` and ``sigma``, in the unit that each name ends in.
+        """Return the parameters as a table by name: ``value`` and ``sigma``, in the unit that the name ends in.
 
         Raises
         ------
