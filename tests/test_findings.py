@@ -1,4 +1,4 @@
-"""A wrong file is reported with every wrong key at once, each by its path in the file and with the key that was meant."""
+"""A wrong file is reported with every wrong key at once, by its path in the file and with the key that was meant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A series as pandas, xarray and HTML tables: the numbers and units of its files, and a clear line without the library."""
+"""A series as pandas, xarray and HTML: the numbers and units of its files; without the library, one clear line."""
 
 from __future__ import annotations
 
