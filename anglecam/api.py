@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from anglecam.data.series import AngleSeries
 from anglecam.identification.identified import Identified
-from anglecam.io.rig import Rig
+from anglecam.io.rig import Rig, read_rig
 from anglecam.io.session import read_session
+from anglecam.io.yaml_schema import validate
 from anglecam.loop.verdict import Verdict
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.workflow.clip import measure_source, open_source
 from anglecam.workflow.session import close_session, identify_session, measure_session
 
 
-def measure(clip: str | Path, rig: Rig | None = None) -> AngleSeries:
+def measure(clip: str | Path, rig: Rig | Mapping[str, Any] | str | Path | None = None) -> AngleSeries:
     """Measure the angle in every frame of a clip, or of tracks of points in its place.
 
     Parameters
     ----------
     clip : path
         A film, or tracks from another program. ``rig.yaml`` and ``NAME.command.csv`` in the same folder are read.
-    rig : Rig, optional
-        In place of that ``rig.yaml``.
+    rig : Rig, mapping or path, optional
+        In place of that ``rig.yaml``: a `Rig`, the keys of such a file, or another such file. Angles in it are degrees,
+        as their names say.
 
     Returns
     -------
@@ -35,7 +38,7 @@ def measure(clip: str | Path, rig: Rig | None = None) -> AngleSeries:
     InputError
         Where the clip cannot be measured.
     RigError
-        Where the rig file is wrong.
+        Where the rig or its file is wrong.
 
     Examples
     --------
@@ -47,8 +50,17 @@ def measure(clip: str | Path, rig: Rig | None = None) -> AngleSeries:
     (60, True)
     >>> bool(np.nanmax(series.sigma) < np.radians(0.1))
     True
+    >>> last_second = measure(clip, rig={"frames": {"from": 30}})
+    >>> len(last_second.time)
+    30
     """
-    return measure_source(open_source(Path(clip), rig)).series
+    return measure_source(open_source(Path(clip), _rig(rig))).series
+
+
+def _rig(rig: Rig | Mapping[str, Any] | str | Path | None) -> Rig | None:
+    if rig is None or isinstance(rig, Rig):
+        return rig
+    return validate(dict(rig), Rig, "rig") if isinstance(rig, Mapping) else read_rig(Path(rig))
 
 
 def identify(

@@ -1,4 +1,4 @@
-"""Exceptions for faults in a call or in a file; their text is the one line that the user reads."""
+"""Exceptions for faults in a call or in a file; their text is what the user reads, usually one line."""
 
 from __future__ import annotations
 
@@ -11,11 +11,19 @@ from unicodedata import category
 class AnglecamError(Exception):
     """Base of every failure that the user reads as one line: ``what: how much, what next``.
 
-    The text stays on one line whatever a file's name and content are: see `printable`.
+    A file with several faults has a line for each. No name and no content of a file adds a line: see `printable`.
     """
 
-    def __init__(self, line: str) -> None:
-        super().__init__(printable(line))
+    def __init__(self, *lines: str) -> None:
+        super().__init__(*map(printable, lines))
+
+    def __str__(self) -> str:
+        return "\n".join(self.args)
+
+    @property
+    def one_line(self) -> str:
+        """All lines as one, for a cell of a table."""
+        return "; ".join(self.args)
 
 
 class RigError(AnglecamError):

@@ -66,7 +66,7 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
             except OSError as problem:
                 return found | {"cause": cannot_write(problem), "call_is_wrong": False, "transient": True}
     except AnglecamError as problem:
-        found |= {"cause": str(problem), "call_is_wrong": isinstance(problem, RigError), "transient": False}
+        found |= {"cause": problem.one_line, "call_is_wrong": isinstance(problem, RigError), "transient": False}
     return found
 
 
@@ -110,8 +110,8 @@ def fit(request: dict[str, Any]) -> dict[str, Any]:
             else:
                 write_identified(measured, into)
     except AnglecamError as problem:
-        return {"cause": str(problem), "call_is_wrong": isinstance(problem, RigError), "problems": []}
-    return {"verdict": verdict, "effects": effects, "problems": [str(problem) for problem in measured.problems]}
+        return {"cause": problem.one_line, "call_is_wrong": isinstance(problem, RigError), "problems": []}
+    return {"verdict": verdict, "effects": effects, "problems": [problem.one_line for problem in measured.problems]}
 
 
 def _figures(measurement: Measurement | MeasuredTracks) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from anglecam.batch.address import fetch, join, name, names_in, parent
 from anglecam.batch.identity import calibration_named
 from anglecam.batch.lock import is_current
 from anglecam.batch.output_folder import OutputFolder
-from anglecam.errors import RigError, printable
+from anglecam.errors import AnglecamError, RigError, printable
 
 _MIN_TIME_LIMIT_S = 600.0
 _TIME_LIMIT_S_PER_BYTE = 1e-5
@@ -66,7 +66,9 @@ def clip_time_limit(size_bytes: int, settings: Settings) -> float:
 
 def message_of(problem: Exception | str, address: str, workspace: Path) -> str:
     """Return a problem's message without the address, which the reader knows, and without temporary folders."""
-    text = str(problem).replace(str(_fetched_folder(workspace, address)), parent(address).rstrip("/"))
+    text = (problem.one_line if isinstance(problem, AnglecamError) else str(problem)).replace(
+        str(_fetched_folder(workspace, address)), parent(address).rstrip("/")
+    )
     return printable(text.removeprefix(f"{address}: "))
 
 

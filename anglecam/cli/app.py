@@ -16,7 +16,9 @@ import typer
 from anglecam import __version__
 from anglecam.cli.batch import batch
 from anglecam.cli.clips import budget, calibrate, measure
+from anglecam.cli.doctor import doctor
 from anglecam.cli.estimator_option import EstimatorCommand
+from anglecam.cli.json_output import with_json
 from anglecam.cli.live import live
 from anglecam.cli.neck import app as neck
 from anglecam.cli.sessions import close, identify
@@ -27,7 +29,6 @@ app = typer.Typer(
     name="anglecam",
     help="From clips of a moving mechanism to its angle, its model, and what the model lacks.",
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -49,8 +50,8 @@ def _anglecam(
 
 
 app.add_typer(neck, name="neck")
-for _command in (measure, live, budget, calibrate, identify, close, batch):
-    app.command(cls=EstimatorCommand if _command is identify else None)(_command)
+for _command in (measure, live, budget, calibrate, identify, close, batch, doctor):
+    app.command(cls=EstimatorCommand if _command is identify else None)(with_json(_command))
 
 
 def main() -> None:

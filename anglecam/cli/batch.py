@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from anglecam.cli.json_output import report
 from anglecam.errors import RigError
 from anglecam.terminal import errors, screen
 from anglecam.threads import cores
@@ -68,6 +70,11 @@ def batch(
         named = (f"{counts[status]} {status}" for status in (OK, TRUNCATED, DOUBTFUL, FAILED) if counts[status])
         summary = ", ".join(named)
         screen.print(f"{len(result.rows)} clips{': ' if summary else ''}{summary}; {out / 'index.csv'}", soft_wrap=True)
+    report(
+        clips=[asdict(row) for row in result.rows],
+        index=str(out / "index.csv"),
+        problems=[problem.one_line for problem in result.problems],
+    )
     for problem in result.problems:
         errors.print(str(problem))
     if result.problems:

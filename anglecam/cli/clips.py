@@ -11,12 +11,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from anglecam.cli.documents import calibration_as_dict, clip_as_dict
+from anglecam.cli.json_output import report
 from anglecam.cli.options import FirstFrame, LastFrame, Out, RigFile
 from anglecam.cli.progress import end, progress_bars
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.io.netcdf_parquet import Also
 from anglecam.io.rig import Rig, RigFrames, read_rig
-from anglecam.io.session import find_clips, find_measurable, is_film_of_images, recording_name, rig_beside
+from anglecam.io.session import (
+    SERIES_ENDING,
+    find_clips,
+    find_measurable,
+    is_film_of_images,
+    recording_name,
+    rig_beside,
+)
 from anglecam.io.tracks.files import tracker_names
 from anglecam.terminal import errors, make_folder, screen
 
@@ -43,6 +52,7 @@ def measure(
     ] = None,
 ) -> None:
     """Measure the angle in every frame: NAME.angles.csv and a plot for each clip, and its response to every change."""
+    from anglecam.measurement.step_response import responses_as_dicts
     from anglecam.report.clip_tables import response_table, series_table
     from anglecam.workflow.clip import open_source, write_clip_overlay, write_measurement
 
@@ -63,6 +73,8 @@ def measure(
         if overlay:
             write_clip_overlay(source, measurement, out)
         measured.append(measurement)
+        written = {"series": str(out / f"{name}{SERIES_ENDING}"), "responses": responses_as_dicts(answers)}
+        report(clips=[clip_as_dict(clip, measurement) | written])
         return measurement
 
     problems = _for_each(clips, out, lambda folder: _clips_and_tracks(folder, declared), measure_one)
@@ -81,6 +93,7 @@ def budget(
     last: LastFrame = None,
 ) -> None:
     """Write the budget of the angle's uncertainty: NAME.budget.json and a page for each clip."""
+    from anglecam.budget.clip import budget_as_dict
     from anglecam.measurement.clip import Measurement
     from anglecam.report.budget_page import budget_table, write_budget
     from anglecam.workflow.clip import open_source
@@ -93,7 +106,9 @@ def budget(
             raise InputError(f"{clip}: a budget needs the pictures; give the clip")
         measurement = _measure(source, bars)
         assert isinstance(measurement, Measurement)
-        screen.print(budget_table(write_budget(source.film, measurement, source.rig, out)))
+        found = write_budget(source.film, measurement, source.rig, out)
+        screen.print(budget_table(found))
+        report(budgets=[budget_as_dict(found)])
         return measurement
 
     end(_for_each(clips, out, find_clips, budget_one))
@@ -119,10 +134,12 @@ def calibrate(
         # the times of photographs of the board do not matter
         film = open_film(clip, RigFrames(rate_hz=1.0) if clip.is_dir() else None)
         found = calibrate_clip(film, (columns, rows))
-    write_calibration(found.calibration, out / f"{clip.stem}.calibration.yaml")
+    path = out / f"{clip.stem}.calibration.yaml"
+    write_calibration(found.calibration, path)
+    report(calibration=calibration_as_dict(path, found))
     plot_calibration(found, out / f"{clip.stem}.calibration.png", clip.name)
     terms = ", ".join(found.terms) or "no distortion"
-    screen.print(f"{out / clip.stem}.calibration.yaml: {len(found.views)} views, {terms}", soft_wrap=True)
+    screen.print(f"{path}: {len(found.views)} views, {terms}", soft_wrap=True)
     for note in found.notes:
         errors.print(printable(note))
 

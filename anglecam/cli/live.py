@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
+from anglecam.cli.documents import clip_as_dict, live_as_dict
+from anglecam.cli.json_output import report
 from anglecam.cli.options import Out
 from anglecam.cli.progress import end, progress_bars
 from anglecam.data.series import OK
@@ -75,7 +77,8 @@ def live(
     except AnglecamError as problem:
         end([problem])
         return
-    _report(result)
+    _show(result)
+    report(live=live_as_dict(result), clips=[clip_as_dict(result.film, result.measurement)])
     doubt = result.measurement.doubt
     end([InputError(f"{result.film}: {doubt}")] if doubt else [])
 
@@ -156,7 +159,7 @@ def _copy(file: Path, kept: Path) -> None:
         shutil.copyfile(file, kept)
 
 
-def _report(result: LiveResult) -> None:
+def _show(result: LiveResult) -> None:
     """Print what was recorded and measured."""
     from anglecam.report.clip_tables import series_table
 

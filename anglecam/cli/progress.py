@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
+from anglecam.cli.json_output import report
 from anglecam.errors import AnglecamError, RigError
 from anglecam.terminal import errors
 
@@ -27,8 +28,13 @@ def progress_bars() -> Iterator[Progress]:
 
 
 def end(problems: Sequence[AnglecamError]) -> None:
-    """Print what went wrong, a line each, and leave with the contract's exit status."""
-    for problem in problems:
-        errors.print(str(problem))
+    """Print what went wrong, a line each, and leave with the contract's exit status.
+
+    A fault of a rig file that several clips share is printed once.
+    """
+    lines = list(dict.fromkeys(line for problem in problems for line in problem.args))
+    for line in lines:
+        errors.print(line)
+    report(problems=lines)
     if problems:
         raise typer.Exit(2 if any(isinstance(p, RigError) for p in problems) else 1)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from anglecam.cli.json_output import report, report_file
 from anglecam.cli.options import Out, SessionFolder
 from anglecam.cli.progress import end, progress_bars
 from anglecam.errors import InputError, RigError, printable
@@ -44,6 +45,8 @@ def identify(
     measured = _measure(read_session(session), out)
     model = write_identified(measured, out, estimator, declared)
     screen.print(model_table([model]))
+    report_file("model", out / "model.json")
+    report(doubts=list(model.doubts), notes=list(measured.notes))
     for doubt in model.doubts:
         screen.print(doubt, soft_wrap=True, highlight=False, markup=False)
     if takes_neck and neck is None:
@@ -82,6 +85,8 @@ def close(
             progress=lambda stage: bars.update(bar, description=stage),
         )
         bars.update(bar, description="done", completed=1, total=1)
+    report_file("loop", out / "loop.json")
+    report(report=str(out / REPORT) if (out / REPORT).exists() else None, notes=list(measured.notes))
     screen.print(model_table(closed.models))
     screen.print(loop_table(closed.verdict, closed.experiment))
     for line in closed.missing:
@@ -108,5 +113,6 @@ def _measure(opened: Session, out: Path) -> MeasuredSession:
     if not measured.records:
         for problem in measured.problems:
             errors.print(str(problem))
+            report(problems=list(problem.args))
         raise InputError(f"{opened.directory}: no recording can be used")
     return measured

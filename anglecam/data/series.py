@@ -5,19 +5,41 @@ Angles are radians, and a frame that could not be measured is NaN. `anglecam.io.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.camera_evidence import NO_EVIDENCE, CameraEvidence
+from anglecam.data.tables import html_curve, html_table, pandas_table, xarray_dataset
 from anglecam.data.typing import Floats
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
 
 OK = "ok"
 STATUSES = (OK, "no_mouth", "occluded", "ambiguous", "no_pivot", "duplicate", "undecodable")
 """``ok``, or the reason why a frame has no angle."""
 CONTRACT_RADII_PX = (6.0, 10.0)
 """Radii of the paper's worst-case mark errors, px; every series file has a column for each."""
+SERIES_COLUMNS = (
+    "frame",
+    "time_s",
+    "angle_deg",
+    "sigma_deg",
+    "bound_6px_deg",
+    "bound_10px_deg",
+    "line_deg",
+    "mouth_x_px",
+    "mouth_y_px",
+    "pivot_x_px",
+    "pivot_y_px",
+    "status",
+)
+"""Columns of a series as a table, in order."""
 
 
 @dataclass(frozen=True)
@@ -67,3 +89,97 @@ class AngleSeries:
     def ok(self) -> NDArray[np.bool_]:
         """(n,) whether the angle of each frame is measured."""
         return np.array([s == OK for s in self.status])
+
+    def columns(self) -> dict[str, NDArray]:
+        """Return the series as the columns of its file, in order: degrees, pixels, NaN for an empty cell.
+
+        Returns
+        -------
+        dict of str to ndarray
+            (n,) values by name. Radii of ``bounds`` other than 6 px and 10 px become columns after ``status``.
+        """
+        n = len(self.time)
+        empty = np.full((n, 2), np.nan)
+        mark = empty if self.mark_px is None else self.mark_px
+        pivot = empty if self.pivot_px is None else self.pivot_px
+        line = empty[:, 0] if self.line is None else self.line
+        further = sorted(set(self.bounds) - set(CONTRACT_RADII_PX))
+        bounds = {r: np.degrees(self.bounds.get(r, empty[:, 0])) for r in (*CONTRACT_RADII_PX, *further)}
+        angle, sigma = np.degrees(self.angle), np.degrees(self.sigma)
+        contract_bounds = [bounds[r] for r in CONTRACT_RADII_PX]
+        frame = np.arange(n) + self.first_frame
+        cells = [frame, self.time, angle, sigma, *contract_bounds, np.degrees(line), *mark.T, *pivot.T]
+        columns = dict(zip(SERIES_COLUMNS, [*cells, np.array(self.status, dtype=str)], strict=True))
+        return columns | {f"bound_{r:g}px_deg": bounds[r] for r in further}
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the series as a table: the columns of ``NAME.angles.csv``, not rounded, by ``frame``.
+
+        Returns
+        -------
+        pandas.DataFrame
+            n rows; angles are degrees, as the columns' names say.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> angle = np.radians([0.0, 1.5])
+        >>> AngleSeries("swing", np.array([0.0, 0.1]), angle, angle, ("ok", "ok")).to_pandas()[["time_s", "angle_deg"]]
+               time_s  angle_deg
+        frame
+        0         0.0        0.0
+        1         0.1        1.5
+        """
+        return pandas_table(self.columns(), "frame")
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the series as a dataset with the variables of ``NAME.angles.nc``: poses as `movement` holds them.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``position`` (time, space, keypoints, individuals), px; angles, their uncertainty and bounds (time),
+            degrees, as the variables' names say; ``time``, s; ``frame`` and ``status`` (time).
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+        """
+        n = len(self.time)
+        columns = self.columns()
+        points = [np.full((n, 2), np.nan) if p is None else p for p in (self.mark_px, self.pivot_px)]
+        variables: dict[str, tuple[tuple[str, ...], Any]] = {
+            "position": (("time", "space", "keypoints", "individuals"), np.stack(points, axis=-1)[..., None]),
+            **{k: (("time",), v) for k, v in columns.items() if k.endswith("_deg") or k == "status"},
+        }
+        coordinates: dict[str, tuple[tuple[str, ...], Any]] = {
+            "time": (("time",), self.time),
+            "frame": (("time",), columns["frame"]),
+            "space": (("space",), ["x", "y"]),
+            "keypoints": (("keypoints",), ["mouth", "pivot"]),
+            "individuals": (("individuals",), ["head"]),
+        }
+        dataset = xarray_dataset(variables, coordinates, {"source_software": "anglecam", "name": self.name})
+        dataset["position"].attrs["units"] = "pixel"
+        return dataset
+
+    def _repr_html_(self) -> str:
+        """Return a summary and the curve of the angle, for notebooks."""
+        ok = self.ok
+        causes = ", ".join(f"{count} {cause}" for cause, count in Counter(self.status).items() if cause != OK)
+        rows = [["frames measured", f"{ok.sum()} of {len(ok)}" + (f" ({causes})" if causes else "")]]
+        if ok.any():
+            angle, seconds = np.degrees(self.angle[ok]), self.time[-1] - self.time[0]
+            sigma = np.degrees(np.median(self.sigma[ok]))
+            rows += [
+                ["duration", f"{seconds:.3f} s"],
+                ["angle", f"{angle.min():.2f}° … {angle.max():.2f}°"],
+                ["median standard uncertainty", f"{sigma:.2g}°" if np.isfinite(sigma) else "not stated"],
+            ]
+        return html_table(self.name, ["", ""], rows) + html_curve(self.time, self.angle, "angle over time")

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from anglecam.data.record import Record
 from anglecam.data.step_figures import StepFigures
+from anglecam.data.tables import html_table, pandas_table, xarray_dataset
 from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit
 from anglecam.identification.multiple_shooting import loses_step, rms_motion
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
 
 DOUBTFUL_RESIDUAL = 3.0
 """Multiple of the angle's stated uncertainty; a model with a larger RMS residual lacks something, so that the stated
@@ -98,3 +103,57 @@ class Identified:
             },
             "residual_correlation": self.fit.residual_phi,
         }
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return the parameters as a table by name: ``value`` and ``sigma``, in the unit that the name ends in.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        return pandas_table({"parameter": self.names, "value": self.values, "sigma": self.sigmas}, "parameter")
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the parameters as a dataset, with their covariance.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``value`` and ``sigma`` (parameter), ``covariance`` (parameter, other), in the units that the names end in;
+            the errors in free run as attributes, degrees.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+        """
+        return xarray_dataset(
+            {
+                "value": (("parameter",), self.values),
+                "sigma": (("parameter",), self.sigmas),
+                "covariance": (("parameter", "other"), self.covariance),
+            },
+            {"parameter": (("parameter",), list(self.names)), "other": (("other",), list(self.names))},
+            {"estimator": self.estimator} | {f"rmse_{key}_deg": value for key, value in self._rmse_deg.items()},
+        )
+
+    def _repr_html_(self) -> str:
+        """Return parameters and errors for notebooks."""
+        pairs = zip(self.names, self.values, self.sigmas, strict=True)
+        rows = [
+            [name, f"{value:.5g}", f"{sigma:.2g}" if np.isfinite(sigma) else "none"] for name, value, sigma in pairs
+        ]
+        errors = [
+            [f"error in free run, {key.replace('_', ' ')}", f"{rmse:.4g}° RMS", ""]
+            for key, rmse in self._rmse_deg.items()
+        ]
+        doubts = [["mind", doubt, ""] for doubt in self.doubts]
+        header = ["parameter", "value", "standard uncertainty"]
+        return html_table(f"model by {self.estimator}", header, [*rows, *errors, *doubts])
+
+    @property
+    def _rmse_deg(self) -> dict[str, float]:
+        """RMS errors in free run, degrees; ``held_out`` only where recordings are held out."""
+        errors = {"fit": self.fit.rmse} | ({} if self.held_out is None else {"held_out": self.held_out.rmse})
+        return {key: float(np.degrees(rmse)) for key, rmse in errors.items()}

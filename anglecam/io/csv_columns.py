@@ -11,26 +11,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.data.series import STATUSES
+from anglecam.data.series import SERIES_COLUMNS, STATUSES
 from anglecam.data.typing import Floats
 from anglecam.errors import InputError
 from anglecam.io.files import open_text
 
-SERIES_COLUMNS = (
-    "frame",
-    "time_s",
-    "angle_deg",
-    "sigma_deg",
-    "bound_6px_deg",
-    "bound_10px_deg",
-    "line_deg",
-    "mouth_x_px",
-    "mouth_y_px",
-    "pivot_x_px",
-    "pivot_y_px",
-    "status",
-)
-"""Columns of ``NAME.angles.csv``, in order."""
 _MOST_BYTES = 256 * 2**20
 """Size above which a file is not read."""
 _MOST_ROWS = 1_000_000

@@ -22,12 +22,10 @@ from numpy.typing import NDArray
 from anglecam import __version__
 from anglecam.data.camera_evidence import CameraEvidence
 from anglecam.data.series import AngleSeries
+from anglecam.data.tables import UNITS
 from anglecam.errors import InputError, printable
 from anglecam.io.files import write_whole
-from anglecam.io.series_csv import series_columns
 
-UNITS = {"s": "s", "deg": "degree", "px": "pixel"}
-"""Units by the last part of a column's name."""
 GROUP = "anglecam"
 """Group of the netCDF file that holds the fields of the series unrounded."""
 
@@ -75,7 +73,7 @@ def write_netcdf(series: AngleSeries, path: Path) -> None:
     """
     import h5netcdf
 
-    columns = series_columns(series)
+    columns = series.columns()
     n = len(series.time)
     with write_whole(path) as unfinished, h5netcdf.File(unfinished, "w") as file:
         file.dimensions = {"time": n, "space": 2, "keypoints": 2, "individuals": 1}
@@ -207,7 +205,7 @@ def write_parquet(series: AngleSeries, path: Path) -> None:
     from pyarrow import parquet
 
     schema, arrays = [], []
-    for name, values in series_columns(series).items():
+    for name, values in series.columns().items():
         unit = UNITS.get(name.rpartition("_")[2])
         array = pa.array(values, from_pandas=True)  # NaN becomes null
         schema.append(pa.field(name, array.type, metadata=None if unit is None else {"unit": unit}))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -179,6 +179,8 @@ class Rig(Declared):
     True
     """
 
+    other_names: ClassVar = {"mark": "mouth"}
+    """Keys that are accepted for others."""
     mouth: RigMark | Literal["auto"] = "auto"
     """The mark, also called ``mark`` in the file; ``auto``: it is found from the clip."""
     pivot: RigPivot = RigPivot()
@@ -243,8 +245,8 @@ def read_rig(path: Path) -> Rig:
     Raises
     ------
     RigError
-        If the file cannot be read, a key is unknown or a value is not allowed; the line names the file, the key and
-        the cause.
+        If the file cannot be read, a key is unknown or a value is not allowed; a line for each such key names the
+        file, the key and the cause.
 
     Examples
     --------

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.data.series import CONTRACT_RADII_PX, OK, STATUSES, AngleSeries
+from anglecam.data.series import OK, STATUSES, AngleSeries
 from anglecam.errors import InputError
-from anglecam.io.csv_columns import SERIES_COLUMNS, read_columns, require_increasing
+from anglecam.io.csv_columns import read_columns, require_increasing
 from anglecam.io.files import write_atomically
 
 
@@ -29,40 +29,12 @@ def write_series(series: AngleSeries, path: Path) -> None:
     path : Path
         The file; it is written whole or not at all.
     """
-    columns = series_columns(series)
+    columns = series.columns()
     with write_atomically(path) as stream:
         rows = csv.writer(stream, lineterminator="\n")
         rows.writerow(columns)
         for cells in zip(*columns.values(), strict=True):
             rows.writerow([_cell(name, cell) for name, cell in zip(columns, cells, strict=True)])
-
-
-def series_columns(series: AngleSeries) -> dict[str, NDArray]:
-    """Return a series as the columns of its file, in order: degrees, pixels, NaN for an empty cell.
-
-    Parameters
-    ----------
-    series : AngleSeries
-        The recording. Radii of ``series.bounds`` other than 6 px and 10 px become columns after ``status``.
-
-    Returns
-    -------
-    dict of str to ndarray
-        Columns by name, each of length n.
-    """
-    n = len(series.time)
-    empty = np.full((n, 2), np.nan)
-    mark = empty if series.mark_px is None else series.mark_px
-    pivot = empty if series.pivot_px is None else series.pivot_px
-    line = empty[:, 0] if series.line is None else series.line
-    further = sorted(set(series.bounds) - set(CONTRACT_RADII_PX))
-    bounds = {r: np.degrees(series.bounds.get(r, empty[:, 0])) for r in (*CONTRACT_RADII_PX, *further)}
-    angle, sigma = np.degrees(series.angle), np.degrees(series.sigma)
-    contract_bounds = [bounds[r] for r in CONTRACT_RADII_PX]
-    frame = np.arange(n) + series.first_frame
-    cells = [frame, series.time, angle, sigma, *contract_bounds, np.degrees(line), *mark.T, *pivot.T]
-    columns = dict(zip(SERIES_COLUMNS, [*cells, np.array(series.status, dtype=str)], strict=True))
-    return columns | {f"bound_{r:g}px_deg": bounds[r] for r in further}
 
 
 def read_series(path: Path) -> AngleSeries:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from anglecam.errors import RigError
+from anglecam.findings import finding_lines
 from anglecam.io.files import read_text
 
 _MOST_BYTES = 256 * 1024
@@ -58,7 +60,8 @@ def read_declared(path: Path, kind: type[Section]) -> Section:
     Raises
     ------
     RigError
-        If the file cannot be read or its content is not valid; the line names the file, the key and the cause.
+        If the file cannot be read or its content is not valid. There is a line for each wrong key: the file, the key
+        and the cause.
     """
     try:
         text = read_text(path, _MOST_BYTES)
@@ -77,10 +80,35 @@ def read_declared(path: Path, kind: type[Section]) -> Section:
         return kind()
     if not isinstance(content, dict):
         raise RigError(f"{path}: expected keys and values, found a {type(content).__name__}")
+    return validate(content, kind, str(path))
+
+
+def validate(content: Mapping[str, Any], kind: type[Section], name: str) -> Section:
+    """Return declarations as an object of ``kind``.
+
+    Parameters
+    ----------
+    content : mapping
+        Keys and values.
+    kind : type
+        The class that they are validated against.
+    name : str
+        The file, or whatever they come from, as errors name it.
+
+    Returns
+    -------
+    Declared
+        What is declared; the defaults for everything else.
+
+    Raises
+    ------
+    RigError
+        If a key is unknown or a value is not allowed, with a line for each such key.
+    """
     try:
         return kind.model_validate(content)
     except ValidationError as error:
-        raise RigError(f"{path}: {_first(error)}") from error
+        raise RigError(*(f"{name}: {line}" for line in finding_lines(error, kind))) from error
 
 
 def _require_plain(path: Path, text: str) -> None:
@@ -101,25 +129,3 @@ def _require_plain(path: Path, text: str) -> None:
         if fault:
             line = "" if event.start_mark is None else f"line {event.start_mark.line + 1}: "
             raise RigError(f"{path}: {line}{fault}; only plain keys and values are read")
-
-
-def _first(error: ValidationError) -> str:
-    """Return pydantic's most informative finding as one line: an unknown key if there is one, else the first."""
-    findings = error.errors()
-    unknown = [f for f in findings if f["type"] == "extra_forbidden"]
-    finding = (unknown or findings)[0]
-    types = {"literal['auto']", "float", *(section.__name__ for section in Declared.__subclasses__())}
-    # Of a union, pydantic adds the type, and its validators' names.
-    path = (str(part) for part in finding["loc"] if part not in types)
-    key = ".".join(part[:60] for part in path if not part.startswith("function-"))
-    if unknown:
-        return f"unknown key {key}"
-    cause = finding["msg"].removeprefix("Value error, ").replace("tuple", "list")
-    got = "" if finding["type"] == "value_error" else f" (got {_shown(finding['input'])})"
-    return f"{key}: {cause[0].lower()}{cause[1:]}{got}"
-
-
-def _shown(value: object) -> str:
-    if isinstance(value, int) and value.bit_length() > 200:  # Python refuses to write out very long numbers
-        return f"a number of {value.bit_length()} bits"
-    return str(value)[:60]

@@ -11,7 +11,6 @@ import numpy as np
 from anglecam.data.record import Record
 from anglecam.effects import Effect, Parameter, effect
 from anglecam.identification.output_error import predict_output_error
-from anglecam.identification.systematic import full_sigma
 from anglecam.loop.candidates import Candidate
 from anglecam.loop.cross_validation import predict_held_out
 from anglecam.loop.free_form.result import FreeForm
@@ -172,15 +171,4 @@ def _held_out_error(candidate: Candidate, verdict: Verdict) -> float:
 
 def fitted_parameters(verdict: Verdict) -> dict[str, dict[str, float]]:
     """Return each parameter of the final model by name: ``value`` and ``sigma``, in the unit that its name states."""
-    fit = verdict.after
-    added = [p for a in verdict.accepted for p in a.effect.parameters]
-    base = len(fit.parameters) - len(added)
-    sigma = full_sigma(fit, verdict.fitted, verdict.noise)
-    pairs = list(zip(fit.parameters.tolist(), sigma.tolist(), strict=True))
-    # a larger uncertainty than the range between the bounds means that the recordings do not determine the parameter,
-    # for instance the asymmetry of a friction that hardly acts
-    effect_pairs = [
-        (value, s if s < p.upper - p.lower else np.nan) for p, (value, s) in zip(added, pairs[base:], strict=True)
-    ]
-    stated = pairs[:base] + [p.in_file_unit(*pair) for p, pair in zip(added, effect_pairs, strict=True)]
-    return {name: {"value": value, "sigma": s} for name, (value, s) in zip(fit.model.names, stated, strict=True)}
+    return verdict.parameters

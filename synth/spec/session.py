@@ -13,6 +13,8 @@ from typing import Annotated, Any
 import yaml
 from pydantic import Field, ValidationError, model_validator
 
+from anglecam.errors import printable
+from anglecam.findings import finding_lines
 from synth.errors import SpecError
 from synth.section import Section
 from synth.spec.commands import Command, Nod
@@ -94,7 +96,7 @@ def read_spec(path: Path) -> Spec:
     Raises
     ------
     SpecError
-        If the spec is wrong; one line with the file, the key and the cause.
+        If the spec is wrong: the file, the key and the cause, with a line for each wrong key.
     """
     try:
         content = yaml.load(path.read_text(encoding="utf-8"), _EveryKeyOnce)
@@ -111,38 +113,4 @@ def read_spec(path: Path) -> Spec:
     try:
         return Spec.model_validate(content)
     except ValidationError as error:
-        raise SpecError(f"{path}: {_first_finding(error)}") from error
-
-
-_UNKNOWN = {"extra_forbidden", "unexpected_keyword_argument"}
-
-
-_TAGS = {
-    "plant": {"linear", "neck"},
-    "command": {"step", "stairs", "paper_series", "triangle", "chirp", "release", "random", "free", "nod"},
-}
-"""Tags that pydantic inserts after a key to state which of several kinds was validated."""
-
-
-def _first_finding(error: ValidationError) -> str:
-    """Format the most specific finding as one line: an unknown key, as it causes other findings, else the deepest."""
-    findings = error.errors()
-    unknown = [finding for finding in findings if finding["type"] in _UNKNOWN]
-    finding = unknown[0] if unknown else max(findings, key=lambda finding: len(finding["loc"]))
-    where = [str(part) for part in finding["loc"]]
-    key = ".".join(
-        part
-        for at, part in enumerate(where)
-        if "[" not in part and not (at and part in _TAGS.get(where[at - 1], ()))  # tags are not keys of the file
-    )
-    if unknown:
-        return f"unknown key {key}"
-    if finding["type"] == "union_tag_invalid":
-        return f"{key}.kind: should be {finding['ctx']['expected_tags']} (got {finding['ctx']['tag']})"
-    message = finding["msg"].removeprefix("Value error, ")
-    got = (
-        ""
-        if finding["type"] in {"missing", "value_error"}
-        else f" (got {' '.join(repr(finding['input']).split())[:60]})"
-    )
-    return f"{key + ': ' if key else ''}{message[0].lower()}{message[1:]}{got}"
+        raise SpecError("\n".join(printable(f"{path}: {line}") for line in finding_lines(error, Spec))) from error

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from anglecam.cli.app import main
+from anglecam.data.series import SERIES_COLUMNS as COLUMNS
 from anglecam.data.series import AngleSeries
-from anglecam.io.csv_columns import SERIES_COLUMNS as COLUMNS
 from anglecam.io.series_csv import write_series
 from support import broken
 from support.drawn import Look, Plant, Recording, draw_session

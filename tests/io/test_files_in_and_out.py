@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from anglecam.data.command import Command
+from anglecam.data.series import SERIES_COLUMNS as COLUMNS
 from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError, RigError
 from anglecam.io.command_csv import read_command
-from anglecam.io.csv_columns import SERIES_COLUMNS as COLUMNS
 from anglecam.io.rig import Rig, RigKeypoints, read_rig
 from anglecam.io.series_csv import read_series, write_series
 from anglecam.io.session import find_measurable, read_session

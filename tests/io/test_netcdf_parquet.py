@@ -13,9 +13,9 @@ from pyarrow import parquet
 
 from anglecam.cli import app as cli
 from anglecam.data.camera_evidence import CameraEvidence
+from anglecam.data.series import SERIES_COLUMNS as COLUMNS
 from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError
-from anglecam.io.csv_columns import SERIES_COLUMNS as COLUMNS
 from anglecam.io.netcdf_parquet import GROUP, Also, read_netcdf, write_also, write_netcdf, write_parquet
 from anglecam.io.series_csv import read_series, write_series
 from support.tracked import nod, write_sleap

@@ -15,8 +15,8 @@ import pytest
 import anglecam
 from anglecam.cli import app as cli
 from anglecam.data.command import Command
+from anglecam.data.series import SERIES_COLUMNS as COLUMNS
 from anglecam.errors import InputError, RigError
-from anglecam.io.csv_columns import SERIES_COLUMNS as COLUMNS
 from anglecam.io.rig import Rig, RigCamera, RigKeypoints
 from anglecam.io.session import read_session, recording_name
 from anglecam.measurement.tracks import measure_tracks
