@@ -15,6 +15,7 @@ import typer
 
 from anglecam import __version__
 from anglecam.cli.batch import batch
+from anglecam.cli.check import check
 from anglecam.cli.clips import budget, calibrate, measure
 from anglecam.cli.doctor import doctor
 from anglecam.cli.estimator_option import EstimatorCommand
@@ -50,7 +51,7 @@ def _anglecam(
 
 
 app.add_typer(neck, name="neck")
-for _command in (measure, live, budget, calibrate, identify, close, batch, doctor):
+for _command in (check, measure, live, budget, calibrate, identify, close, batch, doctor):
     app.command(cls=EstimatorCommand if _command is identify else None)(with_json(_command))
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from anglecam.data.record import Record
 from anglecam.errors import InputError
+from anglecam.identification.clocks import Clocks
 from anglecam.identification.export import fitted_model, transfer_as_dict, write_mat
 from anglecam.identification.identified import Identified
 from anglecam.identification.identify_records import identify_records
@@ -20,11 +21,13 @@ from anglecam.loop.camera_correction import correct_camera_effects
 from anglecam.loop.close import with_free_form
 from anglecam.loop.cross_validation import split_records
 from anglecam.loop.next_experiment.design import Experiment
+from anglecam.loop.refit import plant_of
 from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import NEXT_COMMAND, next_experiment, verdict_as_dict, write_next_command
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.report.page import write_report
 from anglecam.terminal import make_folder
+from anglecam.workflow.clock import session_clocks
 from anglecam.workflow.session import LoopInput, MeasuredSession, close_session, identify_session
 from anglecam.workflow.side_products import attempt
 
@@ -62,6 +65,7 @@ def write_identified(
         The model.
     """
     model = identify_session(measured, estimator, neck=neck)
+    model = replace(model, clock=session_clocks(measured, model.fitted))
     _write_model(model, out, "model")
     return model
 
@@ -99,9 +103,11 @@ def write_closed(
     verdict = attempt("free form", partial(with_free_form, verdict), missing) or verdict
     progress("extended Kalman filter")
     models = []
-    for estimator, name in (("ekf", "ekf"), ("oe2", "model")):
+    effects = plant_of(verdict.after).effects
+    clock = attempt("the clocks", lambda: session_clocks(measured, fitted, effects), missing)
+    for estimator, name, clocks in (("ekf", "ekf", None), ("oe2", "model", clock)):
         model = attempt(
-            f"{name}.json", partial(_identify, fitted, held_out, session.rig, estimator, out, name), missing
+            f"{name}.json", partial(_identify, fitted, held_out, session.rig, estimator, out, name, clocks), missing
         )
         models += [] if model is None else [model]
     progress("report")
@@ -122,12 +128,18 @@ def write_closed(
 
 
 def _identify(
-    fitted: Sequence[Record], held_out: Sequence[Record], rig: Rig, estimator: str, out: Path, name: str
+    fitted: Sequence[Record],
+    held_out: Sequence[Record],
+    rig: Rig,
+    estimator: str,
+    out: Path,
+    name: str,
+    clock: Clocks | None,
 ) -> Identified:
     """Fit a model and write it; delete an older one first."""
     for ending in (".json", ".mat"):
         (out / f"{name}{ending}").unlink(missing_ok=True)
-    model = identify_records(fitted, rig, estimator, held_out=held_out)
+    model = replace(identify_records(fitted, rig, estimator, held_out=held_out), clock=clock)
     _write_model(model, out, name)
     return model
 

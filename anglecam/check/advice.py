@@ -1,0 +1,178 @@
+"""What would make the angle surer, each change with a factor on sigma.
+
+A position error e turns the line by e/R, with the lever R in pixels. The error of an edge by noise is
+
+    e ∝ n·√w / (C·√N)       noise n, contrast C (grey levels), width w of the edge, N pixels along it
+
+so nearing the camera z times divides the angle's error by z^1.5: R grows by z, and N by z. A body of which the largest
+possible number of tiles is compared shows no more edge pixels, and gains z. Shot noise falls relative to the contrast as
+the square root of the light. Errors of codec and pixel grid have a size in pixels. Pivot and zero are measured in the
+same pictures and follow the mixture of both.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anglecam.camera.shutter import blur_error, mean_off_middle
+from anglecam.check.sigma_terms import SigmaTerms
+from anglecam.data.typing import Floats
+from anglecam.io.rig import Rig
+from anglecam.measurement.clip import Measurement
+
+ROUNDING = 1.0 / math.sqrt(12.0)
+"""Noise of rounding to whole grey levels, which no light lowers."""
+LIGHT = 2.0
+MOST_NEARER, LEAST_NEARER = 4.0, 1.1
+FILLED = 0.9
+"""Share of the picture that mark, path and pivot may fill."""
+ALL_TILES = 40
+"""Tiles of a body at most."""
+BEST_CONTRAST = 200.0
+"""Contrast of a mark that stands out as far as a picture of 255 grey levels allows, grey levels."""
+LOSSLESS = ("ffv1", "rawvideo", "huffyuv", "ffvhuff", "utvideo", "png", "bmp", "tiff")
+WORTH_SAYING = 0.97
+"""Factor from which on a change is no help."""
+
+
+@dataclass(frozen=True)
+class Advice:
+    """One change and what it would bring."""
+
+    change: str
+    """Short name, as in the file."""
+    text: str
+    """What to do."""
+    sigma_factor: float
+    """Sigma of a frame after the change, divided by that now."""
+    size_factor: float
+    """Smallest sizes of effects after the change, divided by those now."""
+
+
+def advice(now: SigmaTerms, measured: Measurement, rig: Rig, codec: str, exposure_s: float | None) -> list[Advice]:
+    """List the changes that would help, the most helpful first.
+
+    Parameters
+    ----------
+    now : SigmaTerms
+        Of the film as it is.
+    measured : Measurement
+        Of a part of it.
+    rig : Rig
+        What is declared.
+    codec : str
+        FFmpeg's name.
+    exposure_s : float or None
+        Exposure time, declared or estimated, s.
+
+    Returns
+    -------
+    list of Advice
+        Without changes of less than 3 %, except for the frame rate.
+    """
+    noise = measured.detections.noise
+    shot = math.sqrt(max(noise**2 - ROUNDING**2, 0.0) / LIGHT + ROUNDING**2) / noise
+    tried = [
+        _change(now, "light", f"{LIGHT:g} times the light (or a lens or sensor that takes it)", noise=shot),
+        *_nearer(now, measured),
+        *_on_the_mark(now, measured),
+        *_exposure(now, measured, rig, exposure_s),
+    ]
+    if codec not in LOSSLESS:
+        tried.append(_change(now, "codec", "less compression: twice the bit rate or a lossless codec", grid=0.5))
+    if "declared" not in measured.pivot and "marker" not in measured.pivot:
+        less = math.sqrt(max(now.sigma**2 - now.pivot**2, 0.0)) / now.sigma
+        tried.append(Advice("shaft_mark", "a round mark on the shaft, at most 0.1 px uncertain", less, less))
+    helping = [one for one in tried if min(one.sigma_factor, one.size_factor) < WORTH_SAYING]
+    rate = Advice("rate", "twice the frame rate, with the light for it", 1.0, math.sqrt(0.5))
+    return sorted([*helping, rate], key=lambda one: (one.size_factor, one.sigma_factor))
+
+
+def scaled(now: SigmaTerms, noise: float = 1.0, grid: float = 1.0) -> SigmaTerms:
+    """Return the terms with noise and errors of the grid multiplied; pivot and zero follow the mixture of both."""
+    after = replace(now, noise=noise * now.noise, grid=grid * now.grid)
+    mixed = after.scatter / now.scatter if now.scatter > 0.0 else 1.0
+    return replace(after, pivot=mixed * now.pivot, zero=mixed * now.zero)
+
+
+def _change(now: SigmaTerms, change: str, text: str, noise: float = 1.0, grid: float = 1.0) -> Advice:
+    after = scaled(now, noise, grid)
+    return Advice(change, text, after.sigma / now.sigma, after.sigma / now.sigma)
+
+
+def _nearer(now: SigmaTerms, measured: Measurement) -> list[Advice]:
+    """Return what a camera that is nearer, and a finer sensor, would bring."""
+    found = measured.angles.registered
+    full = found is not None and len(found.clear[0]) >= ALL_TILES
+    power = 1.0 if full else 1.5
+    finer = 2.0**-power * 2.0
+    advices = [
+        _change(now, "resolution", "twice the pixels a side, at the same light", noise=finer, grid=0.5),
+    ]
+    zoom = room_to_fill(measured)
+    if zoom >= LEAST_NEARER:
+        text = f"{zoom:.1f} times nearer (or zoomed in), so that the motion fills the picture"
+        advices.append(_change(now, "nearer", text, noise=zoom**-power, grid=1.0 / zoom))
+    return advices
+
+
+def room_to_fill(measured: Measurement) -> float:
+    """Return how many times larger the picture could show the motion, the pivot included where it is in the picture."""
+    series = measured.series
+    assert series.mark_px is not None
+    assert series.pivot_px is not None
+    places = [series.mark_px[series.ok], series.pivot_px[series.ok][:1]]
+    regions = [r.contour_px.reshape(-1, 2) for r in measured.detections.regions if r is not None]
+    found = measured.angles.registered
+    if found is not None:
+        places.append(found.appearance.tiles.corners)
+    points = np.concatenate([*places, *regions]).astype(float)
+    size = np.array(measured.detections.size, float)
+    inside = np.all((points >= 0.0) & (points < size), axis=1)
+    extent = np.ptp(points[inside], axis=0)
+    return float(np.clip(FILLED * np.min(size / np.maximum(extent, 1.0)), 1.0, MOST_NEARER))
+
+
+def contrast_of(measured: Measurement) -> float | None:
+    """Return the contrast of the mark against its surroundings, grey levels; ``None`` without a mark."""
+    found = measured.detections.found
+    return None if found is None else 1.0 / float(np.linalg.norm(found.model.weights))
+
+
+def _on_the_mark(now: SigmaTerms, measured: Measurement) -> list[Advice]:
+    """Return what another mark would bring, where the angle is that of the mark alone."""
+    contrast = contrast_of(measured)
+    if measured.angles.registered is not None or contrast is None:
+        return []
+    larger = _change(now, "larger_mark", "a mark of twice the diameter", noise=2.0**-0.5, grid=2.0**-0.5)
+    share = contrast / BEST_CONTRAST
+    if share >= 1.0:
+        return [larger]
+    text = f"a mark that stands out by {BEST_CONTRAST:.0f} grey levels (now {contrast:.0f})"
+    return [larger, _change(now, "contrast", text, noise=share)]
+
+
+def _exposure(now: SigmaTerms, measured: Measurement, rig: Rig, exposure_s: float | None) -> list[Advice]:
+    """Return what half the exposure would bring, with the light for it."""
+    if exposure_s is None:
+        return []
+    whole, half = (within_exposure(measured, rig, one) for one in (exposure_s, 0.5 * exposure_s))
+    # an exposure that is not declared is not part of the stated sigma, but of the errors
+    before = replace(now, exposure=whole)
+    after = replace(now, exposure=half)
+    factor = after.sigma / before.sigma
+    text = f"half the exposure ({500.0 * exposure_s:.1f} ms), with the light for it: fast frames are blurred"
+    return [Advice("exposure", text, factor, factor)]
+
+
+def within_exposure(measured: Measurement, rig: Rig, exposure_s: float) -> float:
+    """Return the RMS uncertainty due to motion within an exposure, rad, as `measure` would state it."""
+    angles, time = measured.angles, measured.series.time[measured.ok]
+    lever: Floats = angles.lever_px
+    terms = mean_off_middle(time, angles.line, exposure_s)
+    if angles.registered is not None:
+        terms = np.hypot(terms, blur_error(time, angles.line, lever, exposure_s))
+    return float(np.sqrt(np.mean(terms**2)))
