@@ -126,12 +126,10 @@ def _certified(verdict: Verdict, quantity: Quantity, effect: Effect | None, cloc
     if fit is None:
         return nothing
     extra = clock.sigma if quantity.effect_id == "dead_time" else 0.0
-    first = profile(fit, quantity.parameter, verdict.fitted, verdict.noise, extra)
-    profiles = [first]
-    for rival in _rival_fits(verdict, accepted, fit) if accepted else ():
-        profiles.append(profile(rival, quantity.parameter, verdict.fitted, verdict.noise, extra))
+    fits = [fit, *(_rival_fits(verdict, accepted, fit) if accepted else ())]
+    profiles = [profile(one, quantity.parameter, verdict.fitted, verdict.noise, extra) for one in fits]
     interval = min(p.lower for p in profiles), max(p.upper for p in profiles)
-    return Certified(quantity, first, interval, accepted is not None, accepted.alias_set[1:] if accepted else ())
+    return Certified(quantity, profiles[0], interval, accepted is not None, accepted.alias_set[1:] if accepted else ())
 
 
 def _bounded(effect: Effect, clock: Clock) -> Effect:

@@ -169,8 +169,6 @@ def with_breakaway(friction: Effect) -> BreakawayFriction:
     """
     at = [p.name for p in friction.parameters].index(_EXCESS)
     scale = friction.parameters[at].upper / _BREAKAWAY.upper
-    level = replace(
-        _BREAKAWAY, upper=friction.parameters[at].upper, starts=tuple(scale * s for s in _BREAKAWAY.starts)
-    )
+    level = replace(_BREAKAWAY, upper=friction.parameters[at].upper, starts=tuple(scale * s for s in _BREAKAWAY.starts))
     content = {name: getattr(friction, name) for name in Effect.__dataclass_fields__}
     return BreakawayFriction(**content | {"parameters": (*friction.parameters[:at], level)})

@@ -15,6 +15,7 @@ import typer
 
 from anglecam import __version__
 from anglecam.cli.batch import batch
+from anglecam.cli.certify import certify
 from anglecam.cli.clips import budget, calibrate, measure
 from anglecam.cli.estimator_option import EstimatorCommand
 from anglecam.cli.live import live
@@ -49,7 +50,7 @@ def _anglecam(
 
 
 app.add_typer(neck, name="neck")
-for _command in (measure, live, budget, calibrate, identify, close, batch):
+for _command in (measure, live, budget, calibrate, identify, close, certify, batch):
     app.command(cls=EstimatorCommand if _command is identify else None)(_command)
 
 
