@@ -15,6 +15,7 @@ import typer
 
 from anglecam import __version__
 from anglecam.cli.batch import batch
+from anglecam.cli.certify import certify
 from anglecam.cli.check import check
 from anglecam.cli.clips import budget, calibrate, measure
 from anglecam.cli.doctor import doctor
@@ -51,7 +52,7 @@ def _anglecam(
 
 
 app.add_typer(neck, name="neck")
-for _command in (check, measure, live, budget, calibrate, identify, close, batch, doctor):
+for _command in (check, measure, live, budget, calibrate, identify, close, certify, batch, doctor):
     app.command(cls=EstimatorCommand if _command is identify else None)(with_json(_command))
 
 
