@@ -20,6 +20,7 @@ from anglecam.cli.estimator_option import EstimatorCommand
 from anglecam.cli.live import live
 from anglecam.cli.neck import app as neck
 from anglecam.cli.sessions import close, identify
+from anglecam.cli.view import view
 from anglecam.errors import InputError, RigError, blame
 from anglecam.terminal import errors
 
@@ -49,7 +50,7 @@ def _anglecam(
 
 
 app.add_typer(neck, name="neck")
-for _command in (measure, live, budget, calibrate, identify, close, batch):
+for _command in (measure, view, live, budget, calibrate, identify, close, batch):
     app.command(cls=EstimatorCommand if _command is identify else None)(_command)
 
 

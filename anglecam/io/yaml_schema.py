@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import yaml
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
@@ -60,6 +60,11 @@ def read_declared(path: Path, kind: type[Section]) -> Section:
     RigError
         If the file cannot be read or its content is not valid; the line names the file, the key and the cause.
     """
+    return validate(path, read_plain(path)[1], kind)
+
+
+def read_plain(path: Path) -> tuple[str, dict[str, Any]]:
+    """Read the text of a file of declarations, and its keys and values; raises as `read_declared`."""
     try:
         text = read_text(path, _MOST_BYTES)
         _require_plain(path, text)
@@ -74,9 +79,14 @@ def read_declared(path: Path, kind: type[Section]) -> Section:
         where = f", line {mark.line + 1}" if mark else ""
         raise RigError(f"{path}: not YAML ({problem}{where})") from error
     if content is None:
-        return kind()
+        return text, {}
     if not isinstance(content, dict):
         raise RigError(f"{path}: expected keys and values, found a {type(content).__name__}")
+    return text, content
+
+
+def validate(path: Path, content: dict[str, Any], kind: type[Section]) -> Section:
+    """Validate keys and values; the `RigError` of invalid ones names the file, the key and the cause."""
     try:
         return kind.model_validate(content)
     except ValidationError as error:

@@ -31,7 +31,7 @@ class FrameIndex:
     @property
     def times(self) -> Floats:
         """(n,) presentation times, s."""
-        return self.stamps * self.base
+        return np.asarray(self.stamps * self.base, np.float64)
 
     def key_before(self, number: int) -> int | None:
         """Return the stamp of the last key frame up to a frame; ``None`` where there is none."""

@@ -1,8 +1,7 @@
 """Any frame of a film, exactly, for somebody who looks at one after another.
 
-A seek may end on a wrong frame. So no frame is taken because of where a seek ended: decoding starts at a key frame, each
-picture is identified by its own stamp, and a film in which one picture is not where its index says is decoded from its
-start instead, as for measuring.
+A seek may end on a wrong frame. So each picture is identified by its own stamp and not by where a seek ended. A film in
+which one picture is not where its index says is decoded from its start instead, as for measuring.
 """
 
 from __future__ import annotations
