@@ -27,7 +27,12 @@ from anglecam.view.stages import STAGES, found_in, stage_picture
 from anglecam.workflow.session_results import REPORT
 
 STATIC = Path(__file__).parents[1] / "web" / "static"
-_PAGE_FILES = {"view.html": "text/html", "view.js": "text/javascript", "view.css": "text/css"}
+_PAGE_FILES = {
+    "view.html": "text/html",
+    "view.js": "text/javascript",
+    "view.css": "text/css",
+    "icon.svg": "image/svg+xml",
+}
 _KEPT = {"cache-control": "private, max-age=3600"}
 """For pictures: the page's address of one names the version of its clip, or the mark."""
 _SANDBOX = {"content-security-policy": "sandbox allow-scripts; default-src 'unsafe-inline' data: blob:"}
