@@ -24,6 +24,7 @@ from anglecam.cli.json_output import with_json
 from anglecam.cli.live import live
 from anglecam.cli.neck import app as neck
 from anglecam.cli.sessions import close, identify
+from anglecam.cli.view import view
 from anglecam.errors import InputError, RigError, blame
 from anglecam.terminal import errors
 
@@ -54,6 +55,7 @@ def _anglecam(
 app.add_typer(neck, name="neck")
 for _command in (check, measure, live, budget, calibrate, identify, close, certify, batch, doctor):
     app.command(cls=EstimatorCommand if _command is identify else None)(with_json(_command))
+app.command()(view)
 
 
 def main() -> None:

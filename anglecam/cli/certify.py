@@ -38,6 +38,7 @@ def certify(
             progress=lambda stage: bars.update(bar, description=stage),
         )
         bars.update(bar, description="done", completed=1, total=1)
+    report_file("certificate", out / CERTIFICATE)
     screen.print(certificate_table(certificate))
     screen.print(f"certificate: {out / PAGE}", soft_wrap=True)
     end(measured.problems)

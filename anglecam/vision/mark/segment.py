@@ -69,6 +69,22 @@ class Patch:
     """Whether it touches the picture's edge; its region is then not whole."""
 
 
+@dataclass(frozen=True)
+class FilledPatch:
+    """A patch after threshold, Canny and fill; the pictures show the patch and a margin, bytes of 0 or 1."""
+
+    part: tuple[slice, slice]
+    """Rows and columns of the whole picture that they show."""
+    inner: Image
+    """The thresholded patch alone."""
+    edges: Image
+    """Canny edges along it."""
+    outline_px: NDArray[Any]
+    """(k, 1, 2) outer contour of both, px of this part."""
+    filled: Image
+    """Everything within the contour."""
+
+
 def find_regions(image: Image, model: ColourModel, areas_px2: tuple[float, float], opening_px: int = 0) -> list[Region]:
     """Find the regions of the mark's colour in an image.
 
@@ -112,19 +128,32 @@ def _is_cut(outline: NDArray[Any], picture: Image) -> bool:
     return left <= 0 or top <= 0 or left + across >= width or top + down >= height
 
 
+def fill_patch(patch: Patch) -> FilledPatch:
+    """Join a thresholded patch with the Canny edges along it, and fill the outer contour."""
+    height, width = patch.fraction.shape
+    left, top, across, down = cv2.boundingRect(patch.contour_px)
+    x0, y0 = max(left - MARGIN_PX, 0), max(top - MARGIN_PX, 0)
+    rows = slice(y0, min(top + down + MARGIN_PX, height))
+    columns = slice(x0, min(left + across + MARGIN_PX, width))
+    part = rows, columns
+    inner = np.zeros_like(patch.core[part])
+    cv2.drawContours(inner, [patch.contour_px], -1, 1, cv2.FILLED, offset=(-x0, -y0))
+    step = (FULL_LEVEL - EMPTY_LEVEL) / 2.0
+    along: Image = cv2.dilate(inner, disc(1))
+    edges = cv2.Canny(patch.smooth[part], step, 2.0 * step) // 255 & along
+    contours, _ = cv2.findContours(inner | edges, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    outline = max(contours, key=len)
+    filled = cv2.drawContours(np.zeros_like(inner), [outline], -1, 1, cv2.FILLED)
+    return FilledPatch(part, inner, edges, outline, filled)
+
+
 def measure(patch: Patch, model: ColourModel) -> Region | None:
     """Measure one patch; ``None`` where nothing of it remains after its neighbours are excluded."""
     fraction, smooth, core = patch.fraction, patch.smooth, patch.core
-    height, width = fraction.shape
-    left, top, across, down = cv2.boundingRect(patch.contour_px)
-    right, bottom = left + across, top + down
-    x0, y0 = max(left - MARGIN_PX, 0), max(top - MARGIN_PX, 0)
-    box = np.s_[y0 : min(bottom + MARGIN_PX, height), x0 : min(right + MARGIN_PX, width)]
-    inner = np.zeros_like(core[box])
-    cv2.drawContours(inner, [patch.contour_px], -1, 1, cv2.FILLED, offset=(-x0, -y0))
+    shape = fill_patch(patch)
+    box, inner, filled = shape.part, shape.inner, shape.filled
+    start = np.array([box[1].start, box[0].start])
     others = core[box] & (1 - inner)
-    outline = _outline(smooth[box], inner)
-    filled = cv2.drawContours(np.zeros_like(inner), [outline], -1, 1, cv2.FILLED)
     reach = _reach(smooth[box], filled, model)
     near, touched = reach, False
     if others.any():
@@ -145,11 +174,11 @@ def measure(patch: Patch, model: ColourModel) -> Region | None:
     slope = float(np.linalg.norm(model.weights)) / (1.0 - 2.0 * low)
     soft = ((weight > 0.0) & (weight < 1.0)).astype(float)
     return Region(
-        centre_px=centre + [x0, y0],
+        centre_px=centre + start,
         area_px2=area,
         moments_px2=moments,
         noise_px2=(slope / area) ** 2 * _moments(soft, 1.0, centre)[1],
-        contour_px=(outline.reshape(-1, 2) + [x0, y0]).astype(np.int32),
+        contour_px=(shape.outline_px.reshape(-1, 2) + start).astype(np.int32),
         whole=not (patch.cut or touched),
     )
 
@@ -162,15 +191,6 @@ def _moments(weight: Floats, total: float, about: Floats | None = None) -> tuple
     dx, dy = x - centre[0], y - centre[1]
     xy = dy @ weight @ dx
     return centre, np.array([[columns @ dx**2, xy], [xy, rows @ dy**2]]) / total
-
-
-def _outline(smooth: Image, inner: Image) -> NDArray[Any]:
-    """Join the thresholded patch with the Canny edges along it, and return the outer contour."""
-    step = (FULL_LEVEL - EMPTY_LEVEL) / 2.0
-    edges = cv2.Canny(smooth, step, 2.0 * step) // 255
-    along: Image = cv2.dilate(inner, disc(1))
-    contours, _ = cv2.findContours(inner | (edges & along), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    return max(contours, key=len)
 
 
 def _reach(smooth: Image, filled: Image, model: ColourModel) -> Image:
