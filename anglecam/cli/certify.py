@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from anglecam.cli.json_output import report_file
 from anglecam.cli.options import Out, SessionFolder
 from anglecam.cli.progress import end, progress_bars
 from anglecam.cli.sessions import _measure
@@ -22,7 +23,7 @@ def certify(
 ) -> None:
     """Certify a servo: backlash, friction, dead time, lag, speed and torque limit with 95 % intervals, as one page."""
     from anglecam.report.certificate_page import certificate_table
-    from anglecam.workflow.certified import PAGE, write_certificate
+    from anglecam.workflow.certified import FILE, PAGE, write_certificate
     from anglecam.workflow.session import loop_input, require_recordings
 
     opened = read_session(session)
@@ -38,7 +39,7 @@ def certify(
             progress=lambda stage: bars.update(bar, description=stage),
         )
         bars.update(bar, description="done", completed=1, total=1)
-    report_file("certificate", out / CERTIFICATE)
+    report_file("certificate", out / FILE)
     screen.print(certificate_table(certificate))
     screen.print(f"certificate: {out / PAGE}", soft_wrap=True)
     end(measured.problems)
