@@ -57,7 +57,7 @@ class Advice:
     """Smallest sizes of effects after the change, divided by those now."""
 
 
-def advice(now: SigmaTerms, measured: Measurement, codec: str, exposure_s: float | None, frames: int) -> list[Advice]:
+def advice(now: SigmaTerms, measured: Measurement, codec: str, exposure_s: float | None, session: Seen) -> list[Advice]:
     """List the changes that would help, the most helpful first.
 
     Parameters
@@ -91,26 +91,17 @@ def advice(now: SigmaTerms, measured: Measurement, codec: str, exposure_s: float
         usual = math.sqrt(float(np.trace(measured.angles.pivot.covariance_px2)) / 2.0)
         marked = replace(now, pivot=now.pivot * min(1.0, MARKED_PX / usual))
         tried.append(("shaft_mark", "a round mark on the shaft", marked))
-    found = [_advice(*one, now, frames) for one in tried]
-    found += _exposure(now, measured, exposure_s, frames)
-    faster = smallest_rms(now, 2 * frames) / smallest_rms(now, frames)
+    session = Seen(frames, measured.angles.registered is None)
+    found = [_advice(*one, now, session) for one in tried]
+    found += _exposure(now, measured, exposure_s, session)
+    faster = replace(session, frames=2 * frames).smallest_rms(now) / session.smallest_rms(now)
     found.append(Advice("rate", "twice the frame rate, with the light for it", 1.0, faster))
     helping = [one for one in found if min(one.sigma_factor, one.size_factor) < WORTH_SAYING]
     return sorted(helping, key=lambda one: (one.size_factor, one.sigma_factor))
 
 
-def smallest_rms(terms: SigmaTerms, frames: int) -> float:
-    """Return the RMS change of the angle, rad, that a session of so many frames shows.
-
-    The residual test needs a norm of some standard deviations of the scatter; in a film the loop ignores structure
-    below twice sigma, because errors of a measurement may follow the motion as an effect does.
-    """
-    floor = DEFAULT.stepwise.film_error_sigmas * terms.sigma
-    return max(DETECTED_SIGMAS * terms.scatter / math.sqrt(frames), floor)
-
-
-def _advice(change: str, text: str, after: SigmaTerms, now: SigmaTerms, frames: int) -> Advice:
-    sizes = smallest_rms(after, frames) / smallest_rms(now, frames)
+def _advice(change: str, text: str, after: SigmaTerms, now: SigmaTerms, session: Seen) -> Advice:
+    sizes = session.smallest_rms(after) / session.smallest_rms(now)
     return Advice(change, text, after.sigma / now.sigma, sizes)
 
 
@@ -171,7 +162,7 @@ def _on_the_mark(now: SigmaTerms, measured: Measurement) -> list[tuple[str, str,
     return [larger, ("contrast", text, scaled(now, share))]
 
 
-def _exposure(now: SigmaTerms, measured: Measurement, exposure_s: float | None, frames: int) -> list[Advice]:
+def _exposure(now: SigmaTerms, measured: Measurement, exposure_s: float | None, session: Seen) -> list[Advice]:
     """Return what half the exposure would bring, with the light for it."""
     if exposure_s is None:
         return []
@@ -180,7 +171,7 @@ def _exposure(now: SigmaTerms, measured: Measurement, exposure_s: float | None, 
     before = replace(now, exposure=whole)
     after = replace(now, exposure=half)
     text = f"half the exposure ({500.0 * exposure_s:.1f} ms), with the light for it: fast frames are blurred"
-    return [_advice("exposure", text, after, before, frames)]
+    return [_advice("exposure", text, after, before, session)]
 
 
 def within_exposure(measured: Measurement, exposure_s: float) -> float:

@@ -25,6 +25,7 @@ from anglecam.data.command import Command
 from anglecam.data.record import record_from_series
 from anglecam.errors import InputError, blame
 from anglecam.identification.identify_records import declared_start
+from anglecam.identification.noise import noise_floor
 from anglecam.io.rig import Rig, RigFrames
 from anglecam.io.session import command_beside, rig_beside
 from anglecam.measurement.clip import Measurement
@@ -185,7 +186,9 @@ def _sizes(
     plan = planned(record, play, parameters, first, duration)
     if not np.all(np.isfinite(plan.angle)):
         raise InputError(f"{record.name}: the plant that the part shows is unstable; check frames of a free swing")
+    floor = noise_floor([record])
+    camera = sigma if floor is None else min(sigma, floor.sigma)
     motion = "a free swing as in the clip" if play is None else "the command"
-    smallest = smallest_sizes(plan, parameters, scatter, sigma)
+    smallest = smallest_sizes(plan, parameters, scatter, camera)
     sizes = Sizes(smallest, RECORDINGS, duration, parameters, motion, doubt)
     return sizes, best_command(plan, parameters, scatter)
