@@ -57,7 +57,26 @@ class Advice:
     """Smallest sizes of effects after the change, divided by those now."""
 
 
-def advice(now: SigmaTerms, measured: Measurement, codec: str, exposure_s: float | None, session: Seen) -> list[Advice]:
+@dataclass(frozen=True)
+class Seen:
+    """What decides which change of the angles a session shows."""
+
+    frames: int
+    by_mark: bool
+    """Whether the angles are those of the mark alone."""
+
+    def smallest_rms(self, terms: SigmaTerms) -> float:
+        """Return the RMS change of the angle, rad, that the session shows.
+
+        The residual test needs a norm of some standard deviations of the scatter. In a film the loop also ignores
+        structure below twice the noise floor, because errors of a measurement may follow the motion as an effect does.
+        The floor is sigma or, where it is less, the scatter of the mark's distance from the pivot.
+        """
+        floor = DEFAULT.stepwise.film_error_sigmas * (terms.scatter if self.by_mark else terms.sigma)
+        return max(DETECTED_SIGMAS * terms.scatter / math.sqrt(self.frames), floor)
+
+
+def advice(now: SigmaTerms, measured: Measurement, codec: str, exposure_s: float | None, frames: int) -> list[Advice]:
     """List the changes that would help, the most helpful first.
 
     Parameters
