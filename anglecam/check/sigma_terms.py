@@ -14,12 +14,12 @@ import numpy as np
 
 from anglecam.budget.collect import error_sources
 from anglecam.budget.terms import terms_over_time
-from anglecam.data.typing import Floats
+from anglecam.data.typing import Floats, Integers
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import Measurement
 
 SPREAD = 1.5
-"""Factor within which a predicted sigma of the whole film holds in 90 % of the films of ``benchmarks/check_films.py``."""
+"""Factor within which a predicted sigma holds in 90 % of the films of ``benchmarks/check_films.py``."""
 LEARNT = 120
 """Frames from which a body and its centre are learnt at most; more do not make the pivot surer."""
 
@@ -93,7 +93,7 @@ def sigma_terms(measured: Measurement, rig: Rig) -> SigmaTerms:
     return SigmaTerms(**{name: math.sqrt(variance) for name, variance in variances.items()})
 
 
-def _noise_share(measured: Measurement, rows: Floats) -> Floats:
+def _noise_share(measured: Measurement, rows: Integers) -> Floats:
     """Return (n,) the share of a registered rotation's variance that is the pixels' noise."""
     found = measured.angles.registered
     assert found is not None  # else there is no such term

@@ -133,7 +133,7 @@ def planned(record: Record, command: Command | None, parameters: Floats, first: 
 
 
 def smallest_sizes(
-    plan: Record, parameters: Floats, scatter: float, sigma: float, seed: int = 0
+    plan: Record, parameters: Floats, scatter: float, camera: float, seed: int = 0
 ) -> tuple[Smallest, ...]:
     """Return the smallest detectable sizes in a session of `RECORDINGS` recordings.
 
@@ -143,9 +143,9 @@ def smallest_sizes(
         One of the recordings, from `planned`.
     parameters : ndarray
         Of the plant.
-    scatter, sigma : float
-        Predicted uncertainty of an angle: what differs from frame to frame, and all of it, rad. Structure below twice
-        sigma is ignored in a film.
+    scatter, camera : float
+        Of an angle: what differs from frame to frame, and the noise floor of the film, rad. The loop ignores structure
+        below twice that floor.
     seed : int
         Of the noise.
     """
@@ -153,7 +153,7 @@ def smallest_sizes(
     fit, records, effects = _session(plan, parameters, scatter, rng)
     each = directions(fit, records, changes(fit, records, effects))
     limits = DEFAULT.stepwise
-    least = max(limits.numerical_error_rad, limits.film_error_sigmas * sigma)
+    least = max(limits.numerical_error_rad, limits.film_error_sigmas * camera)
     found = run_residual_test(fit, records, each, rng, least).detectable
     return tuple(
         Smallest(e, e.parameters[0].in_file_unit(found[e.id])[0]) for e in LEDGER if found.get(e.id, 0.0) > 0.0

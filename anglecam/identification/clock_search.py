@@ -48,14 +48,16 @@ def coarse_offset(record: Record) -> float:
     grid = record.time[0] + step * np.arange(math.floor(span / step) + 1)
     angle = np.interp(grid, record.time, record.angle)
     wide = grid[0] + step * np.arange(-most, len(grid) + most)
-    left = np.full(2 * most + 1, np.inf)
+    left: Floats = np.full(2 * most + 1, np.inf)
     for hz, ratio in PLANTS:
         rate = 2.0 * math.pi * hz
         parameters = np.array([2.0 * ratio * rate, rate**2, rate**2])
         start = np.array([float(command.at(wide[:1])[0]), 0.0])
         response = Plant().predict(parameters, wide, command, start)
         left = np.minimum(left, 1.0 - _correlations(angle, response) ** 2)
-    offsets = step * np.arange(most, -most - 1, -1)  # an earlier part of the response is a later command
+    offsets: Floats = (
+        np.arange(most, -most - 1, -1, dtype=np.float64) * step
+    )  # an earlier part of the response is a later command
     good = np.flatnonzero(left <= AS_GOOD * left.min() + 1e-12)
     return _bottom_near(offsets, left, int(good[np.argmin(np.abs(offsets[good]))]))
 

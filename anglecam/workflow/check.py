@@ -25,6 +25,7 @@ from anglecam.data.command import Command
 from anglecam.data.record import record_from_series
 from anglecam.errors import InputError, blame
 from anglecam.identification.identify_records import declared_start
+from anglecam.identification.noise import noise_floor
 from anglecam.io.rig import Rig, RigFrames
 from anglecam.io.session import command_beside, rig_beside
 from anglecam.measurement.clip import Measurement
@@ -94,14 +95,17 @@ def _part_of(path: Path, rig: Rig, first: int | None) -> tuple[Rig, Film, int]:
     """Return a rig that restricts the film to the part that is read, the film, and its frames as far as known."""
     begin = rig.frames.first or 0 if first is None else first
     rate = rig.frames.rate_hz
-    peek = open_film(path, RigFrames(first=begin, last=begin + PEEK, rate_hz=rate))
+    peek = open_film(path, _range(begin, begin + PEEK, rate))
     steps = np.diff(peek.times)
     interval = float(np.median(steps)) if len(steps) else 1.0 / 30.0
     count = int(np.clip(math.ceil(SECONDS / interval), FEWEST, MOST))
     last = begin + count - 1 if rig.frames.last is None else min(begin + count - 1, rig.frames.last)
     end = peek.declared_frames if rig.frames.last is None else rig.frames.last + 1
-    frames = RigFrames(first=begin, last=max(last, begin), rate_hz=rate)
-    return rig.model_copy(update={"frames": frames}), peek, max(end - begin, 0)
+    return rig.model_copy(update={"frames": _range(begin, max(last, begin), rate)}), peek, max(end - begin, 0)
+
+
+def _range(first: int, last: int, rate_hz: float | None) -> RigFrames:
+    return RigFrames.model_validate({"from": first, "to": last, "rate_hz": rate_hz})
 
 
 def _what_would_mend(cause: str) -> str:
@@ -151,9 +155,14 @@ def _predict(
         sizes=sizes,
         why_no_sizes=why,
         played=played,
-        advice=tuple(advice(whole, measured, rig, film.codec, exposure)),
+        advice=tuple(advice(whole, measured, film.codec, exposure, _session_frames(sizes, count, interval))),
         notes=measured.notes,
     )
+
+
+def _session_frames(sizes: Sizes | None, count: int, interval: float) -> int:
+    """Return the frames of a session; without a planned one, of as many recordings as long as the clip."""
+    return RECORDINGS * (count if sizes is None else max(1, round(sizes.duration / interval)))
 
 
 def _sizes(
@@ -177,7 +186,9 @@ def _sizes(
     plan = planned(record, play, parameters, first, duration)
     if not np.all(np.isfinite(plan.angle)):
         raise InputError(f"{record.name}: the plant that the part shows is unstable; check frames of a free swing")
+    floor = noise_floor([record])
+    camera = sigma if floor is None else min(sigma, floor.sigma)
     motion = "a free swing as in the clip" if play is None else "the command"
-    smallest = smallest_sizes(plan, parameters, scatter, sigma)
+    smallest = smallest_sizes(plan, parameters, scatter, camera)
     sizes = Sizes(smallest, RECORDINGS, duration, parameters, motion, doubt)
     return sizes, best_command(plan, parameters, scatter)
