@@ -7,7 +7,7 @@ import numpy as np
 
 from anglecam.loop.free_form.result import FreeForm
 from anglecam.loop.verdict_json import FACTORS
-from anglecam.report.figures import AFTER, COMMAND, FAINT, STYLE, _svg
+from anglecam.report.figures import AFTER, COMMAND, FAINT, NORMAL_95, STYLE, _svg
 
 LABELS = {
     "angle": "angle, °",
@@ -16,8 +16,6 @@ LABELS = {
     "phase": "phase, share of the period",
     "time": "time, s",
 }
-NORMAL_95 = 1.96
-"""Standard uncertainties from the middle to the end of a 95 % interval."""
 
 
 def free_form_figure(found: FreeForm) -> str:
