@@ -3,6 +3,7 @@
 
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
+import { addLegend, type Legend } from "./legend";
 import { times, type Band, type Column, type Curve, type Plot, type Recording } from "./data";
 
 const GRID = { stroke: "#eceff2", width: 1 };
@@ -30,6 +31,7 @@ export function draw(parent: HTMLElement, recording: Recording, plot: Plot, heig
   const edges = bands.flatMap((band) => bandEdges(recording, band));
   const data = [times(recording), ...edges, ...curves.map((curve) => recording.columns[curve.column]!)];
   let pointing = false;
+  let legend: Legend | null = null;
   const chart = new uPlot(
     {
       width: widthOf(parent),
@@ -40,14 +42,14 @@ export function draw(parent: HTMLElement, recording: Recording, plot: Plot, heig
         sync: { key: `recording-${recording.name}`, setSeries: false },
         points: { size: 6 },
       },
-      legend: { live: true },
+      legend: { show: false },
       scales: { x: { time: false }, y: { range: rangeOf(plot) } },
       axes: [
         { ...AXIS, size: 34, values: (_u, ticks) => ticks.map((t) => `${+t.toFixed(6)} s`) },
         { ...AXIS, size: 58, label: plot.label, labelSize: 16, labelFont: "11px system-ui, sans-serif", values: plainTicks },
       ],
       series: [
-        { label: "time", value: (_u, t) => (t == null ? "–" : `${t.toFixed(3)} s`) },
+        {},
         ...bands.flatMap(bandSeries),
         ...curves.map(curveSeries),
       ],
@@ -56,7 +58,9 @@ export function draw(parent: HTMLElement, recording: Recording, plot: Plot, heig
         setCursor: [
           (u) => {
             if (pointing || !isUnderPointer(u)) return;
-            listener.over(u.cursor.left! < 0 ? null : (u.cursor.idx ?? null));
+            const row = u.cursor.left! < 0 ? null : (u.cursor.idx ?? null);
+            legend?.show(row);
+            listener.over(row);
           },
         ],
       },
@@ -64,6 +68,7 @@ export function draw(parent: HTMLElement, recording: Recording, plot: Plot, heig
     data as uPlot.AlignedData,
     parent,
   );
+  legend = addLegend(parent, recording, curves, bands);
   onClick(chart, listener);
   chart.over.addEventListener("mouseleave", () => listener.over(null));
   return {
@@ -73,10 +78,12 @@ export function draw(parent: HTMLElement, recording: Recording, plot: Plot, heig
       const left = chart.valToPos(times(recording)[row]!, "x");
       chart.setCursor({ left, top: chart.over.clientHeight / 2 }, false);
       pointing = false;
+      legend?.show(row);
     },
     showBounds(shown) {
       bands.forEach((band, k) => {
         if (band.shown) return;
+        legend?.showBand(band, shown);
         chart.setSeries(2 * k + 1, { show: shown }, false);
         chart.setSeries(2 * k + 2, { show: shown }, false);
       });
@@ -123,21 +130,16 @@ function bandEdges(recording: Recording, band: Band): [Column, Column] {
 }
 
 function bandSeries(band: Band): uPlot.Series[] {
-  const edge = { show: band.shown, stroke: band.colour, width: 1, points: { show: false }, class: "edge" };
-  return [
-    { ...edge, label: `${band.label}, from`, value: (_u, y) => number(y) },
-    { ...edge, label: "to", value: (_u, y) => number(y) },
-  ];
+  const edge = { show: band.shown, stroke: band.colour, width: 1, points: { show: false } };
+  return [edge, edge];
 }
 
 function curveSeries(curve: Curve): uPlot.Series {
   const dots = curve.style === "dots";
   const series: uPlot.Series = {
-    label: curve.label,
     stroke: curve.colour,
     width: dots ? 0 : 1.3,
     points: dots ? { show: true, size: 3, fill: curve.colour } : { show: false },
-    value: (_u, y) => number(y),
   };
   if (curve.style === "step") series.paths = uPlot.paths.stepped!({ align: 1 });
   if (dots) series.paths = () => null;
@@ -154,8 +156,4 @@ function rangeOf(plot: Plot): uPlot.Range.Function {
 
 function plainTicks(_u: uPlot, ticks: number[]): string[] {
   return ticks.map((tick) => String(+tick.toPrecision(6)).replace("-", "−"));
-}
-
-function number(value: number | null): string {
-  return value == null ? "–" : `${value.toFixed(4).replace("-", "−")}°`;
 }
