@@ -1,4 +1,4 @@
-"""The program of a measuring process, started as ``python -m anglecam.batch.child PARENT`` with its parent's process id.
+"""The program of a measuring process: ``python -m anglecam.batch.child PARENT``, with the process id of its parent.
 
 It loads the libraries that measure, which takes a second, only when it is certain to end with its parent.
 """

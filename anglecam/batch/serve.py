@@ -19,12 +19,12 @@ from typing import Any
 import cv2
 import numpy as np
 
-from anglecam.batch.row import cannot_write
+from anglecam.camera.calibration import read_calibration
 from anglecam.data.series import AngleSeries
 from anglecam.errors import AnglecamError, InputError, RigError, blame
 from anglecam.io.netcdf_parquet import read_netcdf, write_netcdf
-from anglecam.io.rig import read_rig
-from anglecam.io.session import Recording, read_session
+from anglecam.io.rig import Rig, read_rig
+from anglecam.io.session import Recording, read_session, rig_beside
 from anglecam.measurement.clip import Measurement
 from anglecam.measurement.tracks import MeasuredTracks
 from anglecam.workflow.clip import measure_source, open_recording, open_source, write_measurement
@@ -46,13 +46,18 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
     -------
     dict
         The clip's figures for the index, how it is ``truncated``, and any other ``doubt``; or the ``cause`` of the
-        failure, whether the ``call_is_wrong``, and whether the failure is ``transient``: the next attempt may succeed.
+        failure and whether the ``call_is_wrong``; or why the rig file or its calibration is ``unreadable``; or the
+        number and text of the error for which the results were ``not_written``.
     """
     clip, into = Path(request["clip"]), Path(request["into"])
     found: dict[str, Any] = {}
     try:
         with blame(clip):
-            source = open_source(clip, read_rig(Path(request["rig"])) if request["rig"] else None)
+            try:
+                rig = _read_declared(clip, request["rig"])
+            except RigError as problem:
+                return {"unreadable": str(problem)}
+            source = open_source(clip, rig)
             film = source.film
             if film is not None:
                 found |= {"width_px": film.width, "height_px": film.height, "codec": film.codec}
@@ -64,10 +69,18 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
                 if request["series_file"]:
                     write_netcdf(measurement.series, Path(request["series_file"]))
             except OSError as problem:
-                return found | {"cause": cannot_write(problem), "call_is_wrong": False, "transient": True}
+                return {"not_written": [problem.errno, problem.strerror or str(problem)]}
     except AnglecamError as problem:
-        found |= {"cause": str(problem), "call_is_wrong": isinstance(problem, RigError), "transient": False}
+        found |= {"cause": str(problem), "call_is_wrong": isinstance(problem, RigError)}
     return found
+
+
+def _read_declared(clip: Path, rig: str | None) -> Rig:
+    """Read the rig file, and its calibration to find out whether it can be read."""
+    declared = read_rig(Path(rig)) if rig else rig_beside(clip)
+    if declared.camera.calibration is not None:
+        read_calibration(Path(declared.camera.calibration))
+    return declared
 
 
 def fit(request: dict[str, Any]) -> dict[str, Any]:
@@ -82,7 +95,8 @@ def fit(request: dict[str, Any]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``verdict``, ``effects`` and ``problems``; or the ``cause`` of the failure and whether the ``call_is_wrong``.
+        ``verdict``, ``effects`` and ``problems``; or the ``cause`` of the failure and whether the ``call_is_wrong``; or
+        the number and text of the error for which the results were ``not_written``.
     """
     # these imports take a second, and clips do not need them
     from anglecam.workflow.session import gather_session, loop_input
@@ -104,11 +118,14 @@ def fit(request: dict[str, Any]) -> dict[str, Any]:
             opened = read_session(folder, read_rig(Path(request["rig"])) if request["rig"] else None)
             measured = gather_session(opened, series_of)
             verdict = effects = None
-            if request["close"]:
-                found = write_closed(measured, loop_input(measured), into).verdict
-                verdict, effects = found.verdict, " + ".join(a.effect.id for a in found.accepted) or None
-            else:
-                write_identified(measured, into)
+            try:
+                if request["close"]:
+                    found = write_closed(measured, loop_input(measured), into).verdict
+                    verdict, effects = found.verdict, " + ".join(a.effect.id for a in found.accepted) or None
+                else:
+                    write_identified(measured, into)
+            except OSError as problem:
+                return {"not_written": [problem.errno, problem.strerror or str(problem)]}
     except AnglecamError as problem:
         return {"cause": str(problem), "call_is_wrong": isinstance(problem, RigError), "problems": []}
     return {"verdict": verdict, "effects": effects, "problems": [str(problem) for problem in measured.problems]}
