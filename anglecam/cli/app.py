@@ -18,6 +18,7 @@ from anglecam.cli.batch import batch
 from anglecam.cli.certify import certify
 from anglecam.cli.clips import budget, calibrate, measure
 from anglecam.cli.estimator_option import EstimatorCommand
+from anglecam.cli.export import export
 from anglecam.cli.live import live
 from anglecam.cli.neck import app as neck
 from anglecam.cli.sessions import close, identify
@@ -50,7 +51,7 @@ def _anglecam(
 
 
 app.add_typer(neck, name="neck")
-for _command in (measure, live, budget, calibrate, identify, close, certify, batch):
+for _command in (measure, live, budget, calibrate, identify, close, certify, export, batch):
     app.command(cls=EstimatorCommand if _command is identify else None)(_command)
 
 
