@@ -20,6 +20,7 @@ from anglecam.cli.check import check
 from anglecam.cli.clips import budget, calibrate, measure
 from anglecam.cli.doctor import doctor
 from anglecam.cli.estimator_option import EstimatorCommand
+from anglecam.cli.export import export
 from anglecam.cli.json_output import with_json
 from anglecam.cli.live import live
 from anglecam.cli.neck import app as neck
@@ -53,7 +54,7 @@ def _anglecam(
 
 
 app.add_typer(neck, name="neck")
-for _command in (check, measure, live, budget, calibrate, identify, close, certify, batch, doctor):
+for _command in (check, measure, live, budget, calibrate, identify, close, certify, export, batch, doctor):
     app.command(cls=EstimatorCommand if _command is identify else None)(with_json(_command))
 app.command()(view)
 

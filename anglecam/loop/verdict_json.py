@@ -82,6 +82,7 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
                 "parameters": {
                     p.name: model[p.name] | {"null": p.in_file_unit(p.null)[0]} for p in accepted.effect.parameters
                 },
+                "fixed": _fixed(accepted.effect),
                 "relaxes": accepted.effect.relaxes,
                 "alias_set": list(accepted.alias_set),
                 "separating_experiment": _what_to_film(accepted.effect, experiment if accepted.rivals else None),
@@ -143,6 +144,12 @@ def free_form_as_dict(found: FreeForm) -> dict[str, Any]:
 
 def _samples(records: Sequence[Record]) -> int:
     return sum(len(record.time) for record in records)
+
+
+def _fixed(found: Effect) -> dict[str, float]:
+    """Return the parameters that were not fitted, such as a declared direction, in the units of their names."""
+    whole = effect(found.id).parameters
+    return {whole[place].name: whole[place].in_file_unit(value)[0] for place, value in found.fixed}
 
 
 def size_of(effect_id: str) -> Parameter:
