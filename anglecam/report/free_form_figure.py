@@ -58,7 +58,7 @@ def _colours(
         figure, ax = plt.subplots(figsize=(PANEL[0], 3.6), layout="constrained")
         least = -most if colours == "RdBu_r" else 0.0
         size = 20.0 + 600.0 * np.sqrt(visited)
-        drawn = ax.scatter(*points, c=shown, s=size, cmap=colours, vmin=least, vmax=most)
+        drawn = ax.scatter(points[0], points[1], c=shown, s=size, cmap=colours, vmin=least, vmax=most)
         figure.colorbar(drawn, ax=ax)
         ax.set_title(title + "; larger where visited longer", loc="left", fontsize=8)
         ax.set(xlabel=labels[0], ylabel=labels[1])

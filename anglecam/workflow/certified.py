@@ -10,7 +10,7 @@ from pathlib import Path
 from anglecam.certificate.certificate_json import COMMAND_ENDING, certificate_as_dict
 from anglecam.certificate.certify import NO_LAMP, Certificate, Clock, certify
 from anglecam.io.command_csv import COMMAND_ENDING as COMMAND_FILE
-from anglecam.io.files import open_regular, write_json
+from anglecam.io.files import write_json
 from anglecam.io.session import Session, recording_name
 from anglecam.loop.next_experiment.design import write_command
 from anglecam.report.certificate_page import write_certificate_page
@@ -88,5 +88,5 @@ def _sums(session: Session) -> list[tuple[str, str]]:
 
 
 def _sum(path: Path) -> str:
-    with open_regular(path) as stream:
+    with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
