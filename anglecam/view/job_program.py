@@ -19,9 +19,6 @@ from anglecam.io.session import read_session
 from anglecam.terminal import make_folder
 from anglecam.workflow.clip import measure_source, open_source, write_measurement
 
-_NICE = 5
-"""Priority is given up, so that the page answers while all cores measure."""
-
 
 def measure(request: dict[str, Any]) -> dict[str, Any]:
     """Measure one clip as `anglecam measure` does; ``request`` holds ``clip`` and ``out``."""
@@ -64,7 +61,6 @@ def main() -> None:
     """Do what the first line of standard input asks for."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the server handles Ctrl-C
     signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(1))
-    os.nice(_NICE)
     request = json.loads(sys.stdin.readline())
     threading.Thread(target=_end_with_input, daemon=True).start()
     try:

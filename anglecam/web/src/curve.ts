@@ -66,7 +66,7 @@ export class Curve {
     const axis = { stroke: ink, grid: { stroke: faint, width: 1 }, ticks: { stroke: faint, width: 1 } };
     const hidden = { stroke: "transparent", points: { show: false } };
     const edges = data.bands.flatMap(() => [hidden, hidden]);
-    const beside = data.beside ? [{ label: data.beside.label, stroke: styled("--command"), width: 1 }] : [];
+    const beside = data.beside ? [{ label: data.beside.label, stroke: styled("--command"), width: 1, points: { show: false }, paths: uPlot.paths.stepped!({ align: 1 }) }] : [];
     return {
       width: this.host.clientWidth,
       height: this.height(),

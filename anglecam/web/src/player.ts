@@ -24,7 +24,10 @@ export class Player {
   constructor() {
     new ResizeObserver(() => this.draw()).observe(this.canvas);
     watch((changed) => {
-      if (changed.has("info")) this.view.reset();
+      if (changed.has("info")) {
+        this.view.reset();
+        this.canvas.style.aspectRatio = `${this.size[0]} / ${this.size[1]}`;
+      }
       if (["info", "frame", "stage", "learnt"].some((key) => changed.has(key as never))) this.load();
       else this.draw();
     });

@@ -118,10 +118,8 @@ function pair(x: string, y: string, moved: (at: Point) => void): void {
 }
 
 function fillPair(x: string, y: string, at: Point | undefined): void {
-  [x, y].forEach((id, axis) => {
-    input(id).value = at ? String(at[axis]) : "";
-    input(id).disabled = at === undefined;
-  });
+  input(x).closest<HTMLElement>(".pair")!.hidden = at === undefined;
+  [x, y].forEach((id, axis) => (input(id).value = at ? String(at[axis]) : ""));
 }
 
 function input(id: string): HTMLInputElement {
