@@ -86,8 +86,10 @@ def budget(
     """Write the budget of the angle's uncertainty: NAME.budget.json and a page for each clip."""
     from anglecam.measurement.clip import Measurement
     from anglecam.report.budget_page import budget_table, write_budget
-    from anglecam.workflow.clip import open_source
+    from anglecam.report.origin import origin_of
+    from anglecam.workflow.clip import inputs_of, open_source
 
+    run = this_run(rig)
     declared = read_rig(rig) if rig else None
 
     def budget_one(clip: Path, bars: Progress) -> Measurement | MeasuredTracks:
@@ -96,7 +98,8 @@ def budget(
             raise InputError(f"{clip}: a budget needs the pictures; give the clip")
         measurement = _measure(source, bars)
         assert isinstance(measurement, Measurement)
-        screen.print(budget_table(write_budget(source.film, measurement, source.rig, out)))
+        made = origin_of(inputs_of(clip, source.rig, run), run)
+        screen.print(budget_table(write_budget(source.film, measurement, source.rig, out, made)))
         return measurement
 
     end(_for_each(clips, out, find_clips, budget_one))

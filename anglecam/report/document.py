@@ -1,4 +1,4 @@
-"""One HTML file: a template that extends ``base.html``, with stylesheet, scripts and data in it, so that no network is needed.
+"""One HTML file: a template that extends ``base.html``, with stylesheet, scripts and data in it; no network is needed.
 
 The scripts are built from ``anglecam/web/src`` and committed as ``anglecam/web/static``.
 """

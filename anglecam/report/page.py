@@ -79,7 +79,8 @@ def write_report(
     problems : sequence
         Recordings that could not be used, with the cause.
     shown : sequence of AngleSeries, optional
-        The same recordings with the angles that the loop starts from, where measuring corrected an effect of the camera.
+        The same recordings with the angles that the loop starts from, where measuring corrected an effect of the
+        camera.
     films : mapping of str to Film, optional
         Of those recordings that have one, by name.
     made : Origin, optional

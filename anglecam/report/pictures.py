@@ -89,7 +89,7 @@ def take_pictures(film: Film | None, series: AngleSeries, moments: Sequence[Mome
 
 
 def thumbnail(picture: Image, longest_px: int = LONGEST_SIDE_PX, quality: int = QUALITY) -> bytes:
-    """Return a picture, (h, w, 3) blue, green, red or (h, w, 1), as WebP that is at most ``longest_px`` wide and high."""
+    """Return a picture, (h, w, 3) blue, green, red or (h, w, 1), as WebP with sides up to ``longest_px``."""
     height, width = picture.shape[:2]
     scale = min(1.0, longest_px / max(height, width))
     size = (max(1, round(width * scale)), max(1, round(height * scale)))
