@@ -27,7 +27,8 @@ from anglecam.io.rig import Rig, read_rig
 from anglecam.io.session import Recording, read_session, rig_beside
 from anglecam.measurement.clip import Measurement
 from anglecam.measurement.tracks import MeasuredTracks
-from anglecam.workflow.clip import measure_source, open_recording, open_source, write_measurement
+from anglecam.report.origin import Run
+from anglecam.workflow.clip import measure_source, open_recording, open_source, write_clip_page, write_measurement
 
 _GRACE_S = 60.0
 """Time after its time limit at which a process ends itself if it has not noticed that its parent is gone, in s."""
@@ -63,9 +64,15 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
                 found |= {"width_px": film.width, "height_px": film.height, "codec": film.codec}
             measurement = measure_source(source)
         found |= _figures(measurement) | {"truncated": measurement.truncated, "doubt": measurement.doubt}
+        from anglecam.report.clip_page import write_thumbnail  # loads matplotlib
+
         with blame(clip):
             try:
-                write_measurement(measurement, source.command, into)
+                answers = write_measurement(measurement, source.command, into)
+                write_clip_page(
+                    source, measurement, answers, into, Run(rig=Path(request["rig"]) if request["rig"] else None)
+                )
+                write_thumbnail(into, measurement, source.film)
                 if request["series_file"]:
                     write_netcdf(measurement.series, Path(request["series_file"]))
             except OSError as problem:

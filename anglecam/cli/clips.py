@@ -99,8 +99,10 @@ def budget(
     from anglecam.budget.clip import budget_as_dict
     from anglecam.measurement.clip import Measurement
     from anglecam.report.budget_page import budget_table, write_budget
-    from anglecam.workflow.clip import open_source
+    from anglecam.report.origin import origin_of
+    from anglecam.workflow.clip import inputs_of, open_source
 
+    run = this_run(rig)
     declared = read_rig(rig) if rig else None
 
     def budget_one(clip: Path, bars: Progress) -> Measurement | MeasuredTracks:
@@ -109,7 +111,8 @@ def budget(
             raise InputError(f"{clip}: a budget needs the pictures; give the clip")
         measurement = _measure(source, bars)
         assert isinstance(measurement, Measurement)
-        found = write_budget(source.film, measurement, source.rig, out)
+        made = origin_of(inputs_of(clip, source.rig, run), run)
+        found = write_budget(source.film, measurement, source.rig, out, made)
         screen.print(budget_table(found))
         report(budgets=[budget_as_dict(found)])
         return measurement

@@ -21,6 +21,7 @@ from anglecam.report.document import html_of, write_html
 from anglecam.report.figures import angle_panel, sigma_panel
 from anglecam.report.moments import choose_moments
 from anglecam.report.origin import Origin
+from anglecam.report.page_names import THUMBNAIL_ENDING, page_name
 from anglecam.report.pictures import MOST_OF_RECORDING, take_pictures, thumbnail
 from anglecam.video.film import Film
 
@@ -34,21 +35,7 @@ MEANINGS = {
     "undecodable": "the file is damaged here",
 }
 """Of the values of ``status``."""
-OTHER_PAGES = ("index", "report")
-"""Names of pages of sessions and batches, which a clip's page must not replace."""
-THUMBNAIL_ENDING = ".thumb.webp"
 THUMBNAIL_PX = 240
-
-
-def page_name(name: str) -> str:
-    """Return the file name of a clip's page.
-
-    Examples
-    --------
-    >>> page_name("swing"), page_name("report")
-    ('swing.html', 'report.angles.html')
-    """
-    return f"{name}.angles.html" if name in OTHER_PAGES else f"{name}.html"
 
 
 def write_clip_html(
@@ -82,9 +69,8 @@ def write_clip_html(
     columns = series_columns(series, None if command is None else command.at(series.time))
     recording = Columns(series.name, series.first_frame, columns)
     ok = series.ok
-    low, high = (
-        f"{np.degrees(end):.2f}°".replace("-", "−") for end in (series.angle[ok].min(), series.angle[ok].max())
-    )
+    ends = np.degrees([series.angle[ok].min(), series.angle[ok].max()])
+    low, high = (f"{end:.2f}°".replace("-", "−") for end in ends)
     contents = {"film": "Angle and film", "steps": "From rest to rest", "frames": "Frames"}
     if not answers:
         del contents["steps"]

@@ -24,6 +24,7 @@ SHADE = "#bcd7e2"
 """Of the interval in which an angle lies."""
 PANEL = (5.2, 2.3)
 """Size of one panel of a page, inches; small enough that its text can be read on a narrow screen."""
+LEGEND_COLUMNS = 3
 NORMAL_95 = 1.96
 """Standard uncertainties from the middle to the end of a 95 % interval."""
 STYLE: Any = {
@@ -79,12 +80,15 @@ def sigma_panel(series: AngleSeries) -> str:
 def panel(ylabel: str, draw: Callable[[Axes], None], xlabel: str = "time, s") -> str:
     """Return one panel of a page as SVG, with the legend that its curves need."""
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(figsize=PANEL, layout="constrained")
+        figure, axes = plt.subplots(figsize=PANEL)
         draw(axes)
         axes.set(xlabel=xlabel, ylabel=ylabel)
         handles, texts = axes.get_legend_handles_labels()
-        if len(handles) > 1:
-            figure.legend(handles, texts, loc="outside upper left", ncols=3, fontsize=8)
+        rows = -(-len(handles) // LEGEND_COLUMNS) if len(handles) > 1 else 0
+        if rows:
+            figure.legend(handles, texts, loc="upper left", ncols=LEGEND_COLUMNS, fontsize=8)
+        # fixed margins, because working out a layout takes as long as drawing
+        figure.subplots_adjust(left=0.15, right=0.98, bottom=0.2, top=0.95 - 0.08 * rows)
         return _svg(figure)
 
 

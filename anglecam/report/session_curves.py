@@ -64,9 +64,8 @@ def watch(verdict: Verdict, series: Sequence[AngleSeries], films: Mapping[str, F
         for model, residual in (("before", "residual_before"), ("after", "residual_after")):
             if residual in columns:
                 columns[f"model_{model}"] = columns["angle"] - columns[residual]
-        last = columns.get("residual_after", columns.get("residual_before"))
         changes = [] if command is None else command.time[1:][np.diff(command.angle) != 0.0].tolist()
-        moments = choose_moments(one, last, "residual", changes, most_pictures(len(series)))
+        moments = choose_moments(one, columns.get("residual_before"), "residual", changes, most_pictures(len(series)))
         pictures = take_pictures(films.get(one.name), one, moments)
         found.append(Watched(one, Columns(one.name, one.first_frame, columns), pictures))
     return found
