@@ -56,7 +56,7 @@ def self_test() -> SelfTest:
     true = np.radians(AMPLITUDE_DEG) * np.sin(2.0 * np.pi * np.arange(FRAMES) / FRAMES)
     with TemporaryDirectory(prefix="anglecam-") as folder:
         clip = Path(folder) / "self-test.mkv"
-        _write(clip, true)
+        write_film(clip, true)
         began = time.monotonic()
         series = measure_source(open_source(clip)).series
     ok = series.ok
@@ -70,10 +70,18 @@ def self_test() -> SelfTest:
     )
 
 
-def _write(clip: Path, angles: Floats) -> None:
-    """Write the film as FFV1, which is lossless."""
+def write_film(path: Path, angles: Floats) -> None:
+    """Draw a film, a frame for each angle, and write it as FFV1, which is lossless.
+
+    Parameters
+    ----------
+    path : Path
+        A ``.mkv`` file.
+    angles : (n,) ndarray
+        Angle from the middle of the swing in each frame, rad.
+    """
     noise = np.random.default_rng(1)
-    with av.open(str(clip), mode="w") as container:
+    with av.open(str(path), mode="w") as container:
         stream = container.add_stream("ffv1", rate=Fraction(RATE_HZ))
         stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "bgr0"
         for angle in angles:
