@@ -172,8 +172,8 @@ def _is_jpeg(picture: av.VideoFrame) -> bool:
 
 def _jpeg_part(picture: av.VideoFrame, part: tuple[slice, slice]) -> Image:
     rows, columns = part
-    planes = _lines(picture, 0), _lines(picture, 1), _lines(picture, 2)
-    return np.asarray(_jpeg_colours(*planes, rows.start, rows.stop, columns.start, columns.stop))
+    bright, of_blue, of_red = (_lines(picture, k) for k in range(3))
+    return np.asarray(_jpeg_colours(bright, of_blue, of_red, rows.start, rows.stop, columns.start, columns.stop))
 
 
 @njit(cache=True, nogil=True)

@@ -13,6 +13,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
@@ -167,30 +168,58 @@ def measure(patch: Patch, model: ColourModel) -> Region | None:
     # A highlight or the teeth inside the outline belong to the mark: away from the edge the outline is filled.
     weight[cv2.erode(filled, disc(_FOOT_PX)) > 0] = 1.0
 
-    area = float(weight.sum())
+    of_weight, of_edge = _sums(weight)
+    area = float(of_weight[0, 0])
     if area <= 0.0:
         return None
-    centre, moments = _moments(weight, area)
+    centre = of_weight[0, 1:] / area
     slope = float(np.linalg.norm(model.weights)) / (1.0 - 2.0 * low)
-    soft = ((weight > 0.0) & (weight < 1.0)).astype(float)
     return Region(
         centre_px=centre + start,
         area_px2=area,
-        moments_px2=moments,
-        noise_px2=(slope / area) ** 2 * _moments(soft, 1.0, centre)[1],
+        moments_px2=_about(centre, of_weight) / area,
+        noise_px2=(slope / area) ** 2 * _about(centre, of_edge),
         contour_px=(shape.outline_px.reshape(-1, 2) + start).astype(np.int32),
         whole=not (patch.cut or touched),
     )
 
 
-def _moments(weight: Floats, total: float, about: Floats | None = None) -> tuple[Floats, Floats]:
-    """Return the centroid (2,) of weights (h, w) and the second moments (2, 2) about it, or about another place."""
-    columns, rows = weight.sum(axis=0), weight.sum(axis=1)
-    x, y = np.arange(len(columns), dtype=float), np.arange(len(rows), dtype=float)
-    centre = np.array([columns @ x, rows @ y]) / total if about is None else about
-    dx, dy = x - centre[0], y - centre[1]
-    xy = dy @ weight @ dx
-    return centre, np.array([[columns @ dx**2, xy], [xy, rows @ dy**2]]) / total
+@njit(cache=True, nogil=True)
+def _sums(weight):  # type: ignore[no-untyped-def]
+    """Return the sums of weights (h, w) by the products of 1, x and y, and those of the pixels between 0 and 1.
+
+    Of each, an upper triangle (3, 3).
+    """
+    of_weight, of_edge = np.zeros((3, 3)), np.zeros((3, 3))
+    for y in range(weight.shape[0]):
+        one = x1 = x2 = edge = edge_x1 = edge_x2 = 0.0
+        for x in range(weight.shape[1]):
+            share = np.float64(weight[y, x])
+            if share > 0.0:
+                one, x1, x2 = one + share, x1 + share * x, x2 + share * x * x
+                if share < 1.0:
+                    edge, edge_x1, edge_x2 = edge + 1.0, edge_x1 + x, edge_x2 + x * x
+        _add_row(of_weight, y, one, x1, x2)
+        _add_row(of_edge, y, edge, edge_x1, edge_x2)
+    return of_weight, of_edge
+
+
+@njit(cache=True, inline="always")
+def _add_row(sums, y, one, x1, x2):  # type: ignore[no-untyped-def]
+    sums[0, 0] += one
+    sums[0, 1] += x1
+    sums[1, 1] += x2
+    sums[0, 2] += one * y
+    sums[1, 2] += x1 * y
+    sums[2, 2] += one * y * y
+
+
+def _about(centre: Floats, sums: Floats) -> Floats:
+    """Return the second moments (2, 2) about a centre (2,), of sums as from `_sums`."""
+    (one, sum_x, sum_y), (_, sum_xx, sum_xy), (_, _, sum_yy) = sums.tolist()
+    x, y = centre.tolist()
+    xy = sum_xy - x * sum_y - y * sum_x + one * x * y
+    return np.array([[sum_xx - 2.0 * x * sum_x + one * x * x, xy], [xy, sum_yy - 2.0 * y * sum_y + one * y * y]])
 
 
 def _reach(smooth: Image, filled: Image, model: ColourModel) -> Image:
