@@ -44,7 +44,8 @@ SIZES: dict[str, Callable[[np.random.Generator], Keys]] = {
     "torque_saturation": lambda rng: {"limit": rng.uniform(60.0, 120.0), "share": rng.uniform(0.4, 1.0)},
 }
 """Plain sizes of the effects, by their ids, as the specs of `synth` state them."""
-NOTHING = "nothing"
+CASES = ("nothing", *SIZES)
+"""What acts in a session; the place of a case is part of its seed."""
 
 
 def truths(case: str, keys: Keys) -> dict[str, float]:
@@ -73,10 +74,10 @@ def judged(one: Certified, truth: float) -> dict[str, Any]:
 
 
 def run(case: str, seed: int) -> dict[str, Any]:
-    """Draw, close and certify one session."""
-    rng = np.random.default_rng([seed, 77])
-    keys = SIZES[case](rng) if case in SIZES else {}
-    records = session({case: keys} if keys else {}, seed=seed)
+    """Draw, close and certify one session; no two have the same plant, commands or noise."""
+    number = len(CASES) * seed + CASES.index(case)
+    keys = SIZES[case](np.random.default_rng([number, 1])) if case in SIZES else {}
+    records = session({case: keys} if keys else {}, seed=number)
     start = time.perf_counter()
     verdict = close_records(records, held_out=HELD_OUT, seed=seed)
     closed = time.perf_counter()
@@ -141,7 +142,7 @@ def main(
     out.parent.mkdir(parents=True, exist_ok=True)
     done = {(line["case"], line["seed"]) for line in read_lines(out)}
     for seed in range(first, first + seeds):
-        for case in (NOTHING, *SIZES):
+        for case in CASES:
             if (case, seed) not in done:
                 with out.open("a", encoding="utf-8") as stream:
                     stream.write(json.dumps(run(case, seed)) + "\n")

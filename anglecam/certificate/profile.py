@@ -36,10 +36,13 @@ THRESHOLD = 3.841459
 """95 % point of χ² with one degree of freedom."""
 TOLERANCE = 0.02
 """Share of an end's distance from the estimate to which the end is computed; it is rounded outwards."""
-SMALLEST_STEP = 1e-5
+SMALLEST_STEP = 1e-3
 """First step of the search for an end where no standard uncertainty is known, as a share of the parameter's range."""
-FARTHER = (1.5, 3.0)
-"""Multiples of an end's distance at which the likelihood is computed once more: it may have a second maximum."""
+FARTHER = (0.5, 2.0)
+"""Multiples of the distance from an end to the null, or to the estimate if that is farther, at which the likelihood is
+computed once more: it may have a second maximum."""
+MOST_DEVIANCE = 1e6
+"""Larger deviances count as this, also those of a model that diverges."""
 BETTER = 0.1
 """Gain in log-likelihood by which a fit on the way is a better estimate, from which the search begins again."""
 MOST_RESTARTS = 3
@@ -106,7 +109,7 @@ def profile(best: Fit, name: str, records: Sequence[Record], noise: Noise, extra
     return found
 
 
-def fit_at(fit: Fit, name: str, value: float, records: Sequence[Record], near: Sequence[Fit] = ()) -> Fit:
+def fit_at(fit: Fit, name: str, value: float, records: Sequence[Record], near: Fit | None = None) -> Fit:
     """Fit a plant again with one parameter held at a value.
 
     Parameters
@@ -119,8 +122,8 @@ def fit_at(fit: Fit, name: str, value: float, records: Sequence[Record], near: S
         SI.
     records : sequence of Record
         The fitted recordings.
-    near : sequence of Fit
-        Further fits of this kind to start from.
+    near : Fit, optional
+        A fit of this kind, with the parameter held at another value, to start from in place of ``fit``.
 
     Returns
     -------
@@ -129,9 +132,8 @@ def fit_at(fit: Fit, name: str, value: float, records: Sequence[Record], near: S
     """
     plant, place = plant_of(fit), fit.model.names.index(name)
     held = replace(plant, effects=tuple(e.with_fixed({name: value}) for e in plant.effects))
-    starts = [(np.delete(fit.parameters, place), fit.nuisance), *((one.parameters, one.nuisance) for one in near)]
-    fits = [fit_output_error(held, records, [start], nuisance=own, phi=fit.phi) for start, own in starts]
-    return min(fits, key=lambda one: one.cost)
+    start = np.delete(fit.parameters, place) if near is None else near.parameters
+    return fit_output_error(held, records, [start], nuisance=(near or fit).nuisance, phi=fit.phi)
 
 
 def _profile_once(
@@ -144,14 +146,20 @@ def _profile_once(
     sigma, inflation = _uncertainty(best, name, records, noise, extra_sigma)
     held: dict[float, Fit] = {}
 
+    def lost(fit: Fit) -> float:
+        return 2.0 * log_likelihood_gain(fit.cost, best.cost, len(best.white))
+
     def loss(value: float) -> float:
         """Return twice the loss of log-likelihood at a value."""
         if value == estimate:
             return 0.0
         if value not in held:
-            nearest = sorted(held, key=lambda v: abs(v - value))[:1]
-            held[value] = fit_at(best, name, value, records, [held[v] for v in nearest])
-        return 2.0 * log_likelihood_gain(held[value].cost, best.cost, len(best.white))
+            nearest = min(held, key=lambda v: abs(v - value), default=None)
+            one = fit_at(best, name, value, records, None if nearest is None else held[nearest])
+            if nearest is not None and lost(one) > THRESHOLD:  # no value is excluded by one local minimum
+                one = min(one, fit_at(best, name, value, records), key=lambda fit: fit.cost)
+            held[value] = one
+        return lost(held[value])
 
     def ends(step: float, inflation: float) -> tuple[float, float]:
         def deviance(value: float) -> float:
@@ -197,8 +205,9 @@ def _end(deviance: Callable[[float], float], estimate: float, step: float, bound
         else:
             inside, step = tried, 2.0 * step
     outside = _refined(deviance, estimate, inside, outside)
+    reach = max(abs(outside - estimate), abs(outside - null))
     for factor in FARTHER if bound != null else ():
-        tried = estimate + factor * (outside - estimate)
+        tried = outside + side * factor * reach
         if side * (tried - bound) < 0.0 and deviance(tried) <= THRESHOLD:
             return _end(deviance, estimate, 2.0 * (tried - estimate), bound, null)
     return outside
@@ -206,12 +215,12 @@ def _end(deviance: Callable[[float], float], estimate: float, step: float, bound
 
 def _refined(deviance: Callable[[float], float], estimate: float, inside: float, outside: float) -> float:
     """Return a value just outside the interval, between one inside and one outside."""
-    wanted = math.sqrt(THRESHOLD)
+    wanted, halve = math.sqrt(THRESHOLD), False
     while abs(outside - inside) > TOLERANCE * abs(outside - estimate):
-        # the root of the deviance is nearly linear
-        low, high = math.sqrt(max(deviance(inside), 0.0)), math.sqrt(min(deviance(outside), 1e6))
-        share = (wanted - low) / (high - low) + 0.5 * TOLERANCE
-        tried = inside + min(max(share, 0.05), 0.95) * (outside - inside)
+        # the root of the deviance is nearly linear, but for a limit that sets in at once
+        low, high = math.sqrt(max(deviance(inside), 0.0)), math.sqrt(min(deviance(outside), MOST_DEVIANCE))
+        share = 0.5 if halve else min(max((wanted - low) / (high - low) + 0.5 * TOLERANCE, 0.05), 0.95)
+        tried, halve = inside + share * (outside - inside), not halve
         if deviance(tried) > THRESHOLD:
             outside = tried
         else:
