@@ -37,7 +37,7 @@ def test_the_exposure_is_found_within_its_uncertainty(tmp_path, exposure_s):
     found = exposure_from_blur(measure_source(open_source(_film(tmp_path, exposure_s))))
     assert found is not None
     value, sigma = found
-    assert abs(value - exposure_s) < max(4.0 * sigma, 0.1 * exposure_s)
+    assert abs(value - exposure_s) < 2.0 * sigma
     assert sigma < 0.25 * exposure_s
 
 
