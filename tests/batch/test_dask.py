@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
-import sys
 import threading
 import time
 
@@ -14,6 +12,7 @@ import pytest
 
 from anglecam.batch.run import Options, run_batch
 from anglecam.errors import RigError
+from support.dask_cluster import dask_cluster
 from support.tiny import batch_command, children, is_alive, results, tiny_lab
 
 pytest.importorskip("distributed")
@@ -23,25 +22,8 @@ pytestmark = pytest.mark.usefixtures("shared_processes")
 @pytest.fixture
 def cluster(tmp_path):
     """Start a scheduler and two workers as a user does."""
-    file = tmp_path / "scheduler.json"
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
-    dask = [sys.executable, "-c", "from dask.__main__ import main; main()"]
-    scheduler = subprocess.Popen(
-        [*dask, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", file], **quiet
-    )
-    workers = [
-        subprocess.Popen([*dask, "worker", "--scheduler-file", file, "--nthreads", "1", "--no-dashboard"], **quiet)
-        for _ in range(2)
-    ]
-    until = time.monotonic() + 60.0
-    while not file.exists() or not file.read_text():
-        assert time.monotonic() < until
-        time.sleep(0.05)
-    yield json.loads(file.read_text())["address"], workers
-    for process in (*workers, scheduler):
-        process.terminate()
-    for process in (*workers, scheduler):
-        process.wait(30)
+    with dask_cluster(tmp_path) as started:
+        yield started.address, started.workers
 
 
 def test_a_worker_that_is_killed_loses_no_clip(cluster, tmp_path):
@@ -105,3 +87,15 @@ def test_a_missing_scheduler_is_reported_in_one_line(tmp_path, monkeypatch):
     lab = tiny_lab(tmp_path / "lab", ["a.avi"])
     with pytest.raises(RigError, match=r"^--dask tcp://127\.0\.0\.1:9: no scheduler with a worker there \(.*\)$"):
         run_batch([str(lab)], tmp_path / "out", Options(jobs=1, quiet=True, dask="tcp://127.0.0.1:9"))
+
+
+def test_a_scheduler_with_workers_of_other_versions_only_is_refused_and_names_them(tmp_path, capfd):
+    lab = tiny_lab(tmp_path / "lab", ["a.avi"])
+    with dask_cluster(tmp_path, ["9.9.9"]) as cluster:
+        refused = rf"^--dask {cluster.address}: no worker there can do the jobs of this batch$"
+        with pytest.raises(RigError, match=refused):
+            run_batch([str(lab)], tmp_path / "out", Options(jobs=1, quiet=True, dask=cluster.address))
+    lines = capfd.readouterr().err.splitlines()
+    assert len(lines) == 1
+    assert "gets no jobs: anglecam 9.9.9, but the batch was started by" in lines[0]
+    assert not list((tmp_path / "out").glob("*.csv"))

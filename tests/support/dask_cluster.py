@@ -1,0 +1,56 @@
+"""A Dask scheduler and workers in processes of their own, as a user starts them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+_PROGRAM = "from dask.__main__ import main; main()"
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A running scheduler with its workers."""
+
+    address: str
+    scheduler: subprocess.Popen[bytes]
+    workers: tuple[subprocess.Popen[bytes], ...]
+
+
+@contextmanager
+def dask_cluster(folder: Path, versions: Sequence[str | None] = (None, None)) -> Iterator[Cluster]:
+    """Start a scheduler and one worker for each version of anglecam; ``None`` is the version that is installed."""
+    file = folder / "scheduler.json"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
+
+    def start(program: str, *arguments: object) -> subprocess.Popen[bytes]:
+        return subprocess.Popen([sys.executable, "-c", program, *map(str, arguments)], **quiet)
+
+    scheduler = start(
+        _PROGRAM, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", file
+    )
+    workers = tuple(
+        start(
+            _PROGRAM if version is None else f"import anglecam; anglecam.__version__ = {version!r}; {_PROGRAM}",
+            *("worker", "--scheduler-file", file, "--nthreads", "1", "--no-dashboard"),
+            *(() if version is None else ("--no-nanny",)),  # a nanny's worker is a new program
+        )
+        for version in versions
+    )
+    try:
+        until = time.monotonic() + 120.0
+        while not file.exists() or not file.read_text():
+            assert time.monotonic() < until
+            time.sleep(0.05)
+        yield Cluster(json.loads(file.read_text())["address"], scheduler, workers)
+    finally:
+        for process in (*workers, scheduler):
+            process.terminate()
+        for process in (*workers, scheduler):
+            process.wait(30)
