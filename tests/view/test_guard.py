@@ -20,7 +20,7 @@ ROUTES = ["/", "/static/view.js", "/api/folder", "/api/clips/0", "/api/clips/0/f
 
 @pytest.fixture
 def stranger(lab: Path) -> TestClient:
-    """A browser that does not know the token."""
+    """Return a browser that does not know the token."""
     return TestClient(application(open_folder(lab), PORT, TOKEN), base_url=HOST, follow_redirects=False)
 
 
