@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUN := $(VENV)/.run-ready
 DEV := $(VENV)/.dev-ready
-MESA := libegl1 libgl1 libgl1-mesa-dri
+TEST_PACKAGES := libegl1 libgl1 libgl1-mesa-dri chromium
 DEMO := build/demo
 
 # uv installs in seconds what takes pip minutes; it compiles bytecode as pip does, without which every process starts two
@@ -29,7 +29,7 @@ system = @missing=""; \
 	fi
 
 .DEFAULT_GOAL := help
-.PHONY: help setup venv-module mesa demo test check lock clean
+.PHONY: help setup venv-module test-packages demo test check lock clean
 
 help: ## list what there is
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-8s %s\n", $$1, $$2}'
@@ -41,9 +41,9 @@ VENV_MODULE := $(shell $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || echo
 venv-module:
 	$(if $(VENV_MODULE),$(call system,$(VENV_MODULE)),@:)
 
-# The tests also draw with OpenGL, off screen, by Mesa's EGL.
-mesa:
-	$(call system,$(MESA))
+# The tests also draw with OpenGL, off screen, by Mesa's EGL, and use the pages in Chromium.
+test-packages:
+	$(call system,$(TEST_PACKAGES))
 
 $(RUN): pyproject.toml requirements/build.lock requirements/run.lock
 	@echo "setup: making $(VENV) (1.0 GB) with the packages of requirements/run.lock"
@@ -66,7 +66,7 @@ demo: setup ## render a rig with a hidden effect, measure it, find the effect, w
 	$(BIN)/synth score $(DEMO)/result --truth $(DEMO)/truth
 
 # Many tests start processes; they start in three quarters of the time where bytecode of anglecam is kept.
-test: venv-module mesa $(DEV) ## everything that must pass
+test: venv-module test-packages $(DEV) ## everything that must pass
 	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest
 
 check: venv-module $(DEV) ## style, types, docstrings and the direction of imports, in seconds

@@ -8,12 +8,13 @@ from pathlib import Path
 
 from anglecam import __version__
 from anglecam.batch.address import TransientError, fetch, is_remote, name, stem
-from anglecam.batch.identity import clip_configuration, content_hash, is_reliable, stamp
+from anglecam.batch.identity import clip_inputs, combined_hash, content_hash, is_reliable, stamp
 from anglecam.batch.lock import is_current
 from anglecam.batch.measuring_process import MeasuringProcess, ProcessLost
-from anglecam.batch.publish import Finished, finish, workspace
+from anglecam.batch.publish import Finished, finish, not_done, workspace
 from anglecam.batch.records import ClipRecord
-from anglecam.batch.row import DOUBTFUL, OK, TRUNCATED, Row, cannot_write
+from anglecam.batch.row import DOUBTFUL, OK, TRUNCATED, Row
+from anglecam.batch.trouble import Trouble, TroubleError, not_written
 from anglecam.batch.worker import Settings, clip_time_limit, fetch_beside, message_of, require_same_batch
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.io.command_csv import COMMAND_ENDING
@@ -57,32 +58,40 @@ def run_clip_job(job: ClipJob, settings: Settings, process: MeasuringProcess) ->
             with blame(Path(job.address)):
                 require_same_batch(settings)
                 record = _identified(record, settings)
-                if job.before is not None and _is_done(job.before, record, job, settings):
-                    return _unchanged(job.before, record)
+                done = _done_before(record, job, settings)
+                if done is not None:
+                    return _unchanged(done, record)
                 clip = _fetched(job.address, work) if is_remote(job.address) else Path(job.address)
                 record = replace(record, row=replace(record.row, sha256=content_hash(clip)))
-                if job.before is not None and _is_done(job.before, record, job, settings):
-                    return _unchanged(job.before, record)
+                done = _done_before(record, job, settings)
+                if done is not None:
+                    return _unchanged(done, record)
                 record, made = _measured(record, job, settings, process, clip, work)
+        except TroubleError as problem:
+            return not_done(record, job.before, problem.trouble)
+        except TransientError as problem:
+            return not_done(record, job.before, Trouble(job.address, message_of(problem, job.address, work)))
         except AnglecamError as problem:
-            record = record.failed(
-                message_of(problem, job.address, work),
-                call_is_wrong=isinstance(problem, RigError),
-                transient=isinstance(problem, TransientError),
-            )
+            cause = message_of(problem, job.address, work)
+            record = record.failed(cause, call_is_wrong=isinstance(problem, RigError))
         record = replace(record, row=replace(record.row, wall_time_s=round(time.monotonic() - began, 3)))
         if not is_current(settings.folder, settings.run):
-            late = record.failed("the batch had ended before the clip was finished", transient=True)
-            return Finished(late, to_publish=False)
+            return not_done(record, job.before, Trouble(job.address, "the batch had ended before it was finished"))
         return finish(record, made, job.before, work, settings.folder)
 
 
 def _identified(record: ClipRecord, settings: Settings) -> ClipRecord:
     """Add which version of the clip this is, and the hash of what is declared for it."""
     found = stamp(record.address)
-    configuration = clip_configuration(record.address, settings.rig)
-    row = replace(record.row, size_bytes=found["size"], configuration=configuration)
-    return replace(record, row=row, stamp=found, stamp_is_reliable=is_reliable(found))
+    inputs = clip_inputs(record.address, settings.rig)
+    row = replace(record.row, size_bytes=found["size"], configuration=combined_hash(inputs))
+    return replace(record, row=row, stamp=found, stamp_is_reliable=is_reliable(found), inputs=inputs)
+
+
+def _done_before(record: ClipRecord, job: ClipJob, settings: Settings) -> ClipRecord | None:
+    """Return the record whose results this batch would obtain again: of those in place, or of the last attempt."""
+    earlier = () if job.before is None else (job.before.in_place, job.before)
+    return next((one for one in earlier if one is not None and _is_done(one, record, job, settings)), None)
 
 
 def _is_done(before: ClipRecord, record: ClipRecord, job: ClipJob, settings: Settings) -> bool:
@@ -123,7 +132,7 @@ def _measured(
     try:
         into.mkdir(parents=True)
     except OSError as problem:
-        return record.failed(cannot_write(problem), transient=True), {}
+        raise TroubleError(not_written(problem, job.address, settings.out)) from problem
     request = {
         "clip": str(clip),
         "rig": settings.rig,
@@ -138,9 +147,14 @@ def _measured(
     record = replace(record, row=replace(record.row, **figures))
     if not is_remote(record.address) and stamp(record.address) != record.stamp:
         return record.failed("it changed while it was being measured", transient=True), {}
+    if "unreadable" in answer:
+        file, _, cause = message_of(answer["unreadable"], job.address, work).partition(": ")
+        raise TroubleError(Trouble(file, cause, call_is_wrong=True))
+    if "not_written" in answer:
+        raise TroubleError(not_written(OSError(*answer["not_written"]), job.address, settings.out))
     if "cause" in answer:
         cause = message_of(answer["cause"], job.address, work)
-        return record.failed(cause, call_is_wrong=answer["call_is_wrong"], transient=answer["transient"]), {}
+        return record.failed(cause, call_is_wrong=answer["call_is_wrong"]), {}
     made = {job.output_path + file.name[len(clip.stem) :]: file for file in sorted(into.iterdir())}
     if job.in_session:
         made[settings.folder.cached_series(job.address)] = cached

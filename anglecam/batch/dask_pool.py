@@ -1,11 +1,13 @@
 """A worker pool of Dask workers, on this machine or several: they do the same jobs with the same function.
 
 Like a worker on this machine, a Dask worker measures in a separate process, so that a decoder that crashes does not end
-the worker. A job whose worker is lost is done by another worker.
+the worker. A job whose worker is lost is done by another worker. Only workers that `anglecam.batch.dask_door` admits
+get jobs.
 """
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import re
 import threading
@@ -14,12 +16,16 @@ from concurrent.futures import CancelledError
 from typing import Any, Generic, TypeVar
 
 from anglecam.batch.measuring_process import MeasuringProcess
+from anglecam.batch.worker import Settings
 from anglecam.errors import InputError, RigError
+from anglecam.terminal import errors
 
 try:
     import distributed
     from distributed.client import FutureCancelledError
     from distributed.comm import CommClosedError
+
+    from anglecam.batch.dask_door import Door
 except ImportError as missing:
     raise RigError("--dask: Dask is not installed; pip install 'anglecam[dask]'") from missing
 
@@ -44,10 +50,15 @@ class DaskPool(Generic[Job, Done]):
         The scheduler's address, or ``local`` to start a scheduler and workers on this machine.
     size : int
         Number of workers that ``local`` starts.
+    settings : Settings
+        The settings of the batch, by which workers are admitted.
     """
 
-    def __init__(self, work: Callable[[Job, MeasuringProcess], Done], address: str, size: int) -> None:
+    def __init__(
+        self, work: Callable[[Job, MeasuringProcess], Done], address: str, size: int, settings: Settings
+    ) -> None:
         self._work = work
+        self._door = Door(settings)
         self._address = address
         self._size = size
 
@@ -66,11 +77,36 @@ class DaskPool(Generic[Job, Done]):
             self._client.wait_for_workers(1, timeout=_WAIT_S)
         except (OSError, ValueError, TimeoutError) as problem:
             raise RigError(f"--dask {self._address}: no scheduler with a worker there ({_line(problem)})") from problem
+        self._open_door()
         self._started: dict[Any, Job] = {}
         self._done = distributed.as_completed(loop=self._client.loop)
         return self
 
+    def _open_door(self) -> None:
+        """Admit workers, now and whenever one joins; report each that is refused.
+
+        Raises
+        ------
+        RigError
+            If all are refused.
+        """
+        self._client.register_plugin(self._door, name=self._door.name)
+        refused = self._door.refused(self._client)
+        for line in refused:
+            errors.print(f"--dask {self._address}: {line}")
+        if not self._admitted():
+            self.__exit__()
+            raise RigError(f"--dask {self._address}: no worker there can do the jobs of this batch")
+
+    def _admitted(self) -> int:
+        """Return the number of threads of the workers that get jobs."""
+        assert self._client.scheduler is not None
+        workers = self._client.sync(self._client.scheduler.identity)["workers"].values()
+        return sum(worker["nthreads"] for worker in workers if self._door.name in worker["resources"])
+
     def __exit__(self, *_: object) -> None:
+        with contextlib.suppress(Exception):  # the scheduler may be lost
+            self._client.unregister_worker_plugin(self._door.name)
         self._client.close()
         if self._cluster is not None:
             self._cluster.close()
@@ -78,11 +114,11 @@ class DaskPool(Generic[Job, Done]):
     @property
     def capacity(self) -> int:
         """Number of jobs to have under way so that no worker waits for its next job."""
-        return 2 * max(1, sum(self._client.nthreads().values()))
+        return 2 * max(1, self._admitted())
 
     def start(self, job: Job) -> None:
         """Submit a job to the scheduler."""
-        future = self._client.submit(_do, self._work, job, pure=False)
+        future = self._client.submit(_do, self._work, job, pure=False, resources={self._door.name: 1})
         self._started[future.key] = job
         self._done.add(future)
 

@@ -18,6 +18,7 @@ measured anew.
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import sqlite3
@@ -197,7 +198,8 @@ def _as_os_errors() -> Iterator[None]:
     try:
         yield
     except sqlite3.Error as problem:
-        raise OSError(f"{problem}") from problem
+        full = getattr(problem, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
+        raise OSError(errno.ENOSPC if full else errno.EIO, str(problem)) from problem
 
 
 def _columns(record: Record) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from anglecam.batch.address import asking, is_remote, join, parent, read_small, stem
+from anglecam.batch.address import TransientError, asking, is_remote, join, names_in, parent, read_small, stem
 from anglecam.errors import InputError
 from anglecam.io.command_csv import COMMAND_ENDING
 
@@ -40,7 +40,9 @@ def stamp(address: str) -> Stamp:
     Raises
     ------
     InputError
-        If there is no such file, or its store does not answer.
+        If there is no such file.
+    TransientError
+        If its store does not answer, or its folder is gone or empty, as that of a share that is not mounted.
     """
     try:
         if is_remote(address):
@@ -48,6 +50,8 @@ def stamp(address: str) -> Stamp:
                 return {"size": int(fs.size(path) or 0), "key": str(fs.ukey(path))}
         found = Path(address).stat()
     except FileNotFoundError as problem:
+        if not is_remote(address) and not names_in(parent(address)):
+            raise TransientError(f"{address}: its folder is gone or empty; is it mounted?") from problem
         raise InputError(f"{address}: no such file") from problem
     # a program can set the content's time (mtime) by hand, but not the inode's (ctime)
     return {"size": found.st_size, "content": found.st_mtime_ns, "inode": [found.st_ino, found.st_ctime_ns]}
@@ -64,8 +68,8 @@ def content_hash(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def clip_configuration(address: str, rig: str | None) -> str:
-    """Return a hash of everything that a clip's results depend on, except the clip and the version of anglecam.
+def clip_inputs(address: str, rig: str | None) -> dict[str, str | None]:
+    """Return hashes of everything that a clip's results depend on, except the clip and the version of anglecam.
 
     Parameters
     ----------
@@ -76,13 +80,13 @@ def clip_configuration(address: str, rig: str | None) -> str:
 
     Returns
     -------
-    str
-        SHA-256 of rig file, calibration file and command file.
+    dict
+        SHA-256 of rig file, calibration file and command file; ``None`` for a file that is not there.
     """
     file = rig or join(parent(address), "rig.yaml")
     declared = read_small(file)
     calibration = calibration_named(declared)
-    return combined_hash(
+    return hashes(
         {
             "rig": declared,
             "calibration": None if calibration is None else read_small(_beside(file, calibration)),
@@ -102,13 +106,17 @@ def calibration_named(rig: bytes | None) -> str | None:
     return named if isinstance(named, str) else None
 
 
-def combined_hash(parts: Mapping[str, bytes | str | None]) -> str:
-    """Return the SHA-256 of a set of named parts; different sets have different hashes."""
-    hashes = {
+def hashes(parts: Mapping[str, bytes | str | None]) -> dict[str, str | None]:
+    """Return the SHA-256 of each of a set of named parts."""
+    return {
         key: None if part is None else hashlib.sha256(part if isinstance(part, bytes) else part.encode()).hexdigest()
         for key, part in parts.items()
     }
-    return hashlib.sha256(json.dumps(hashes, sort_keys=True).encode()).hexdigest()
+
+
+def combined_hash(inputs: Mapping[str, str | None]) -> str:
+    """Return one SHA-256 of a set of named hashes; different sets have different ones."""
+    return hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
 
 
 def _beside(rig: str, file: str) -> str:

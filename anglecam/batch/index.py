@@ -1,4 +1,4 @@
-"""The index: one row for every clip, as CSV for people and as Parquet for DuckDB and pandas."""
+"""The index: one row for every clip, as CSV, as Parquet for DuckDB and pandas, and as a page for people."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pyarrow import parquet
 
 from anglecam.batch.output_folder import OutputFolder
 from anglecam.batch.row import Row
+from anglecam.report.index_page import index_html
 
 _TYPES = {"int | None": pa.int64(), "float | None": pa.float64()}
 SCHEMA = pa.schema([(field.name, _TYPES.get(str(field.type), pa.string())) for field in fields(Row)])
@@ -19,7 +20,7 @@ SCHEMA = pa.schema([(field.name, _TYPES.get(str(field.type), pa.string())) for f
 
 
 def write_index(rows: Sequence[Row], folder: OutputFolder, run: str) -> None:
-    """Write ``index.csv`` and ``index.parquet``, each whole or not at all.
+    """Write ``index.csv``, ``index.parquet`` and ``index.html``, each whole or not at all.
 
     Parameters
     ----------
@@ -45,3 +46,5 @@ def write_index(rows: Sequence[Row], folder: OutputFolder, run: str) -> None:
     made = io.BytesIO()
     parquet.write_table(pa.Table.from_arrays(columns, schema=SCHEMA), made)
     folder.write(made.getvalue(), folder.path / "index.parquet", run)
+    page = index_html([dict(zip(SCHEMA.names, cells, strict=True)) for cells in table], folder.path)
+    folder.write(page.encode("utf-8", "backslashreplace"), folder.path / "index.html", run)

@@ -14,10 +14,15 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 _THREADED_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMBA")
 """Libraries that are limited to one thread, by the prefixes of their environment variables."""
+_STARTER = ThreadPoolExecutor(1, thread_name_prefix="starter")
+"""The thread that starts all measuring processes. Linux ends a process with the thread that started it, and this
+thread lasts as long as the program; see `anglecam.batch.parent`.
+"""
 
 
 class ProcessLost(Exception):  # noqa: N818  (an event, not a fault of this program)
@@ -41,7 +46,7 @@ class MeasuringProcess:
         Parameters
         ----------
         request : dict
-            As `anglecam.batch.child` expects it.
+            As `anglecam.batch.serve` expects it.
         time_limit : float
             Time after which the process is ended, in s.
 
@@ -96,13 +101,9 @@ class MeasuringProcess:
         if self._process is not None and self._process.poll() is not None:
             self._end()  # it died between two requests
         if self._process is None:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "anglecam.batch.child"],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL,  # decoders write messages there that the index reports once
-                env=os.environ | {f"{library}_NUM_THREADS": "1" for library in _THREADED_LIBRARIES},
-            )
+            self._process = _STARTER.submit(_start).result()
+            if self._closed:  # meanwhile
+                self._process.kill()
         return self._process
 
     def _ended(self) -> str:
@@ -117,3 +118,13 @@ class MeasuringProcess:
         if code >= 0:
             return f"the process that measured it ended with status {code}"
         return f"the process that measured it died of signal {-code} ({signal.Signals(-code).name})"
+
+
+def _start() -> subprocess.Popen[bytes]:
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", "anglecam.batch.child", str(os.getpid())],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,  # decoders write messages there that the index reports once
+        env=os.environ | {f"{library}_NUM_THREADS": "1" for library in _THREADED_LIBRARIES},
+    )

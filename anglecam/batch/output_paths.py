@@ -3,13 +3,14 @@
 A clip's results are named as `anglecam measure` names them, and lie in the folder that the clip has below the folder
 given in the call. If two clips would share a path, the first in the order of addresses keeps it. For the other, the
 name of the given folder is put in front, or the clip's ending or a part of its address's hash is appended. These names
-do not depend on the other clips.
+do not depend on the other clips. A path at which a clip has results is that clip's: it keeps the path where the path is
+still one of its candidates, and no other clip gets it.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection, Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import TypeVar
 from urllib.parse import quote
 
@@ -17,17 +18,18 @@ from anglecam.batch.address import name, parent, stem
 from anglecam.batch.sources import Source
 
 Item = TypeVar("Item", bound=Hashable)
+_NOBODY: Mapping[str, str] = {}
 
 
-def assign_clip_paths(sources: Sequence[Source], taken: Collection[str] = ()) -> dict[str, str]:
+def assign_clip_paths(sources: Sequence[Source], holders: Mapping[str, str] = _NOBODY) -> dict[str, str]:
     """Assign an output path to every clip.
 
     Parameters
     ----------
     sources : sequence of Source
         In the order of their addresses.
-    taken : collection of str
-        Output paths that are not available, such as those of clips of earlier batches.
+    holders : mapping
+        From output path to the address of the clip that has results there, or of anything else that takes the path.
 
     Returns
     -------
@@ -45,19 +47,22 @@ def assign_clip_paths(sources: Sequence[Source], taken: Collection[str] = ()) ->
             _path(below, f"{stem(source.address)}.{_digest(source.address)}"),
         ]
 
-    def of_one_folder(source: Source, holder: Source | None) -> bool:
-        return holder is not None and parent(source.address) == parent(holder.address)
+    def of_one_folder(source: Source, holder: str) -> bool:
+        return parent(source.address) == parent(holder)
 
-    return {s.address: path for s, path in _assign(sources, candidates, taken, of_one_folder).items()}
+    found = _assign(sources, candidates, lambda source: source.address, holders, of_one_folder)
+    return {source.address: path for source, path in found.items()}
 
 
-def assign_session_folders(folders: Sequence[tuple[str, str]]) -> dict[str, str]:
+def assign_session_folders(folders: Sequence[tuple[str, str]], holders: Mapping[str, str] = _NOBODY) -> dict[str, str]:
     """Assign an output folder to every session.
 
     Parameters
     ----------
     folders : sequence of (str, str)
         A session's folder and the folder that was searched to find it, in the order of addresses.
+    holders : mapping
+        From output folder to the folder of the session that has results there.
 
     Returns
     -------
@@ -70,32 +75,34 @@ def assign_session_folders(folders: Sequence[tuple[str, str]]) -> dict[str, str]
         below = folder[len(root) :].strip("/")
         return [_path(below), _path(name(root) or "root", below), _path(below, f"session.{_digest(folder)}")]
 
-    return {item[0]: path for item, path in _assign(folders, candidates).items()}
+    return {item[0]: path for item, path in _assign(folders, candidates, lambda item: item[0], holders).items()}
 
 
 def _assign(
     items: Iterable[Item],
     candidates: Callable[[Item], list[str]],
-    taken: Collection[str] = (),
-    skips_second: Callable[[Item, Item | None], bool] = lambda item, holder: False,
+    address: Callable[[Item], str],
+    holders: Mapping[str, str],
+    skips_second: Callable[[Item, str], bool] = lambda item, holder: False,
 ) -> dict[Item, str]:
-    """Assign every item its first candidate that is free; first candidates of all items go before second ones."""
-    holders: dict[str, Item | None] = dict.fromkeys(taken)
+    """Assign every item a path that it holds, or its first free candidate; first candidates go before second ones."""
+    held = dict(holders)
     assigned: dict[Item, str] = {}
     others = []
     for item in items:
-        path = candidates(item)[0]
-        if path in holders:
-            others.append(item)
+        mine = [path for path in candidates(item) if held.get(path, address(item)) == address(item)]
+        holding = [path for path in mine if path in held]
+        if holding or candidates(item)[0] in mine:
+            assigned[item] = (holding or mine)[0]
+            held[assigned[item]] = address(item)
         else:
-            holders[path] = item
-            assigned[item] = path
+            others.append(item)
     for item in others:
         first, second, *rest = candidates(item)
         # the second candidate, with the folder's name in front, does not distinguish two clips of one folder
-        tried = rest if skips_second(item, holders[first]) else [second, *rest]
-        path = next(path for path in tried if path not in holders)
-        holders[path] = item
+        tried = rest if skips_second(item, held[first]) else [second, *rest]
+        path = next(path for path in tried if path not in held)
+        held[path] = address(item)
         assigned[item] = path
     return assigned
 

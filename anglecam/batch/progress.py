@@ -13,7 +13,7 @@ from typing import IO
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from anglecam.batch.records import ClipRecord, SessionRecord
-from anglecam.batch.row import FAILED, OK
+from anglecam.batch.row import FAILED, OK, STALE
 from anglecam.errors import RigError
 from anglecam.terminal import errors
 
@@ -60,14 +60,19 @@ class ProgressDisplay:
 
 
 def _clip_outcome(record: ClipRecord, *, unchanged: bool) -> str:
-    status = record.row.status + (", as before" if unchanged else "")
-    cause = (record.row.cause or "").removeprefix(f"{record.row.status}: ")
+    row = record.shown
+    status = row.status + (", as before" if unchanged else "")
+    cause = (row.cause or "").removeprefix(f"{row.status}: ")
     return f"{status}: {cause}" if cause else status
+
+
+def _session_status(record: SessionRecord) -> str:
+    return OK if not record.has_failed else FAILED if record.in_place is None else STALE
 
 
 def _session_outcome(record: SessionRecord, *, unchanged: bool) -> str:
     if record.has_failed:
-        return "failed"
+        return _session_status(record)
     outcome = f"{record.verdict or 'identified'}{f' to {record.effects}' if record.effects else ''}"
     return f"{outcome}, as before" if unchanged else outcome
 
@@ -108,13 +113,13 @@ class Log:
 
     def add_clip(self, record: ClipRecord, *, unchanged: bool) -> None:
         """Write the outcome of a clip."""
-        row = record.row
+        row = record.shown
         self._write({"clip": row.path, "status": row.status}, row.cause, row.wall_time_s, unchanged=unchanged)
 
     def add_session(self, record: SessionRecord, *, unchanged: bool) -> None:
         """Write the outcome of a session."""
-        what = {"session": record.address, "status": FAILED if record.has_failed else OK}
-        self._write(what, record.cause, record.wall_time_s, unchanged=unchanged)
+        what = {"session": record.address, "status": _session_status(record)}
+        self._write(what, record.shown_cause, record.wall_time_s, unchanged=unchanged)
 
     def _write(self, what: dict[str, str], cause: str | None, wall_time_s: float | None, *, unchanged: bool) -> None:
         if self._stream is None:

@@ -9,6 +9,10 @@ record only ever describes results that are in place:
 2. move the new results to their paths, and remove old results that have no successor;
 3. save the new record.
 
+An attempt that must not replace the earlier results (see `anglecam.batch.records.keeping`) moves and removes nothing:
+its record is saved beside them. If results cannot be moved, the old record is saved again; files of new names are moved
+first, so that a full disk shows before a file is replaced.
+
 The worker also leaves its record in the workspace, as ``result.json``. If the batch is killed before or during
 publication, the next batch completes it with `recover`, and the clip need not be measured again.
 """
@@ -26,8 +30,8 @@ from pathlib import Path
 
 from anglecam.batch.database import RecordDatabase
 from anglecam.batch.output_folder import OutputFolder
-from anglecam.batch.records import ClipRecord, Record, SessionRecord, record_from_dict
-from anglecam.batch.row import cannot_write
+from anglecam.batch.records import ClipRecord, Record, SessionRecord, keeping, record_from_dict
+from anglecam.batch.trouble import Trouble, not_written
 
 _RESULT = "result.json"
 
@@ -37,6 +41,8 @@ class Finished:
     """What a worker returns for a job."""
 
     record: Record
+    trouble: Trouble | None = None
+    """Why the job was not done, if the reason lies not in its clip."""
     unchanged: bool = False
     """Whether the results are those of an earlier batch, already in place."""
     to_publish: bool = True
@@ -79,10 +85,15 @@ def finish(record: Record, made: dict[str, Path], before: Record | None, path: P
     Returns
     -------
     Finished
-        A failure if the results cannot be written.
+        With trouble if the results cannot be written.
     """
-    # after a change of output path the old results may belong to another clip
-    superseded = tuple(before.files) if before is not None and before.output_path == record.output_path else ()
+    record = keeping(record, before)
+    if record.has_failed:
+        made = {}
+    # after a change of output path the old results stay where they are
+    earlier = None if before is None else before.in_place
+    is_replaced = not record.has_failed and earlier is not None and earlier.output_path == record.output_path
+    superseded = tuple(earlier.files) if is_replaced and earlier is not None else ()
     inside = {output: str(file.relative_to(folder.path)) for output, file in made.items()}
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -94,8 +105,26 @@ def finish(record: Record, made: dict[str, Path], before: Record | None, path: P
         unnamed.write_text(json.dumps(content))
         unnamed.replace(path / _RESULT)
     except OSError as problem:
-        return Finished(_not_written(record, problem), superseded=superseded)
+        return not_done(record, before, not_written(problem, record.address, str(folder.path)))
     return Finished(record, made=inside, superseded=superseded, workspace=str(path.relative_to(folder.path)))
+
+
+def not_done(record: Record, before: Record | None, trouble: Trouble) -> Finished:
+    """Return the outcome of a job that the batch could not do: the record of an earlier batch, and nothing to publish.
+
+    Parameters
+    ----------
+    record : ClipRecord or SessionRecord
+        What is known of the clip or session.
+    before : ClipRecord or SessionRecord, optional
+        Its record by an earlier batch. If there are no results, the index states the trouble as the cause.
+    trouble : Trouble
+        Why the job was not done.
+    """
+    if before is not None and before.in_place is not None:
+        return Finished(before, trouble, to_publish=False)
+    cause = trouble.cause if trouble.where == record.address else f"{trouble.where}: {trouble.cause}"
+    return Finished(record.failed(cause, call_is_wrong=trouble.call_is_wrong), trouble, to_publish=False)
 
 
 def publish(finished: Finished, folder: OutputFolder, database: RecordDatabase) -> Finished:
@@ -113,7 +142,7 @@ def publish(finished: Finished, folder: OutputFolder, database: RecordDatabase) 
     Returns
     -------
     Finished
-        The same, or a failure if results or record cannot be written. There is then no record of new results.
+        The same, or with trouble if results or record cannot be written.
     """
     record = finished.record
     if not finished.to_publish:
@@ -122,21 +151,35 @@ def publish(finished: Finished, folder: OutputFolder, database: RecordDatabase) 
         with contextlib.suppress(OSError):
             database.save(record)
         return finished
+    old: Record | None = None
     try:
-        if database.find(type(record), record.address) is not None:
-            database.delete(type(record), record.address)
-        for output, file in finished.made.items():
-            target = folder.path / output
-            target.parent.mkdir(parents=True, exist_ok=True)
-            (folder.path / file).replace(target)
-        for output in set(finished.superseded) - set(record.files):
-            (folder.path / output).unlink(missing_ok=True)
-        database.save(record)
+        old = database.find(type(record), record.address)
+        if record.has_failed:
+            database.save(record)
+        else:
+            _replace_results(finished, folder, database, old)
     except OSError as problem:
-        finished = replace(finished, record=_not_written(record, problem))
+        if old is not None:
+            with contextlib.suppress(OSError):
+                database.save(old)
+        trouble = not_written(problem, record.address, str(folder.path))
+        finished = replace(not_done(record, old, trouble), workspace=finished.workspace)
     if finished.workspace:  # after an interruption it stays, for `recover`
         shutil.rmtree(folder.path / finished.workspace, ignore_errors=True)
     return finished
+
+
+def _replace_results(finished: Finished, folder: OutputFolder, database: RecordDatabase, old: Record | None) -> None:
+    record = finished.record
+    if old is not None:
+        database.delete(type(record), record.address)
+    targets = {folder.path / output: folder.path / file for output, file in finished.made.items()}
+    for target in sorted(targets, key=lambda target: target.exists()):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        targets[target].replace(target)
+    for output in set(finished.superseded) - set(record.files):
+        (folder.path / output).unlink(missing_ok=True)
+    database.save(record)
 
 
 def recover(run: str, folder: OutputFolder, database: RecordDatabase) -> None:
@@ -172,12 +215,6 @@ def _left_in(path: Path, folder: OutputFolder) -> Finished | None:
     if not folder.has(expected):
         return None
     return Finished(record, made=remaining, superseded=superseded, workspace=str(path.relative_to(folder.path)))
-
-
-def _not_written(record: Record, problem: OSError) -> Record:
-    """Return a record of the failure to write; a failure that was known before keeps its cause."""
-    cause = record.row.cause if isinstance(record, ClipRecord) else record.cause
-    return record.failed(cause if record.has_failed and cause else cannot_write(problem), transient=True)
 
 
 def _synchronise(file: Path) -> None:

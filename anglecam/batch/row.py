@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-OK, TRUNCATED, DOUBTFUL, FAILED = "ok", "truncated", "doubtful", "failed"
+OK, TRUNCATED, DOUBTFUL, STALE, FAILED = "ok", "truncated", "doubtful", "stale", "failed"
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Row:
     configuration: str | None = None
     """SHA-256 of rig file, calibration and command."""
     status: str = FAILED
-    """``ok``, ``truncated``, ``doubtful`` or ``failed``."""
+    """``ok``, ``truncated``, ``doubtful``, ``stale`` or ``failed``."""
     cause: str | None = None
     series: str | None = None
     """``NAME.angles.csv``, relative to the output folder."""
@@ -47,8 +47,3 @@ class Row:
     """Remarks that `anglecam measure` prints beside the angles, separated by ``; ``: for example, that only the mark
     could be followed.
     """
-
-
-def cannot_write(problem: OSError) -> str:
-    """Return the cause of a failure to write results."""
-    return f"the results cannot be written ({problem.strerror or problem})"

@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
-from anglecam.batch.address import is_of_one_process, join, normalised, stem
+from anglecam.batch.address import is_of_one_process, join, parent, stem
 from anglecam.batch.clip_job import ClipJob, run_clip_job
 from anglecam.batch.database import RecordDatabase
 from anglecam.batch.local_pool import LocalPool
@@ -24,14 +24,16 @@ from anglecam.batch.measuring_process import MeasuringProcess
 from anglecam.batch.output_folder import OutputFolder
 from anglecam.batch.output_paths import assign_clip_paths, assign_session_folders
 from anglecam.batch.progress import Log, ProgressDisplay, open_log, show_progress
+from anglecam.batch.prune import Pruned, is_stale, prune
 from anglecam.batch.publish import Finished, publish, recover
 from anglecam.batch.records import ClipRecord, SessionRecord
 from anglecam.batch.row import Row
 from anglecam.batch.session_job import SessionJob, find_sessions, run_session_job
-from anglecam.batch.sources import Source, find_sources
+from anglecam.batch.sources import Search, Source, find_sources
 from anglecam.batch.summary import Summary
+from anglecam.batch.trouble import Trouble
 from anglecam.batch.worker import Settings
-from anglecam.errors import AnglecamError, RigError
+from anglecam.errors import AnglecamError, InputError, RigError
 from anglecam.io.rig import read_rig
 from anglecam.io.session import CORRECTED
 from anglecam.terminal import make_folder
@@ -50,6 +52,8 @@ class Options:
     close: bool = False
     """Whether to close the loop for each session."""
     retry_failed: bool = False
+    prune: bool = False
+    """Whether to remove stale results at the end."""
     quiet: bool = False
     log: Path | None = None
     time_limit: float | None = None
@@ -66,6 +70,8 @@ class Result:
     """The rows of the index, in the order of their paths."""
     problems: tuple[AnglecamError, ...]
     """One for every clip and session that failed, and for everything else that could not be done."""
+    pruned: tuple[Pruned, ...] = ()
+    """Stale results that were removed."""
 
 
 class WorkerPool(Protocol):
@@ -110,9 +116,10 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
         read_rig(options.rig)
     make_folder(out)
     folder = OutputFolder(out.resolve())
-    sources, problems = find_sources(asked, folder.path)
+    sources, search, problems = find_sources(asked, folder.path)
     if options.dask is not None:
         _require_shared(sources)
+    pruned: list[Pruned] = []
     with (
         open_log(options.log) as log,
         locked(folder) as interrupted,
@@ -131,9 +138,9 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
             retry_failed=options.retry_failed,
             time_limit=options.time_limit,
         )
-        plan = _plan(sources, asked, earlier, database.read_all(SessionRecord), options)
+        plan = _plan(sources, search, earlier, database.read_all(SessionRecord), options)
         with contextlib.suppress(OSError):  # such as a full disk
-            database.save(*(replace(record, removed=True) for record in plan.removed))
+            database.save(*plan.removed)
         summary = Summary(folder, run, plan.earlier, plan.earlier_sessions, plan.sessions)
         with (
             _worker_pool(settings, options) as pool,
@@ -141,10 +148,12 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
         ):
             try:
                 _do_jobs(plan, pool, partial(publish, folder=folder, database=database), summary, display, log)
+                if options.prune:
+                    pruned = _prune(plan, search, folder, database, summary)
             finally:
                 summary.write_index()
         folder.clear_unfinished()
-    return Result(summary.rows(), (*problems, *summary.problems()))
+    return Result(summary.rows(), (*problems, *_out_of_reach(search, earlier), *summary.problems()), tuple(pruned))
 
 
 @dataclass(frozen=True)
@@ -162,31 +171,76 @@ class Plan:
 
 def _plan(
     sources: Sequence[Source],
-    asked: Sequence[str],
+    search: Search,
     records: Sequence[ClipRecord],
     session_records: Sequence[SessionRecord],
     options: Options,
 ) -> Plan:
     here = {source.address for source in sources}
-    searched = tuple(join(normalised(one), "") for one in asked)
     before = {record.address: record for record in records}
-    missing = [r for r in records if r.address not in here and r.address.startswith(searched)]
-    elsewhere = [r for r in records if r.address not in here and not r.address.startswith(searched)]
-    earlier = (*(r for r in records if r.address in here), *(r for r in elsewhere if not r.removed))
-    session_before = {record.address: record for record in session_records}
+    elsewhere = [r for r in records if r.address not in here]
+    elsewhere = [replace(r, removed=r.removed or search.has_reached(r.address)) for r in elsewhere]
+    # a clip that is no longer there has a row as long as its results are in place
+    shown = [r for r in elsewhere if not r.removed or r.in_place is not None]
+    sessions = _plan_sessions(sources, session_records, options)
+    in_session = {clip for job in sessions for clip in job.clips}
+    holders = {r.in_place.output_path: r.address for r in records if r.in_place is not None}
+    for job in sessions:  # the loop writes series there from which it has removed the camera's effects
+        for clip in job.clips:
+            corrected = "/".join(filter(None, (job.output_path, CORRECTED, stem(clip))))
+            holders.setdefault(corrected, join(join(job.address, CORRECTED), stem(clip)))
+    paths = assign_clip_paths(sources, holders)
+    clips = tuple(ClipJob(s.address, paths[s.address], s.address in in_session, before.get(s.address)) for s in sources)
+    earlier = (*(r for r in records if r.address in here), *shown)
+    removed = tuple(r for r in elsewhere if r != before[r.address])
+    return Plan(clips, sessions, earlier, tuple(session_records), removed)
+
+
+def _plan_sessions(
+    sources: Sequence[Source], records: Sequence[SessionRecord], options: Options
+) -> tuple[SessionJob, ...]:
+    before = {record.address: record for record in records}
+    earlier = {record.address: record.in_place for record in records if record.in_place is not None}
     found = find_sessions(sources)
-    folders = assign_session_folders([(folder, root) for folder, root, _ in found])
-    sessions = tuple(
-        SessionJob(folder, folders[folder], clips, options.close, before=session_before.get(folder))
+    holders = {record.output_path: address for address, record in earlier.items()}
+    folders = assign_session_folders([(folder, root) for folder, root, _ in found], holders)
+    # a verdict is not replaced by a model without one
+    closed = {address for address, record in earlier.items() if record.verdict is not None}
+    return tuple(
+        SessionJob(folder, folders[folder], clips, options.close or folder in closed, before=before.get(folder))
         for folder, _, clips in found
     )
-    in_session = {clip for job in sessions for clip in job.clips}
-    taken = {record.output_path for record in elsewhere if record.row.series}
-    for job in sessions:  # the loop writes series there from which it has removed the camera's effects
-        taken |= {"/".join(filter(None, (job.output_path, CORRECTED, stem(clip)))) for clip in job.clips}
-    paths = assign_clip_paths(sources, taken)
-    clips = tuple(ClipJob(s.address, paths[s.address], s.address in in_session, before.get(s.address)) for s in sources)
-    return Plan(clips, sessions, earlier, tuple(session_records), tuple(r for r in missing if not r.removed))
+
+
+def _out_of_reach(search: Search, records: Sequence[ClipRecord]) -> list[AnglecamError]:
+    """Return a problem for every empty folder from which clips were measured."""
+    found: list[AnglecamError] = []
+    for folder in search.empty:
+        lost = sum(r.address.startswith(join(folder, "")) and r.in_place is not None for r in records)
+        if lost:
+            what = f"is empty, and {lost} clips were measured from it; their results stay as they were; is it mounted?"
+            found.append(InputError(f"{folder}: {what}"))
+    return found
+
+
+def _prune(
+    plan: Plan, search: Search, folder: OutputFolder, database: RecordDatabase, summary: Summary
+) -> list[Pruned]:
+    """Remove the stale results of the folders of this batch."""
+    here = {job.address for job in plan.clips}
+    clips = [r for r in database.read_all(ClipRecord) if r.address in here or search.has_reached(r.address)]
+    folders = {parent(address) for address in here}
+    sessions = database.read_all(SessionRecord)
+    left = [r for r in sessions if r.address in folders and is_stale(r)]
+    left += [r for r in sessions if r.address not in folders and search.has_reached(r.address) and r.in_place]
+    try:
+        pruned = prune([*filter(is_stale, clips), *left], folder, database)
+    except OSError as problem:
+        summary.add_trouble(Trouble("--prune", f"{problem.filename or folder.path} ({problem.strerror})"), "--prune")
+        return []
+    for one in pruned:
+        summary.prune(one)
+    return pruned
 
 
 def _do_jobs(
@@ -197,7 +251,7 @@ def _do_jobs(
     display: ProgressDisplay,
     log: Log,
 ) -> None:
-    """Give out all jobs, and publish and report the outcome of each."""
+    """Give out all jobs, and publish and report the outcome of each, until trouble stops the batch."""
     waiting: deque[Job] = deque(plan.clips)
     session_of = {clip: job for job in plan.sessions for clip in job.clips}
     missing = {job.address: set(job.clips) for job in plan.sessions}
@@ -208,7 +262,9 @@ def _do_jobs(
             under_way += 1
         finished = put_in_place(pool.next_done())
         under_way -= 1
-        record = finished.record
+        record, trouble = finished.record, finished.trouble
+        if trouble is not None:
+            summary.add_trouble(trouble, record.address)
         if isinstance(record, SessionRecord):
             summary.add_session(record)
             display.add_session(record, unchanged=finished.unchanged)
@@ -218,10 +274,13 @@ def _do_jobs(
         summary.add_clip(record, in_session=session is not None)
         display.add_clip(record, unchanged=finished.unchanged)
         log.add_clip(record, unchanged=finished.unchanged)
-        if session is not None:
+        if trouble is not None and trouble.stops:
+            break
+        if session is not None and trouble is None:  # a session is fitted when all its clips have been tried
             missing[session.address].discard(record.address)
             if not missing[session.address]:
-                waiting.appendleft(replace(session, measured=summary.measured(session.clips)))
+                measured, stale = summary.measured(session.clips), summary.stale(session.clips)
+                waiting.appendleft(replace(session, measured=measured, stale=stale))
 
 
 def _worker_pool(settings: Settings, options: Options) -> AbstractContextManager[WorkerPool]:
@@ -230,7 +289,7 @@ def _worker_pool(settings: Settings, options: Options) -> AbstractContextManager
         return LocalPool(work, options.jobs)
     from anglecam.batch.dask_pool import DaskPool  # an optional dependency
 
-    return DaskPool(work, options.dask, options.jobs)
+    return DaskPool(work, options.dask, options.jobs, settings)
 
 
 def _run_job(job: Job, process: MeasuringProcess, *, settings: Settings) -> Finished:

@@ -9,13 +9,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from anglecam import __version__
-from anglecam.batch.address import is_remote, join, name, names_in, parent, read_small, stem
-from anglecam.batch.identity import combined_hash, content_hash
+from anglecam.batch.address import TransientError, is_remote, join, name, names_in, parent, read_small, stem
+from anglecam.batch.identity import combined_hash, content_hash, hashes
 from anglecam.batch.lock import is_current
 from anglecam.batch.measuring_process import MeasuringProcess, ProcessLost
-from anglecam.batch.publish import Finished, finish, workspace
+from anglecam.batch.publish import Finished, finish, not_done, workspace
 from anglecam.batch.records import ClipRecord, SessionRecord
 from anglecam.batch.sources import Source
+from anglecam.batch.trouble import Trouble, TroubleError, not_written
 from anglecam.batch.worker import Settings, clip_time_limit, fetch_beside, message_of, require_same_batch
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.io.command_csv import COMMAND_ENDING
@@ -40,6 +41,8 @@ class SessionJob:
     """Whether to close the loop, as `anglecam close` does."""
     measured: tuple[ClipRecord, ...] = ()
     """Records of those of its clips that could be measured."""
+    stale: tuple[str, ...] = ()
+    """Names of those of its clips whose results are stale."""
     before: SessionRecord | None = None
     """Its record by an earlier batch."""
 
@@ -95,33 +98,44 @@ def run_session_job(job: SessionJob, settings: Settings, process: MeasuringProce
         try:
             with blame(Path(job.address)):
                 require_same_batch(settings)
-                if not job.measured and not any(file.endswith(SERIES_ENDING) for file in names_in(job.address)):
+                earlier = None if job.before is None else job.before.in_place
+                if earlier is None and not job.measured and not _has_series(job.address):
                     return Finished(record, to_publish=False)  # each clip's failure has been reported
-                record = replace(record, configuration=_configuration(job, settings))
-                # a session whose loop was closed also has the model, and keeps what was found
-                closed = replace(record, configuration=_configuration(replace(job, close=True), settings))
-                if job.before is not None and any(_is_done(job.before, one, settings) for one in (record, closed)):
-                    return Finished(job.before, unchanged=True, to_publish=False)
+                inputs = _inputs(job, settings)
+                record = replace(record, configuration=combined_hash(inputs), inputs=inputs)
+                for before in (earlier, job.before):
+                    if before is not None and _is_done(before, record, settings):
+                        return Finished(before, unchanged=True, to_publish=before != job.before)
+                if earlier is not None and job.stale:
+                    raise InputError(f"{job.address}: not fitted again without {', '.join(job.stale)}")
                 record, made = _fitted(record, job, settings, process, work)
+        except TroubleError as problem:
+            return not_done(record, job.before, problem.trouble)
+        except TransientError as problem:
+            cause = message_of(problem, join(job.address, ""), work)
+            return not_done(record, job.before, Trouble(job.address, cause))
         except AnglecamError as problem:
             cause = message_of(problem, join(job.address, ""), work).removeprefix(f"{job.address}: ")
             record = record.failed(cause, call_is_wrong=isinstance(problem, RigError))
         record = replace(record, wall_time_s=round(time.monotonic() - began, 3))
         if not is_current(settings.folder, settings.run):
-            return Finished(record.failed("the batch had ended before the session was finished"), to_publish=False)
+            return not_done(record, job.before, Trouble(job.address, "the batch had ended before it was finished"))
         return finish(record, made, job.before, work, settings.folder)
 
 
-def _configuration(job: SessionJob, settings: Settings) -> str:
-    """Return a hash of everything that a session's results depend on."""
+def _has_series(folder: str) -> bool:
+    return any(file.endswith(SERIES_ENDING) for file in names_in(folder))
+
+
+def _inputs(job: SessionJob, settings: Settings) -> dict[str, str | None]:
+    """Return hashes of everything that a session's results depend on."""
     files = sorted(f for f in names_in(job.address) if f.endswith((COMMAND_ENDING, SERIES_ENDING)))
-    parts: dict[str, bytes | str | None] = {f"file {f}": read_small(join(job.address, f)) for f in files}
-    parts |= {f"clip {clip.address}": f"{clip.row.sha256} {clip.row.configuration}" for clip in job.measured}
+    parts: dict[str, bytes | str | None] = {f: read_small(join(job.address, f)) for f in files}
+    parts |= {name(clip.address): f"{clip.row.sha256} {clip.row.configuration}" for clip in job.measured}
     if not is_remote(job.address):  # tracks by another program may stand in a clip's place
-        parts |= {f"tracks {path.name}": content_hash(path) for path in find_tracks(Path(job.address))}
+        parts |= {path.name: content_hash(path) for path in find_tracks(Path(job.address))}
     parts["rig"] = read_small(settings.rig or join(job.address, "rig.yaml"))
-    parts["close"] = str(job.close)
-    return combined_hash(parts)
+    return hashes(parts) | {"close": str(job.close)}
 
 
 def _is_done(before: SessionRecord, record: SessionRecord, settings: Settings) -> bool:
@@ -139,7 +153,10 @@ def _fitted(
 ) -> tuple[SessionRecord, dict[str, Path]]:
     """Have a session fitted; return its record, and its finished files by their output paths."""
     out, into = settings.folder, work / "out"
-    into.mkdir(parents=True)
+    try:
+        into.mkdir(parents=True)
+    except OSError as problem:
+        raise TroubleError(not_written(problem, job.address, settings.out)) from problem
     folder = _fetched(job, work) if is_remote(job.address) else Path(job.address)
     request = {
         "session": str(folder),
@@ -153,6 +170,8 @@ def _fitted(
         answer = process.ask(request, max(_MIN_TIME_LIMIT_S, limit))
     except ProcessLost as loss:
         raise InputError(f"{job.address}: {loss}") from loss
+    if "not_written" in answer:
+        raise TroubleError(not_written(OSError(*answer["not_written"]), job.address, settings.out))
     # problems with a clip or its command have been reported for that clip
     known = tuple(str(folder / file) for clip in job.clips for file in (name(clip), stem(clip) + COMMAND_ENDING))
     inside = join(job.address, "")

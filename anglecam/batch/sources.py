@@ -9,7 +9,7 @@ from __future__ import annotations
 import glob
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from anglecam.batch.address import asking, is_remote, join, name, normalised, parent, store
@@ -34,7 +34,27 @@ class Source:
         return parent(self.address)[len(self.root) :].strip("/")
 
 
-def find_sources(asked: Sequence[str], out: Path) -> tuple[list[Source], list[AnglecamError]]:
+@dataclass
+class Search:
+    """Which folders a call has searched, so that a clip that is not found can be told from one that is out of reach."""
+
+    folders: list[str] = field(default_factory=list)
+    """Folders that were searched and hold clips."""
+    unreachable: list[str] = field(default_factory=list)
+    """Folders in them that cannot be searched."""
+    empty: list[str] = field(default_factory=list)
+    """Folders in them with nothing inside, as the folder of a share that is not mounted."""
+
+    def has_reached(self, address: str) -> bool:
+        """Return whether a clip would have been found if it existed."""
+        return _is_in(address, self.folders) and not _is_in(address, [*self.unreachable, *self.empty])
+
+
+def _is_in(address: str, folders: Iterable[str]) -> bool:
+    return address.startswith(tuple(join(folder, "") for folder in folders))
+
+
+def find_sources(asked: Sequence[str], out: Path) -> tuple[list[Source], Search, list[AnglecamError]]:
     """Find the clips of a call.
 
     Parameters
@@ -48,6 +68,8 @@ def find_sources(asked: Sequence[str], out: Path) -> tuple[list[Source], list[An
     -------
     sources : list of Source
         In the order of their addresses, without repetition.
+    search : Search
+        Which folders were searched.
     problems : list of AnglecamError
         Folders that cannot be searched or contain no clip, one line each.
 
@@ -58,11 +80,12 @@ def find_sources(asked: Sequence[str], out: Path) -> tuple[list[Source], list[An
     """
     problems: list[AnglecamError] = []
     found: dict[str, Source] = {}
+    search = Search()
     for given, listed in _unlisted(asked):
         try:
             if is_remote(given):
                 store(given)[0].invalidate_cache()  # the store may have changed since it was last listed
-            for source in _expand(given, out.resolve(), problems):
+            for source in _expand(given, out.resolve(), search, problems):
                 found.setdefault(source.address, source)
         except RigError as problem:
             if not listed:
@@ -70,7 +93,7 @@ def find_sources(asked: Sequence[str], out: Path) -> tuple[list[Source], list[An
             problems.append(problem)
         except InputError as problem:
             problems.append(problem)
-    return sorted(found.values()), problems
+    return sorted(found.values()), search, problems
 
 
 def _unlisted(asked: Sequence[str]) -> Iterator[tuple[str, bool]]:
@@ -89,13 +112,15 @@ def _unlisted(asked: Sequence[str]) -> Iterator[tuple[str, bool]]:
                 yield text, True
 
 
-def _expand(given: str, out: Path, problems: list[AnglecamError]) -> Iterator[Source]:
+def _expand(given: str, out: Path, search: Search, problems: list[AnglecamError]) -> Iterator[Source]:
     """Yield the clips that one address stands for."""
     address = normalised(given)
     folder, single = _kind(address)
     if folder:
-        clips = _search(address, out, problems)
-        if not clips:
+        clips = _search(address, out, search, problems)
+        if clips:
+            search.folders.append(address)
+        else:
             problems.append(InputError(f"{given}: no clip in this folder"))
         yield from (Source(clip, address) for clip in clips)
     elif single or not _GLOB_CHARACTERS & set(address):
@@ -108,7 +133,7 @@ def _expand(given: str, out: Path, problems: list[AnglecamError]) -> Iterator[So
         clips = [m for m in matches if _is_clip(m)]
         for match in sorted(set(matches) - set(clips)):
             if _kind(match)[0]:
-                clips += _search(match, out, problems)
+                clips += _search(match, out, search, problems)
         if not clips:
             problems.append(InputError(f"{given}: no clip matches"))
         yield from (Source(clip, root) for clip in clips)
@@ -135,7 +160,7 @@ def _below(root: str, paths: Iterable[str]) -> list[str]:
     return [join(root, path[len(start) :].lstrip("/")) for path in paths]
 
 
-def _search(folder: str, out: Path, problems: list[AnglecamError]) -> list[str]:
+def _search(folder: str, out: Path, search: Search, problems: list[AnglecamError]) -> list[str]:
     """Return the clips in a folder and all folders below it."""
     if is_remote(folder):
         with asking(folder) as (fs, path):
@@ -144,9 +169,12 @@ def _search(folder: str, out: Path, problems: list[AnglecamError]) -> list[str]:
 
     def denied(problem: OSError) -> None:
         problems.append(InputError(f"{problem.filename}: cannot be searched ({problem.strerror})"))
+        search.unreachable.append(problem.filename)
 
     clips = []
     for here, below, files in os.walk(folder, onerror=denied):
+        if here != folder and not below and not files:
+            search.empty.append(here)
         below[:] = [d for d in below if not d.startswith(".") and Path(here, d).resolve() != out]
         clips += [join(here, file) for file in files if _is_clip(file) and not file.startswith(".")]
     return sorted(clips)

@@ -6,12 +6,14 @@ import time
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from anglecam.batch.address import parent
+from anglecam.batch.address import name, parent
 from anglecam.batch.index import write_index
 from anglecam.batch.output_folder import OutputFolder
+from anglecam.batch.prune import Pruned
 from anglecam.batch.records import ClipRecord, SessionRecord
-from anglecam.batch.row import Row, cannot_write
+from anglecam.batch.row import FAILED, STALE, Row
 from anglecam.batch.session_job import SessionJob
+from anglecam.batch.trouble import Trouble, as_problems
 from anglecam.errors import AnglecamError, InputError, RigError, printable
 
 _INDEX_EVERY_S = 10.0
@@ -55,6 +57,13 @@ class Summary:
         self._sessions_here: set[str] = set()
         self._next = time.monotonic() + _INDEX_EVERY_S
         self._index_problem: str | None = None
+        self._troubles: list[Trouble] = []
+        self._untried: set[str] = set()
+
+    def add_trouble(self, trouble: Trouble, address: str) -> None:
+        """Add why the job of a clip or session was not done."""
+        self._troubles.append(trouble)
+        self._untried.add(address)
 
     def add_clip(self, record: ClipRecord, *, in_session: bool) -> None:
         """Add the outcome of a clip of this batch, and write the index if it is due."""
@@ -73,6 +82,22 @@ class Summary:
         self._sessions[record.address] = record
         self._sessions_here.add(record.address)
 
+    def prune(self, pruned: Pruned) -> None:
+        """Leave out the results that were removed."""
+        address, left = pruned.record.address, pruned.left
+        if isinstance(left, ClipRecord):
+            self._clips[address] = _light(left)
+        elif isinstance(left, SessionRecord):
+            self._sessions[address] = left
+        elif isinstance(pruned.record, ClipRecord):
+            del self._clips[address]
+        else:
+            del self._sessions[address]
+
+    def stale(self, clips: Iterable[str]) -> tuple[str, ...]:
+        """Return the names of those of these clips whose results are stale."""
+        return tuple(name(clip) for clip in clips if self._clips[clip].shown.status == STALE)
+
     def measured(self, clips: Iterable[str]) -> tuple[ClipRecord, ...]:
         """Return the records, without files, of those of these clips that have been measured."""
         return tuple(record for record in map(self._clips.__getitem__, clips) if not record.has_failed)
@@ -87,36 +112,41 @@ class Summary:
             write_index(self.rows(), self._folder, self._run)
             self._index_problem = None
         except OSError as problem:
-            self._index_problem = cannot_write(problem)
+            self._index_problem = f"the index cannot be written ({problem.strerror or problem})"
 
     def problems(self) -> list[AnglecamError]:
         """Return the problems of this batch: clips, sessions, then the index; each group in the order of addresses."""
-        found: list[AnglecamError] = []
-        for address in sorted(self._clips_here):
+        found = as_problems(self._troubles)
+        for address in sorted(self._clips_here - self._untried):
             record = self._clips[address]
-            if record.row.cause is not None:
-                found.append(_problem(record.row.path, record.row.cause, call_is_wrong=record.call_is_wrong))
-        for address in sorted(self._sessions_here):
+            if record.shown.cause is not None:
+                found.append(_problem(record.row.path, record.shown.cause, call_is_wrong=record.call_is_wrong))
+        for address in sorted(self._sessions_here - self._untried):
             session = self._sessions[address]
             found += [_problem(printable(address), problem, call_is_wrong=False) for problem in session.problems]
-            if session.cause is not None:
-                found.append(_problem(printable(address), session.cause, call_is_wrong=session.call_is_wrong))
-        if self._index_problem is not None:
+            if session.shown_cause is not None:
+                found.append(_problem(printable(address), session.shown_cause, call_is_wrong=session.call_is_wrong))
+        if self._index_problem is not None and not any(trouble.stops for trouble in self._troubles):
             found.append(InputError(f"{self._folder.path / 'index.csv'}: {self._index_problem}"))
         return found
 
     def _row(self, record: ClipRecord) -> Row:
         """Return a clip's row, with the outcome of its session."""
+        row = record.shown
         session = self._sessions.get(self._session_of.get(record.address, ""))
-        if session is None or record.has_failed:
-            return record.row
-        cause = record.row.cause or (None if session.cause is None else f"no model: {session.cause}")
-        return replace(record.row, model=session.model, verdict=session.verdict, effects=session.effects, cause=cause)
+        if session is None or row.status == FAILED:
+            return row
+        cause = row.cause
+        if cause is None and session.shown_cause is not None:
+            cause = f"{'no model' if session.in_place is None else 'the model is stale'}: {session.shown_cause}"
+        found = session.in_place or session
+        return replace(row, model=found.model, verdict=found.verdict, effects=found.effects, cause=cause)
 
 
 def _light(record: ClipRecord) -> ClipRecord:
     """Return a record without what neither rows nor problems need."""
-    return replace(record, files={}, stamp=None)
+    kept = None if record.kept is None else replace(record.kept, files={}, stamp=None)
+    return replace(record, files={}, stamp=None, kept=kept)
 
 
 def _problem(what: str, cause: str, *, call_is_wrong: bool) -> AnglecamError:

@@ -15,7 +15,8 @@ from anglecam.batch.address import fetch, join, name, names_in, parent
 from anglecam.batch.identity import calibration_named
 from anglecam.batch.lock import is_current
 from anglecam.batch.output_folder import OutputFolder
-from anglecam.errors import AnglecamError, RigError, printable
+from anglecam.batch.trouble import Trouble, TroubleError
+from anglecam.errors import AnglecamError, printable
 
 _MIN_TIME_LIMIT_S = 600.0
 _TIME_LIMIT_S_PER_BYTE = 1e-5
@@ -44,19 +45,29 @@ class Settings:
         return OutputFolder(Path(self.out))
 
 
+def refusal(settings: Settings) -> str | None:
+    """Return why this worker may not do the jobs of a batch; ``None`` if it may.
+
+    It needs the version of anglecam that started the batch, and must see the output folder.
+    """
+    if settings.version != __version__:
+        return f"anglecam {__version__}, but the batch was started by {settings.version}"
+    if not is_current(settings.folder, settings.run):
+        return f"does not see the folder that the batch sees at {settings.out}"
+    return None
+
+
 def require_same_batch(settings: Settings) -> None:
-    """Require that this worker has the batch's version of anglecam and sees the batch's output folder.
+    """Require that this worker may still do the jobs of a batch.
 
     Raises
     ------
-    RigError
-        If it does not.
+    TroubleError
+        If it may not; see `refusal`.
     """
-    if settings.version != __version__:
-        raise RigError(f"this worker has anglecam {__version__}; the batch was started by {settings.version}")
-    if not is_current(settings.folder, settings.run):
-        host = socket.gethostname()
-        raise RigError(f"--out {settings.out}: {host} does not see the folder that the batch sees there")
+    reason = refusal(settings)
+    if reason is not None:
+        raise TroubleError(Trouble(f"worker on {socket.gethostname()}", reason))
 
 
 def clip_time_limit(size_bytes: int, settings: Settings) -> float:

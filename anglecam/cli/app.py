@@ -15,13 +15,17 @@ import typer
 
 from anglecam import __version__
 from anglecam.cli.batch import batch
+from anglecam.cli.certify import certify
+from anglecam.cli.check import check
 from anglecam.cli.clips import budget, calibrate, measure
 from anglecam.cli.doctor import doctor
 from anglecam.cli.estimator_option import EstimatorCommand
+from anglecam.cli.export import export
 from anglecam.cli.json_output import with_json
 from anglecam.cli.live import live
 from anglecam.cli.neck import app as neck
 from anglecam.cli.sessions import close, identify
+from anglecam.cli.view import view
 from anglecam.errors import InputError, RigError, blame
 from anglecam.terminal import errors
 
@@ -50,8 +54,9 @@ def _anglecam(
 
 
 app.add_typer(neck, name="neck")
-for _command in (measure, live, budget, calibrate, identify, close, batch, doctor):
+for _command in (check, measure, live, budget, calibrate, identify, close, certify, export, batch, doctor):
     app.command(cls=EstimatorCommand if _command is identify else None)(with_json(_command))
+app.command()(view)
 
 
 def main() -> None:

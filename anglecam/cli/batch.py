@@ -31,6 +31,7 @@ def batch(
     ] = None,
     close: Annotated[bool, typer.Option("--close", help="Find what each session's model lacks.")] = False,
     retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Measure again the clips that failed.")] = False,
+    prune: Annotated[bool, typer.Option("--prune", help="Remove stale results at the end, and list them.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress.")] = False,
     log: Annotated[Path | None, typer.Option("--log", help="Append a line of JSON per clip to this file.")] = None,
     time_limit: Annotated[
@@ -42,7 +43,7 @@ def batch(
     ] = None,
 ) -> None:
     """Measure folders of clips, each clip once, identify the sessions among them, and write an index of all clips."""
-    from anglecam.batch.row import DOUBTFUL, FAILED, OK, TRUNCATED
+    from anglecam.batch.row import DOUBTFUL, FAILED, OK, STALE, TRUNCATED
     from anglecam.batch.run import Options, run_batch  # imports fsspec and pyarrow, which no other command needs
 
     if dask is not None and dask != "local" and jobs is not None:
@@ -56,6 +57,7 @@ def batch(
                 dask=dask,
                 close=close,
                 retry_failed=retry_failed,
+                prune=prune,
                 quiet=quiet,
                 log=log,
                 time_limit=time_limit,
@@ -65,9 +67,11 @@ def batch(
     except KeyboardInterrupt:
         errors.print("stopped; the same call goes on from here")
         raise typer.Exit(130) from None
+    for pruned in result.pruned:
+        screen.print(pruned.line, soft_wrap=True, highlight=False)
     if not quiet:
         counts = Counter(row.status for row in result.rows)
-        named = (f"{counts[status]} {status}" for status in (OK, TRUNCATED, DOUBTFUL, FAILED) if counts[status])
+        named = (f"{counts[status]} {status}" for status in (OK, TRUNCATED, DOUBTFUL, STALE, FAILED) if counts[status])
         summary = ", ".join(named)
         screen.print(f"{len(result.rows)} clips{': ' if summary else ''}{summary}; {out / 'index.csv'}", soft_wrap=True)
     report(

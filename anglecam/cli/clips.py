@@ -15,6 +15,7 @@ from anglecam.cli.documents import calibration_as_dict, clip_as_dict
 from anglecam.cli.json_output import report
 from anglecam.cli.options import FirstFrame, LastFrame, Out, RigFile
 from anglecam.cli.progress import end, progress_bars
+from anglecam.cli.this_run import this_run
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.io.netcdf_parquet import Also
 from anglecam.io.rig import Rig, RigFrames, read_rig
@@ -51,11 +52,12 @@ def measure(
         list[Also] | None, typer.Option("--also", help="Also write NAME.angles.nc or .parquet; repeatable.")
     ] = None,
 ) -> None:
-    """Measure the angle in every frame: NAME.angles.csv and a plot for each clip, and its response to every change."""
+    """Measure the angle in every frame: NAME.angles.csv, a plot and a page with the film for each clip."""
     from anglecam.measurement.step_response import responses_as_dicts
     from anglecam.report.clip_tables import response_table, series_table
-    from anglecam.workflow.clip import open_source, write_clip_overlay, write_measurement
+    from anglecam.workflow.clip import open_source, write_clip_overlay, write_clip_page, write_measurement
 
+    run = this_run(rig)
     declared = read_rig(rig) if rig else None
     names: dict[str, Path] = {}
     measured, tables = [], []
@@ -68,6 +70,7 @@ def measure(
         source = open_source(clip, declared, (first, last))
         measurement = _measure(source, bars)
         answers = write_measurement(measurement, source.command, out, also or ())
+        write_clip_page(source, measurement, answers, out, run)
         if answers:
             tables.append(response_table(clip.name, answers))
         if overlay:
@@ -96,8 +99,10 @@ def budget(
     from anglecam.budget.clip import budget_as_dict
     from anglecam.measurement.clip import Measurement
     from anglecam.report.budget_page import budget_table, write_budget
-    from anglecam.workflow.clip import open_source
+    from anglecam.report.origin import origin_of
+    from anglecam.workflow.clip import inputs_of, open_source
 
+    run = this_run(rig)
     declared = read_rig(rig) if rig else None
 
     def budget_one(clip: Path, bars: Progress) -> Measurement | MeasuredTracks:
@@ -106,7 +111,8 @@ def budget(
             raise InputError(f"{clip}: a budget needs the pictures; give the clip")
         measurement = _measure(source, bars)
         assert isinstance(measurement, Measurement)
-        found = write_budget(source.film, measurement, source.rig, out)
+        made = origin_of(inputs_of(clip, source.rig, run), run)
+        found = write_budget(source.film, measurement, source.rig, out, made)
         screen.print(budget_table(found))
         report(budgets=[budget_as_dict(found)])
         return measurement

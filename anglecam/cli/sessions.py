@@ -13,6 +13,7 @@ import typer
 from anglecam.cli.json_output import report, report_file
 from anglecam.cli.options import Out, SessionFolder
 from anglecam.cli.progress import end, progress_bars
+from anglecam.cli.this_run import this_run
 from anglecam.errors import InputError, RigError, printable
 from anglecam.io.session import Session, read_session
 from anglecam.terminal import errors, make_folder, screen
@@ -83,6 +84,7 @@ def close(
             out,
             hold_out=hold_out or (),
             progress=lambda stage: bars.update(bar, description=stage),
+            run=this_run(),
         )
         bars.update(bar, description="done", completed=1, total=1)
     report_file("loop", out / "loop.json")

@@ -203,11 +203,14 @@ class Effect:
     is some other cause."""
 
     def with_fixed(self, values: Mapping[str, float]) -> Effect:
-        """Return the effect with some parameters fixed: ``values`` by name, SI; itself if none of them is named."""
-        fixed = tuple((i, values[p.name]) for i, p in enumerate(self.parameters) if p.name in values)
-        if not fixed:
+        """Return the effect with more parameters fixed: ``values`` by name, SI; itself if none of them is named."""
+        if not any(p.name in values for p in self.parameters):
             return self
-        return replace(self, parameters=tuple(p for p in self.parameters if p.name not in values), fixed=fixed)
+        fixed = dict(self.fixed)
+        places = [i for i in range(len(self.parameters) + len(fixed)) if i not in fixed]
+        fixed |= {i: values[p.name] for i, p in zip(places, self.parameters, strict=True) if p.name in values}
+        left = tuple(p for p in self.parameters if p.name not in values)
+        return replace(self, parameters=left, fixed=tuple(sorted(fixed.items())))
 
     def at_scale(self, rate: float, swing: float) -> Effect:
         """Return the effect with the bounds and starts that a rig requires; see `Parameter.at_scale`."""

@@ -10,6 +10,7 @@ large angles is exported as its linearisation at neutral, Eq. (33), together wit
 from __future__ import annotations
 
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +34,8 @@ SECOND_ORDER = ("a_per_s", "b_per_s2", "c_per_s2")
 """Parameters of the second-order model, in the order of the transfer function's coefficients."""
 THIRD_ORDER = ("d2_per_s", "d1_per_s2", "d0_per_s3", "n2_per_s", "n1_per_s2", "n0_per_s3")
 """Parameters of the third-order model, likewise."""
+_MAT_TEXT = b"MATLAB 5.0 MAT-file, written by anglecam".ljust(116)
+"""The descriptive text that a MAT-file of version 5 begins with: 116 bytes (MathWorks, MAT-File Format, 1-5)."""
 
 
 @dataclass(frozen=True)
@@ -203,6 +206,9 @@ def transfer_as_dict(model: FittedModel) -> dict[str, Any]:
 def write_mat(model: FittedModel, path: Path) -> None:
     """Write a model as a MATLAB file: one struct ``model``, for ``tf(model.num, model.den)``.
 
+    The same model always gives the same bytes: the text at the beginning, in which SciPy states the system and the
+    time, is replaced by a constant one.
+
     Parameters
     ----------
     model : FittedModel
@@ -231,7 +237,9 @@ def write_mat(model: FittedModel, path: Path) -> None:
         "output_unit": "deg",
     }
     path.parent.mkdir(parents=True, exist_ok=True)
-    io.savemat(path, {"model": content}, appendmat=False, oned_as="column")
+    made = BytesIO()
+    io.savemat(made, {"model": content}, oned_as="column")
+    path.write_bytes(_MAT_TEXT + made.getvalue()[len(_MAT_TEXT) :])
 
 
 _UNITS = {"nms": "N*m*s", "nm": "N*m", "n": "N", "m": "m", "v": "V", "rad": "rad", "deg": "deg", "s": "s", "s2": "s^2"}

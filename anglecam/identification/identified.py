@@ -11,6 +11,7 @@ from anglecam.data.record import Record
 from anglecam.data.step_figures import StepFigures
 from anglecam.data.tables import html_table, pandas_table, xarray_dataset
 from anglecam.data.typing import Floats
+from anglecam.identification.clocks import Clocks
 from anglecam.identification.fit import Fit
 from anglecam.identification.multiple_shooting import loses_step, rms_motion
 
@@ -45,6 +46,8 @@ class Identified:
     """The recordings that were fitted."""
     settled: bool = True
     """Whether the estimator settled. If it did not, ``covariance`` is NaN."""
+    clock: Clocks | None = None
+    """Clocks of the commands; ``None`` where no recording has a command, or they were not fitted."""
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -70,6 +73,8 @@ class Identified:
                 f" {np.degrees(rms_motion(self.fitted)):.2g}° RMS: unless the angle is so noisy, it lacks something,"
                 f" and its ± do not hold; anglecam close searches for it"
             )
+        if self.clock is not None and self.clock.notes:
+            doubts.append(f"clock: {'; '.join(self.clock.notes)}; a, b, c take these time stamps as they are")
         return tuple(doubts)
 
     @property
@@ -102,6 +107,7 @@ class Identified:
                 "steady_state_deg": self.step.steady_state,
             },
             "residual_correlation": self.fit.residual_phi,
+            "clock": None if self.clock is None else self.clock.as_dict(),
         }
 
     def to_pandas(self) -> pd.DataFrame:

@@ -60,8 +60,13 @@ class Session:
 
 def command_beside(source: Path, rig: Rig | None = None) -> Command | None:
     """Read the command file in a recording's folder that has its name; ``None`` if there is none."""
-    path = (source.resolve() if source.is_dir() else source).with_name(recording_name(source) + COMMAND_ENDING)
+    path = command_file_beside(source)
     return command_of(path, Rig() if rig is None else rig) if path.exists() else None
+
+
+def command_file_beside(source: Path) -> Path:
+    """Return the path of the command file that belongs to a recording; it need not exist."""
+    return (source.resolve() if source.is_dir() else source).with_name(recording_name(source) + COMMAND_ENDING)
 
 
 def command_of(path: Path, rig: Rig) -> Command:
@@ -100,15 +105,20 @@ def _name_beside(tracks: Path) -> str:
 
 
 def rig_beside(source: Path) -> Rig:
-    """Read ``rig.yaml`` in the folder of ``source``, or in ``source`` if it is a folder; without it, the defaults.
+    """Read ``rig.yaml`` in the folder of ``source``, or in ``source`` if it is a folder; without it, the defaults."""
+    path = rig_file_beside(source)
+    return Rig() if path is None else read_rig(path)
+
+
+def rig_file_beside(source: Path) -> Path | None:
+    """Return the ``rig.yaml`` in the folder of ``source``, or in ``source`` if it is a folder; ``None`` without one.
 
     Of a folder of numbered pictures both are tried, because it is a clip and a folder.
     """
     folders = [source, source.resolve().parent] if source.is_dir() else [source.parent]
     if source.is_dir() and not is_film_of_images(source):
         folders.pop()
-    path = next((folder / "rig.yaml" for folder in folders if (folder / "rig.yaml").exists()), None)
-    return Rig() if path is None else read_rig(path)
+    return next((folder / "rig.yaml" for folder in folders if (folder / "rig.yaml").exists()), None)
 
 
 def is_film_of_images(folder: Path) -> bool:

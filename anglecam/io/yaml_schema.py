@@ -63,6 +63,11 @@ def read_declared(path: Path, kind: type[Section]) -> Section:
         If the file cannot be read or its content is not valid. There is a line for each wrong key: the file, the key
         and the cause.
     """
+    return validate(read_plain(path)[1], kind, str(path))
+
+
+def read_plain(path: Path) -> tuple[str, dict[str, Any]]:
+    """Read the text of a file of declarations, and its keys and values; raises as `read_declared`."""
     try:
         text = read_text(path, _MOST_BYTES)
         _require_plain(path, text)
@@ -77,10 +82,10 @@ def read_declared(path: Path, kind: type[Section]) -> Section:
         where = f", line {mark.line + 1}" if mark else ""
         raise RigError(f"{path}: not YAML ({problem}{where})") from error
     if content is None:
-        return kind()
+        return text, {}
     if not isinstance(content, dict):
         raise RigError(f"{path}: expected keys and values, found a {type(content).__name__}")
-    return validate(content, kind, str(path))
+    return text, content
 
 
 def validate(content: Mapping[str, Any], kind: type[Section], name: str) -> Section:

@@ -2,7 +2,8 @@
 
     base fit → stepwise selection (`anglecam.loop.stepwise`) → verdict
 
-If the final model leaves significant structure that no candidate explains, the verdict is ``unexplained``.
+If the final model leaves significant structure that no candidate explains, the verdict is ``unexplained``. The search
+works on stretches of long recordings; the errors and sizes that are stated are those of the whole recordings.
 """
 
 from __future__ import annotations
@@ -32,12 +33,15 @@ from anglecam.loop.stepwise import (
     Assessment,
     Task,
     add_effects,
+    add_more_effects,
     applicable,
     assess,
     rank_candidates,
     smallest_structure,
 )
+from anglecam.loop.stretches import stretches
 from anglecam.loop.verdict import Accepted, Verdict
+from anglecam.loop.whole import with_whole_recordings
 from anglecam.models.plant import FASTEST, Plant
 
 VERDICTS = {
@@ -87,16 +91,24 @@ def close_records(
     """
     # the matrices are small and several fits run at a time, so threads of linear algebra would only wait for each other
     with threadpool_limits(1, "blas"):
-        task, base = _begin(records, held_out, starts, np.random.default_rng(seed), progress, policy)
+        fitted, predicted = split_records(records, held_out)
+        task, base = _begin(fitted, predicted, starts, np.random.default_rng(seed), progress, policy)
         progress("residual")
         first = assess(task, base)
         candidates: list[Candidate] = []
         if not first.residual_test.passed:
             progress("candidates")
             candidates = rank_candidates(task, first)
-        last = add_effects(task, first, candidates)
+        last = add_effects(task, first, first, candidates)
+        final_task, last = _without_windows(task, first, last)
         progress("verdict")
-        return _conclude(task, first, last, candidates)
+        verdict = _conclude(task, final_task, first, last, candidates)
+        if max(map(_samples, (fitted, predicted))) <= policy.stepwise.most_samples:
+            return verdict
+        progress("whole recordings")
+        if final_task.uncut is not None:
+            fitted, predicted = (windows(part, base.parameters) for part in (fitted, predicted))
+        return with_whole_recordings(verdict, fitted, predicted, task.rng)
 
 
 def with_free_form(verdict: Verdict, *, seed: int = 0) -> Verdict:
@@ -116,14 +128,18 @@ def with_free_form(verdict: Verdict, *, seed: int = 0) -> Verdict:
     """
     if verdict.verdict in ("attributed", "nothing_missing"):
         return verdict
-    rate = plant_of(verdict.after).fastest / FASTEST
-    left = effects_left(applicable([*verdict.fitted, *verdict.held_out], rate), verdict.after)
+    fitted, held_out, fit, before = verdict.searched, verdict.searched_held_out, verdict.after, verdict.after_held_out
+    rate = plant_of(fit).fastest / FASTEST
+    left = effects_left(applicable([*fitted, *held_out], rate), fit)
     with threadpool_limits(1, "blas"):
+        if fitted is not verdict.fitted:
+            fit = fit_output_error(fit.model, fitted, [fit.parameters], phi=fit.phi)
+            before, _ = predict_held_out(fit, fitted, held_out, verdict.policy)
         found = find_free_form(
-            verdict.after,
-            verdict.after_held_out,
-            verdict.fitted,
-            verdict.held_out,
+            fit,
+            before,
+            fitted,
+            held_out,
             left,
             [one for one in verdict.candidates if one.effect.id in [effect.id for effect in left]],
             np.random.default_rng(seed),
@@ -133,15 +149,15 @@ def with_free_form(verdict: Verdict, *, seed: int = 0) -> Verdict:
 
 
 def _begin(
-    records: Sequence[Record],
-    held_out: Sequence[str],
+    whole_fitted: Sequence[Record],
+    whole_predicted: Sequence[Record],
     starts: Sequence[np.ndarray],
     rng: np.random.Generator,
     progress: Callable[[str], None],
     policy: Policy,
 ) -> tuple[Task, Fit]:
-    """Fit the base model, in windows if a free run over whole recordings diverges."""
-    fitted, predicted = split_records(records, held_out)
+    """Fit the base model to stretches of long recordings, in windows if a free run over them diverges."""
+    fitted, predicted = (stretches(part, policy.stepwise.most_samples) for part in (whole_fitted, whole_predicted))
     progress("base model")
     found = start_parameters(fitted)
     plant = Plant(
@@ -149,20 +165,43 @@ def _begin(
     )
     declared_starts = [s[: plant.base_count] for s in starts]
     base = fit_output_error(plant, fitted, [*found, *declared_starts])
-    floor = noise_floor(fitted)
+    uncut = None
     if drifts(base.parameters, fitted) or loses_step(base, fitted):
-        fitted, predicted = windows(fitted, base.parameters), windows(predicted, base.parameters)
+        uncut = fitted, predicted
+        fitted, predicted = (tuple(windows(part, base.parameters)) for part in uncut)
         base = fit_output_error(plant, fitted, [base.parameters, *declared_starts])
-    ledger = applicable([*fitted, *predicted], plant.fastest / FASTEST)
-    return Task(tuple(fitted), tuple(predicted), tuple(ledger), floor, rng, progress, policy), base
+    ledger = tuple(applicable([*fitted, *predicted], plant.fastest / FASTEST))
+    return Task(fitted, predicted, ledger, noise_floor(whole_fitted), rng, progress, policy, uncut), base
 
 
-def _conclude(task: Task, first: Assessment, last: Assessment, candidates: Sequence[Candidate]) -> Verdict:
+def _samples(records: Sequence[Record]) -> int:
+    return sum(len(record.time) for record in records)
+
+
+def _without_windows(task: Task, first: Assessment, last: Assessment) -> tuple[Task, Assessment]:
+    """Continue the search without windows if the effects found so far let a free run keep step."""
+    if task.uncut is None or not effects_of(last.fit):
+        return task, last
+    fitted, predicted = task.uncut
+    fit = fit_output_error(last.fit.model, fitted, [last.fit.parameters], phi=last.fit.phi)
+    if drifts(fit.parameters, fitted) or loses_step(fit, fitted):
+        return task, last
+    task.progress("without windows")
+    whole = replace(task, fitted=fitted, predicted=predicted, uncut=None)
+    return whole, add_more_effects(whole, first, assess(whole, fit))
+
+
+def _conclude(
+    first_task: Task, task: Task, first: Assessment, last: Assessment, candidates: Sequence[Candidate]
+) -> Verdict:
+    """State the verdict; ``first_task`` is that of ``first``, in windows where the base model loses step."""
     # both models are compared with the AR(1) coefficient of the better model's residual
-    before = refit_with_phi(first.fit, task.fitted, last.fit.phi)
+    judged = before = refit_with_phi(first.fit, first_task.fitted, last.fit.phi)
+    if task is not first_task:
+        before = fit_output_error(first.fit.model, task.fitted, [first.fit.parameters], phi=last.fit.phi)
     before_held_out, _ = predict_held_out(before, task.fitted, task.predicted, task.policy)
     noise = task.noise_within(last.fit) or replace(autoregression(last.fit.residuals, RESIDUAL), sigma=last.fit.rmse)
-    remains = _structure_remains(task, first, last, before)
+    remains = _structure_remains(task, first, last, judged)
     final = _model_that_stands(task, first, last) if remains else last
     named = effects_of(final.fit)
     # without an effect the final model is the base model
@@ -179,6 +218,8 @@ def _conclude(task: Task, first: Assessment, last: Assessment, candidates: Seque
         last.residual_test,
         tuple(candidates),
         noise,
+        task.fitted,
+        task.predicted,
         task.fitted,
         task.predicted,
         task.policy,

@@ -18,7 +18,7 @@ from scipy import special
 from anglecam.data.record import Record
 from anglecam.effects import LEDGER, Effect
 from anglecam.identification.fit import Fit
-from anglecam.identification.noise import RESIDUAL, Noise, autoregression
+from anglecam.identification.noise import QUANTISED, RESIDUAL, Noise, autoregression
 from anglecam.loop.candidates import (
     Candidate,
     fit_candidates,
@@ -54,11 +54,21 @@ class Task:
     rng: np.random.Generator
     progress: Callable[[str], None]
     policy: Policy = DEFAULT
+    uncut: tuple[tuple[Record, ...], tuple[Record, ...]] | None = None
+    """Fitted and held-out recordings before they were cut into windows; ``None`` if they are whole."""
 
     @property
     def camera(self) -> float:
-        """Stated standard uncertainty of a film's angle, rad; 0 for angle series from elsewhere."""
-        return self.floor.sigma if self.floor and self.floor.filmed else 0.0
+        """Size of errors that may follow the motion, rad.
+
+        In a film that is the stated standard uncertainty, for a quantised angle a share of the rounding error's; for
+        other angle series it is 0.
+        """
+        if self.floor is None:
+            return 0.0
+        if self.floor.source == QUANTISED:
+            return self.policy.stepwise.rounding_error_share * self.floor.sigma
+        return self.floor.sigma if self.floor.filmed else 0.0
 
     def noise_within(self, fit: Fit) -> Noise | None:
         """Return the noise, or ``None`` if it is unknown or contradicted by the much smaller residual of a fit.
@@ -141,7 +151,7 @@ def rank_candidates(task: Task, now: Assessment) -> list[Candidate]:
     return [first, *(one for one in found if one is not first)]
 
 
-def add_effects(task: Task, first: Assessment, candidates: Sequence[Candidate]) -> Assessment:
+def add_effects(task: Task, first: Assessment, now: Assessment, candidates: Sequence[Candidate]) -> Assessment:
     """Add effects as long as the best candidate is significant.
 
     Parameters
@@ -150,15 +160,17 @@ def add_effects(task: Task, first: Assessment, candidates: Sequence[Candidate]) 
         Recordings, ledger and policy.
     first : Assessment
         Of the base model.
+    now : Assessment
+        Of the model to which effects are added.
     candidates : sequence of Candidate
-        For the base model; empty if nothing is missing.
+        For that model; empty if nothing is missing.
 
     Returns
     -------
     Assessment
         Of the final model.
     """
-    now, negligible, visited = first, smallest_structure(task, first), [_names(first)]
+    negligible, visited = smallest_structure(task, first), [_names(now)]
     most = task.policy.stepwise.most_effects
     while candidates:
         best = candidates[0]
@@ -180,6 +192,12 @@ def add_effects(task: Task, first: Assessment, candidates: Sequence[Candidate]) 
         visited.append(_names(added))
         now, candidates = _next(task, added, negligible)
     return now
+
+
+def add_more_effects(task: Task, first: Assessment, now: Assessment) -> Assessment:
+    """Look for candidates for a model, and add effects as `add_effects` does."""
+    now, candidates = _next(task, now, smallest_structure(task, first))
+    return add_effects(task, first, now, candidates)
 
 
 def _names(one: Assessment) -> set[str]:

@@ -65,8 +65,14 @@ class Verdict:
     noise: Noise
     """Of the angle."""
     fitted: tuple[Record, ...]
+    """The recordings; windows of them where a free run diverges."""
     held_out: tuple[Record, ...]
     """Recordings that were predicted only; may be empty."""
+    searched: tuple[Record, ...]
+    """What the search was made on: ``fitted``, or stretches of long recordings. The tests, the candidates and the
+    rivals are those of the search."""
+    searched_held_out: tuple[Record, ...]
+    """The same of ``held_out``."""
     policy: Policy = DEFAULT
     """The thresholds that led to the verdict."""
     free_form: FreeForm | None = None

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from anglecam.data.record import Record
 from anglecam.effects import Effect, Parameter, effect
 from anglecam.identification.output_error import predict_output_error
 from anglecam.loop.candidates import Candidate
@@ -80,6 +82,7 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
                 "parameters": {
                     p.name: model[p.name] | {"null": p.in_file_unit(p.null)[0]} for p in accepted.effect.parameters
                 },
+                "fixed": _fixed(accepted.effect),
                 "relaxes": accepted.effect.relaxes,
                 "alias_set": list(accepted.alias_set),
                 "separating_experiment": _what_to_film(accepted.effect, experiment if accepted.rivals else None),
@@ -102,6 +105,7 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
         },
         "held_out_gain": {"ratio": verdict.gain.ratio, "interval_95": list(verdict.gain.interval_95)},
         "held_out": list(dict.fromkeys(r.name for r in verdict.held_out)),
+        "samples": {"fitted": _samples(verdict.fitted), "searched": _samples(verdict.searched)},
         "p_value": verdict.first_test.p_value,
         "p_value_after": verdict.last_test.p_value,
         "model": {name: model[name] for name in MODEL_NAMES if name in model},
@@ -138,6 +142,16 @@ def free_form_as_dict(found: FreeForm) -> dict[str, Any]:
     }
 
 
+def _samples(records: Sequence[Record]) -> int:
+    return sum(len(record.time) for record in records)
+
+
+def _fixed(found: Effect) -> dict[str, float]:
+    """Return the parameters that were not fitted, such as a declared direction, in the units of their names."""
+    whole = effect(found.id).parameters
+    return {whole[place].name: whole[place].in_file_unit(value)[0] for place, value in found.fixed}
+
+
 def size_of(effect_id: str) -> Parameter:
     """Return the parameter that states the size of an effect."""
     return effect(effect_id).parameters[0]
@@ -157,9 +171,9 @@ def _held_out_error(candidate: Candidate, verdict: Verdict) -> float:
     """Return a candidate's RMS error on held-out data, rad, also if the loop did not cross-validate it."""
     if candidate.held_out is not None:
         return candidate.held_out.rmse
-    if verdict.held_out:
-        return predict_output_error(candidate.fit, verdict.held_out).rmse
-    return predict_held_out(candidate.fit, verdict.fitted, (), verdict.policy)[0].rmse
+    if verdict.searched_held_out:
+        return predict_output_error(candidate.fit, verdict.searched_held_out).rmse
+    return predict_held_out(candidate.fit, verdict.searched, (), verdict.policy)[0].rmse
 
 
 def fitted_parameters(verdict: Verdict) -> dict[str, dict[str, float]]:

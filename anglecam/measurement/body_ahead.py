@@ -195,19 +195,28 @@ def turn_ahead(
     TurnEstimate
         With a rotation of NaN where the body is not seen.
     """
-    image = None if np.isnan(begin) else registered_planes(film, picture)
+    if np.isnan(begin):
+        return NO_TURN
+    # other angles are tried in other parts of the picture
+    part = None if reach_px else body.appearance.part_seen(begin, film.size)
+    image = registered_planes(film, picture, part)
     if image is None:
         return NO_TURN
     view = FrameView(image, begin, body.appearance.pivot_px, 0.0, 0.0)
-    copied = None if before is None or not picture.predicted else registered_planes(film, before)
+    copied = None if before is None or not picture.predicted else registered_planes(film, before, part)
     if reach_px:
         view = refine_doubtful_turn(body.appearance, view, reach_px)
     return find_turn(body.appearance, view, copied)
 
 
-def registered_planes(film: Film, picture: Picture) -> Image | None:
-    """Return the planes by which a body is registered, (h, w, planes); ``None`` where a frame cannot be decoded."""
-    return picture.brightness if film.coarse_colour else picture.colours
+def registered_planes(film: Film, picture: Picture, part: tuple[slice, slice] | None = None) -> Image | None:
+    """Return the planes by which a body is registered, (h, w, planes); ``None`` where a frame cannot be decoded.
+
+    What is outside a part, if one is given, may have any values.
+    """
+    if film.coarse_colour:
+        return picture.brightness
+    return picture.colours if part is None else picture.colours_within(part)
 
 
 def _wrapped(angle: Floats) -> Floats:

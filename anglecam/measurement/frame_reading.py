@@ -110,7 +110,7 @@ def _search(
         # converted once, here, where a thread has time for it
         if steady is not None:
             _ = picture.colours
-        elif body is not None:
+        elif body is not None and (film.coarse_colour or not picture.has_parts):
             registered_planes(film, picture)
         if picture.stored is None:
             search.lose()

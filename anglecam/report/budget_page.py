@@ -3,33 +3,47 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.axes import Axes
 from rich.table import Table
 
-from anglecam import __version__
 from anglecam.budget.clip import PAPER, Budget, FrameBudget, budget_as_dict, budget_of, implied_lever, pixel_bound
 from anglecam.budget.collect import error_sources
 from anglecam.budget.gum import Propagated
-from anglecam.io.files import write_atomically, write_json
+from anglecam.data.typing import Floats
+from anglecam.errors import printable
+from anglecam.io.files import write_json
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import Measurement
+from anglecam.report.curves import Columns, Curve, Plot, curves_as_dict
+from anglecam.report.document import html_of, write_html
 from anglecam.report.figure8 import Scene, figure8
-from anglecam.report.figures import AFTER, BEFORE, FAINT, MEASURED, STYLE, _svg
+from anglecam.report.figures import AFTER, BEFORE, FAINT, MEASURED, panel
+from anglecam.report.origin import Origin
 from anglecam.video.film import Film
 
 _HUES = ("#1f6f8b", "#c4432b", "#d39b23", "#6a4c93", "#3d7a4a", "#8a939c", "#b5651d", "#2b6cff", "#444b53")
+ANGLE, TERMS = "angle", "standard uncertainty, term by term"
+"""Titles of the plots over time."""
+CONTENTS = {
+    "terms": "1 · Term by term",
+    "time": "2 · Over the clip",
+    "montecarlo": "3 · Check by Monte Carlo",
+    "bounds": "4 · If the mark is 6 px or 10 px off",
+    "figure8": "5 · Fig. 8 on this clip",
+    "missing": "6 · What is not in the budget",
+}
 _MANY = 1000
 """Degrees of freedom beyond which Student's t equals the normal distribution to three digits."""
 _GAP = 1.5
 """Gap between frames, in median frame intervals, at which a curve is interrupted."""
 
 
-def write_budget(film: Film, measured: Measurement, rig: Rig, out: Path) -> Budget:
+def write_budget(film: Film, measured: Measurement, rig: Rig, out: Path, made: Origin | None = None) -> Budget:
     """Write ``NAME.budget.json`` and ``NAME.budget.html`` of a measured clip.
 
     Parameters
@@ -42,6 +56,8 @@ def write_budget(film: Film, measured: Measurement, rig: Rig, out: Path) -> Budg
         The rig that it was measured with.
     out : Path
         A folder; created if missing.
+    made : Origin, optional
+        How the budget was made.
 
     Returns
     -------
@@ -56,11 +72,11 @@ def write_budget(film: Film, measured: Measurement, rig: Rig, out: Path) -> Budg
     budget = budget_of(measured.series.name, error_sources(measured, rig), rig.pixel_error_px)
     row = budget.typical.frame - film.first_frame
     write_json(out / f"{budget.name}.budget.json", budget_as_dict(budget))
-    write_page(out / f"{budget.name}.budget.html", budget, _scene(film, measured, row))
+    write_page(out / f"{budget.name}.budget.html", budget, _scene(film, measured, row), made)
     return budget
 
 
-def write_page(path: Path, budget: Budget, scene: Scene | None) -> None:
+def write_page(path: Path, budget: Budget, scene: Scene | None, made: Origin | None = None) -> None:
     """Write the page of a budget as one HTML file without external resources.
 
     Parameters
@@ -71,20 +87,24 @@ def write_page(path: Path, budget: Budget, scene: Scene | None) -> None:
         A clip's budget.
     scene : Scene, optional
         The frame for Fig. 8; without it the figure is left out.
+    made : Origin, optional
+        How the budget was made.
     """
-    environment = Environment(loader=PackageLoader("anglecam.report", "."), autoescape=True, undefined=StrictUndefined)
-    environment.filters["g"] = lambda value: f"{value:.3g}"
-    environment.filters["nu"] = _nu
     content = budget_as_dict(budget)
     frames = (("typical frame", budget.typical), ("worst frame", budget.worst))
-    drawings = {
-        "over_time": _figure_over_time(budget),
-        "distributions": _distribution_figure(budget),
-        "figure8": None if scene is None else figure8(scene),
+    figures = {
+        "over_time": [_panel(svg, plot, plot) for plot, svg in _over_time(budget).items()],
+        "distributions": [_panel(_distribution(one), f"{title}: number {one.frame}") for title, one in frames],
+        "figure8": [] if scene is None else [_panel(figure8(scene))],
     }
-    text = environment.get_template("budget.html").render(
-        name=budget.name,
-        version=__version__,
+    recording = Columns(budget.name, 0, _columns(budget))
+    text = html_of(
+        "budget.html",
+        contents=CONTENTS,
+        made=made,
+        curves=curves_as_dict([recording], _plots(budget)),
+        filters={"g": lambda value: f"{value:.3g}", "nu": _nu},
+        name=printable(budget.name),
         content=content,
         lever=budget.lever_px,
         pivot_sigma=np.sqrt(np.diag(budget.sources.pivot_covariance_px2)),
@@ -103,10 +123,9 @@ def write_page(path: Path, budget: Budget, scene: Scene | None) -> None:
             for radius, stated in PAPER
         ],
         at_paper=[math.degrees(pixel_bound(r, implied_lever(*PAPER[1])).worst) for r, _ in PAPER],
-        figures={k: None if svg is None else environment.filters["safe"](svg) for k, svg in drawings.items()},
+        figures=figures,
     )
-    with write_atomically(path) as stream:
-        stream.write(text)
+    write_html(path, text)
 
 
 def budget_table(budget: Budget) -> Table:
@@ -199,49 +218,58 @@ def _frame_content(title: str, one: FrameBudget, content: dict[str, Any]) -> dic
     }
 
 
-def _figure_over_time(budget: Budget) -> str:
-    """Draw the angle, its uncertainty and every term's contribution over time, as SVG."""
-    s = budget.sources
-    with plt.rc_context(STYLE):
-        figure, (top, bottom) = plt.subplots(
-            2, 1, figsize=(9, 5), sharex=True, height_ratios=(1, 2), layout="constrained"
-        )
-        step = np.diff(s.time)
-        breaks = np.flatnonzero(step > _GAP * np.median(step)) + 1 if len(step) else np.array([], int)
-        time = np.insert(s.time, breaks, np.nan)
-
-        def plot(ax: Any, values: Any, **how: Any) -> None:
-            ax.plot(time, np.insert(np.degrees(values), breaks, np.nan), **how)
-
-        plot(top, s.angle, color=MEASURED, lw=1.0)
-        top.set_ylabel("angle, °")
-        plot(bottom, budget.total, color=MEASURED, lw=1.8, label="combined")
-        if not np.allclose(budget.sigma, budget.total):
-            plot(bottom, budget.sigma, color=MEASURED, lw=1.0, ls=":", label="sigma of the series")
-        for term, hue in zip(budget.terms_over_time, _HUES, strict=False):
-            plot(bottom, term.contribution, color=hue, lw=1.0, label=term.name)
-        for one, name in ((budget.typical, "typical"), (budget.worst, "worst")):
-            for ax in (top, bottom):
-                ax.axvline(one.time, color=FAINT, lw=4, zorder=0)
-            top.annotate(
-                name, (one.time, 1.0), xycoords=("data", "axes fraction"), fontsize=8, ha="center", va="bottom"
-            )
-        bottom.set(xlabel="time on the clip's clock, s", ylabel="standard uncertainty, °", ylim=(0.0, None))
-        figure.legend(*bottom.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
-        return _svg(figure)
+def _panel(svg: str, title: str = "", plot: str = "") -> dict[str, Any]:
+    """Return a panel as the template shows it; ``plot`` is what the scripts draw in its place."""
+    return {"svg": svg, "title": title, "plot": plot, "number": 0 if plot else None}
 
 
-def _distribution_figure(budget: Budget) -> str:
-    """Draw the Monte Carlo densities with the densities that the GUM assumes and both 95 % intervals, as SVG."""
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(1, 2, figsize=(9, 2.9), layout="constrained")
-        for ax, one, name in zip(axes, (budget.typical, budget.worst), ("typical frame", "worst frame"), strict=True):
-            _draw_density(ax, one, one.drawn)
-            ax.set_title(f"{name}: {one.frame}", loc="left", fontsize=9)
-            ax.set_xlabel("error of the angle, °")
-            ax.set_yticks([])
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
-        return _svg(figure)
+def _columns(budget: Budget) -> dict[str, Floats]:
+    """Return the columns of the plots over time, with a row without values in every gap between frames."""
+    time = budget.sources.time
+    step = np.diff(time)
+    breaks = np.flatnonzero(step > _GAP * np.median(step)) + 1 if len(step) else np.array([], int)
+    found = {"time": np.insert(time, breaks, 0.5 * (time[breaks - 1] + time[breaks]))}
+    values = {"angle": budget.sources.angle, "combined": budget.total, "sigma": budget.sigma}
+    values |= {f"term{k}": term.contribution for k, term in enumerate(budget.terms_over_time)}
+    return found | {name: np.insert(np.degrees(one), breaks, np.nan) for name, one in values.items()}
+
+
+def _plots(budget: Budget) -> dict[str, Plot]:
+    """Return the plots over time by their titles."""
+    curves = [Curve("combined", "combined", MEASURED)]
+    if not np.allclose(budget.sigma, budget.total):
+        curves.append(Curve("sigma", "sigma of the series", "#7a858f"))
+    terms = zip(budget.terms_over_time, _HUES, strict=False)
+    curves += [Curve(f"term{k}", term.name, hue) for k, (term, hue) in enumerate(terms)]
+    return {
+        ANGLE: Plot("angle, °", (Curve("angle", "angle", MEASURED),)),
+        TERMS: Plot("standard uncertainty, °", tuple(curves), from_zero=True),
+    }
+
+
+def _over_time(budget: Budget) -> dict[str, str]:
+    """Draw the same plots as SVG, with the typical and the worst frame marked."""
+    columns = _columns(budget)
+
+    def draw(axes: Axes, plot: Plot) -> None:
+        for one in (budget.typical, budget.worst):
+            axes.axvline(one.time, color=FAINT, lw=4, zorder=0)
+        for curve in plot.curves:
+            axes.plot(columns["time"], columns[curve.column], color=curve.colour, lw=1.0, label=curve.label)
+        if plot.from_zero:
+            axes.set_ylim(0.0, None)
+
+    return {title: panel(plot.label, partial(draw, plot=plot)) for title, plot in _plots(budget).items()}
+
+
+def _distribution(one: FrameBudget) -> str:
+    """Draw the Monte Carlo density with the density that the GUM assumes and both 95 % intervals, as SVG."""
+
+    def draw(ax: Axes) -> None:
+        _draw_density(ax, one, one.drawn)
+        ax.set_yticks([])
+
+    return panel("density", draw, "error of the angle, °")
 
 
 def _draw_density(ax: Any, one: FrameBudget, drawn: Propagated) -> None:

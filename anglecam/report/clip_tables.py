@@ -36,24 +36,30 @@ def series_table(measurements: Sequence[Measurement | MeasuredTracks]) -> Table:
     return table
 
 
+RESPONSE_HEADS = ("start, s", "from → to, °", "rise, s", "overshoot, %", "settled after, s", "peak, °/s")
+"""Columns of a table of responses."""
+
+
 def response_table(name: str, answers: Sequence[Response]) -> Table:
     """Tabulate the steps of a clip's angle from rest to rest."""
-    table = Table(
-        "start, s", "from → to, °", "rise, s", "overshoot, %", "settled after, s", "peak, °/s", title=printable(name),
-        title_justify="left",
-    )  # fmt: skip
+    table = Table(*RESPONSE_HEADS, title=printable(name), title_justify="left")
     for column in table.columns:
         column.justify = "right"
-    for a in answers:
-        table.add_row(
-            f"{a.start.value:.3f}",
-            f"{_plain(np.degrees(a.from_angle.value))} → {_plain(np.degrees(a.to_angle.value))}",
-            _figure(a.rise_time),
-            _figure(a.overshoot, 100.0),
-            _figure(a.settling_time),
-            _figure(a.peak_speed, 180.0 / np.pi),
-        )
+    for answer in answers:
+        table.add_row(*response_cells(answer))
     return table
+
+
+def response_cells(answer: Response) -> tuple[str, ...]:
+    """Return a response as the cells of a row under `RESPONSE_HEADS`."""
+    return (
+        f"{answer.start.value:.3f}",
+        f"{_plain(np.degrees(answer.from_angle.value))} → {_plain(np.degrees(answer.to_angle.value))}",
+        _figure(answer.rise_time),
+        _figure(answer.overshoot, 100.0),
+        _figure(answer.settling_time),
+        _figure(answer.peak_speed, 180.0 / np.pi),
+    )
 
 
 def _plain(degrees: float) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +13,20 @@ matplotlib.use("Agg")  # draws without a display
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from anglecam.data.series import AngleSeries
 from anglecam.errors import printable
 
 MEASURED, BEFORE, AFTER, COMMAND, FAINT = "#1b1f24", "#c4432b", "#1f6f8b", "#9aa3ad", "#d9dee3"
+SHADE = "#bcd7e2"
+"""Of the interval in which an angle lies."""
+PANEL = (5.2, 2.3)
+"""Size of one panel of a page, inches; small enough that its text can be read on a narrow screen."""
+LEGEND_COLUMNS = 3
+NORMAL_95 = 1.96
+"""Standard uncertainties from the middle to the end of a 95 % interval."""
 STYLE: Any = {
     "font.size": 9,
     "font.family": "DejaVu Sans",
@@ -34,7 +43,7 @@ STYLE: Any = {
 
 
 def plot_series(series: AngleSeries, path: Path) -> None:
-    """Draw a measured clip: the angle over time with its 6 px bound, its sigma, and the frames without an angle.
+    """Draw a measured clip: the angle over time with its 95 % interval, its sigma, and the frames without an angle.
 
     Parameters
     ----------
@@ -47,23 +56,58 @@ def plot_series(series: AngleSeries, path: Path) -> None:
         figure, (top, bottom) = plt.subplots(
             2, 1, figsize=(9, 5), sharex=True, height_ratios=(3, 1), layout="constrained"
         )
-        degrees = np.degrees(series.angle)
-        bound = np.degrees(series.bounds.get(6.0, np.full(len(degrees), np.nan)))
-        top.fill_between(series.time, degrees - bound, degrees + bound, color=FAINT, label="6 px bound, worst case")
-        top.plot(series.time, degrees, color=MEASURED, lw=1.0, marker=".", ms=3, label="angle")
-        lost = ~series.ok
-        if lost.any():
-            for t in series.time[lost]:
-                top.axvline(t, color=BEFORE, lw=0.6, alpha=0.5)
-            top.plot([], [], color=BEFORE, lw=0.6, label=f"no angle: {lost.sum()} of {len(lost)} frames")
-        top.set(ylabel="angle from neutral, °")
+        _draw_angle(top, series)
+        top.set_ylabel("angle from neutral, °")
         top.set_title(printable(series.name), parse_math=False)
         figure.legend(*top.get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8)
-        bottom.plot(series.time, np.degrees(series.sigma), color=AFTER, lw=1.0)
-        bottom.set(xlabel="time on the clip's clock, s", ylabel="sigma, °", ylim=(0.0, None))
+        _draw_sigma(bottom, series)
+        bottom.set_xlabel("time on the clip's clock, s")
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=110, format="png")
         plt.close(figure)
+
+
+def angle_panel(series: AngleSeries) -> str:
+    """Draw the angle over time with its 95 % interval, as SVG."""
+    return panel("angle, °", lambda axes: _draw_angle(axes, series))
+
+
+def sigma_panel(series: AngleSeries) -> str:
+    """Draw the standard uncertainty over time, as SVG."""
+    return panel("σ, °", lambda axes: _draw_sigma(axes, series))
+
+
+def panel(ylabel: str, draw: Callable[[Axes], None], xlabel: str = "time, s") -> str:
+    """Return one panel of a page as SVG, with the legend that its curves need."""
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(figsize=PANEL)
+        draw(axes)
+        axes.set(xlabel=xlabel, ylabel=ylabel)
+        handles, texts = axes.get_legend_handles_labels()
+        rows = -(-len(handles) // LEGEND_COLUMNS) if len(handles) > 1 else 0
+        if rows:
+            figure.legend(handles, texts, loc="upper left", ncols=LEGEND_COLUMNS, fontsize=8)
+        # fixed margins, because working out a layout takes as long as drawing
+        figure.subplots_adjust(left=0.15, right=0.98, bottom=0.2, top=0.95 - 0.08 * rows)
+        return _svg(figure)
+
+
+def _draw_angle(axes: Axes, series: AngleSeries) -> None:
+    degrees, half = np.degrees(series.angle), NORMAL_95 * np.degrees(series.sigma)
+    if np.isfinite(half).any():
+        label = "95 % interval (1.96 σ)"
+        axes.fill_between(series.time, degrees - half, degrees + half, color=SHADE, label=label)
+    axes.plot(series.time, degrees, color=MEASURED, lw=1.0, marker=".", ms=2, label="angle")
+    lost = ~series.ok
+    for t in series.time[lost]:
+        axes.axvline(t, color=BEFORE, lw=0.6, alpha=0.5)
+    if lost.any():
+        axes.plot([], [], color=BEFORE, lw=0.6, label=f"no angle: {lost.sum()} of {len(lost)} frames")
+
+
+def _draw_sigma(axes: Axes, series: AngleSeries) -> None:
+    axes.plot(series.time, np.degrees(series.sigma), color=AFTER, lw=1.0)
+    axes.set(ylabel="σ, °", ylim=(0.0, None))
 
 
 def _svg(figure: Figure) -> str:

@@ -1,10 +1,11 @@
-"""The figures of the loop's report, each an ``<svg>`` element."""
+"""The figures of the loop's report: panels, each an ``<svg>`` element that can be read on a narrow screen."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -22,10 +23,9 @@ from anglecam.loop.next_experiment.design import SETTLE, Experiment
 from anglecam.loop.residual_torque import ResidualTorque
 from anglecam.loop.verdict import Verdict
 from anglecam.models.plant import Plant
-from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, STYLE, _svg
+from anglecam.report.figures import AFTER, BEFORE, COMMAND, FAINT, MEASURED, PANEL, STYLE, _svg, panel
 from anglecam.report.wording import plain
 
-WIDTH = 9.6
 MOST_RECORDINGS = 8
 """Largest number of recordings in a figure; those with the largest errors are drawn."""
 BINS, FEWEST_FRAMES = 16, 5
@@ -33,51 +33,69 @@ BINS, FEWEST_FRAMES = 16, 5
 COLOURS = {"base model": BEFORE, "before": BEFORE, "after": AFTER}
 
 
-def measured_figure(series: Sequence[AngleSeries], commands: dict[str, Command]) -> str:
-    """Draw angle and command of every recording over time, and mark frames without an angle."""
+@dataclass(frozen=True)
+class Panel:
+    """One panel of a figure."""
 
-    def draw(axes: Axes, i: int) -> None:
-        one = series[i]
-        if one.name in commands:
-            _draw_command(axes, commands[one.name], one.time)
-        axes.plot(one.time, np.degrees(one.angle), color=MEASURED, lw=1.1, label="measured angle")
-        for t in one.time[~one.ok]:
+    svg: str
+    title: str = ""
+    record: Record | None = None
+    """The recording that it shows over time."""
+    plot: str = ""
+    """The plot that the scripts draw in its place; empty for a panel that stays."""
+
+
+def measured_panel(series: AngleSeries, command: Command | None) -> str:
+    """Draw angle and command of a recording over time, and mark frames without an angle."""
+
+    def draw(axes: Axes) -> None:
+        if command is not None:
+            _draw_command(axes, command, series.time)
+        axes.plot(series.time, np.degrees(series.angle), color=MEASURED, lw=1.1, label="measured angle")
+        for t in series.time[~series.ok]:
             axes.axvline(t, color=BEFORE, lw=0.6, alpha=0.5)
 
-    return _panels([s.name for s in series], draw, "angle, °")
+    return panel("angle, °", draw)
 
 
-def prediction_figure(records: Sequence[Record], residuals: Sequence[Floats]) -> str:
+def prediction_panels(records: Sequence[Record], residuals: Sequence[Floats]) -> list[Panel]:
     """Draw the measured angle, and the angle that the base model predicts."""
     names = labels(records)
-    worst = _worst(residuals)
 
     def draw(axes: Axes, i: int) -> None:
-        record, error = records[worst[i]], residuals[worst[i]]
-        axes.plot(record.time, np.degrees(record.angle), ".", color=MEASURED, ms=2.5, label="measured")
-        axes.plot(record.time, np.degrees(record.angle - error), color=BEFORE, lw=1.0, label="base model")
+        axes.plot(records[i].time, np.degrees(records[i].angle), ".", color=MEASURED, ms=2.5, label="measured")
+        path = np.degrees(records[i].angle - residuals[i])
+        axes.plot(records[i].time, path, color=BEFORE, lw=1.0, label="base model")
 
-    return _panels([names[i] for i in worst], draw, "angle, °")
+    drawn = [(i, panel("angle, °", partial(draw, i=i))) for i in worst(residuals)]
+    return [Panel(svg, names[i], records[i], "prediction") for i, svg in drawn]
 
 
-def residual_figure(records: Sequence[Record], fit: Fit, floor: float) -> str:
+def residual_panels(records: Sequence[Record], fit: Fit, floor: float) -> list[Panel]:
     """Draw the residual of a model, and the band of the noise with standard deviation ``floor``, rad."""
-    names, worst = labels(records), _worst(fit.residuals)
+    curves = [{"measured − model": (BEFORE, residual)} for residual in fit.residuals]
+    return _error_panels(records, curves, worst(fit.residuals), floor, "residual, °", "residual")
 
-    def draw(axes: Axes, i: int) -> None:
-        _draw_band(axes, floor)
-        axes.plot(
-            records[worst[i]].time, np.degrees(fit.residuals[worst[i]]), color=BEFORE, lw=0.9, label="measured − model"
-        )
 
-    return _panels([names[i] for i in worst], draw, "residual, °")
+def error_panels(before: Prediction, after: Prediction | None, floor: float) -> list[Panel]:
+    """Draw the prediction errors: before and after, and then after alone, on a finer scale."""
+    first = "error" if after is None else "error before"
+    curves: list[dict[str, tuple[str, Floats]]] = [{first: (BEFORE, one)} for one in before.residuals]
+    shown = worst(before.residuals)
+    if after is None:
+        return _error_panels(before.records, curves, shown, floor, "error, °", "error")
+    alone: list[dict[str, tuple[str, Floats]]] = [{"error after": (AFTER, one)} for one in after.residuals]
+    both = [one | more for one, more in zip(curves, alone, strict=True)]
+    wide = _error_panels(before.records, both, shown, floor, "error, °", "error")
+    fine = _error_panels(before.records, alone, shown, floor, "error, °", "error_after")
+    return [one for pair in zip(wide, fine, strict=True) for one in pair]
 
 
 def candidate_figure(candidates: Sequence[Candidate], found: Sequence[str]) -> str:
     """Draw the log-likelihood gain of every candidate; the names of attributed effects are bold."""
     with plt.rc_context(STYLE):
         ordered = candidates[::-1]
-        figure, ax = plt.subplots(figsize=(7.6, 0.9 + 0.42 * len(ordered)), layout="constrained")
+        figure, ax = plt.subplots(figsize=(PANEL[0], 0.9 + 0.36 * len(ordered)), layout="constrained")
         rows = np.arange(len(ordered))
         fitted = [c.log_likelihood_gain if np.isfinite(c.log_likelihood_gain) else 0.0 for c in ordered]
         predicted = [c.predictive_gain if np.isfinite(c.predictive_gain) else 0.0 for c in ordered]
@@ -100,132 +118,80 @@ def candidate_figure(candidates: Sequence[Candidate], found: Sequence[str]) -> s
         return _svg(figure)
 
 
-def held_out_figure(before: Prediction, after: Prediction | None) -> str:
+def held_out_panels(before: Prediction, after: Prediction | None) -> list[Panel]:
     """Draw the recording with the largest prediction error, as predicted by the base model and by the final model.
 
     ``after`` is ``None`` if no effect was added.
     """
-    i = _worst(before.residuals, 1)[0]
-    record = before.records[i]
+    i = worst(before.residuals, 1)[0]
+    record, name = before.records[i], labels(before.records)[i]
     shown = {"base model": before} if after is None else {"before": before, "after": after}
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(
-            1, len(shown), figsize=(WIDTH, 2.7), sharex=True, sharey=True, squeeze=False, layout="constrained"
-        )
-        for ax, (label, prediction) in zip(axes[0], shown.items(), strict=True):
-            ax.plot(record.time, np.degrees(record.angle), ".", color=MEASURED, ms=3, label="measured")
-            path = record.angle - prediction.residuals[i]
-            ax.plot(record.time, np.degrees(path), color=COLOURS[label], lw=1.2, label="predicted")
-            ax.set_title(f"{labels(before.records)[i]}, {label}", loc="left", fontsize=9, parse_math=False)
-            ax.set_xlabel("time, s")
-            ax.legend(fontsize=8)
-        axes[0, 0].set_ylabel("angle, °")
-        return _svg(figure)
+
+    def draw(axes: Axes, label: str) -> None:
+        axes.plot(record.time, np.degrees(record.angle), ".", color=MEASURED, ms=3, label="measured")
+        path = record.angle - shown[label].residuals[i]
+        axes.plot(record.time, np.degrees(path), color=COLOURS[label], lw=1.2, label="predicted")
+
+    drawn = {label: panel("angle, °", partial(draw, label=label)) for label in shown}
+    return [Panel(svg, f"{name}, {label}") for label, svg in drawn.items()]
 
 
-def error_figure(before: Prediction, after: Prediction | None, floor: float) -> str:
-    """Draw the prediction errors: before and after on the left, and after alone, on a finer scale, on the right."""
-    worst = _worst(before.residuals)
-    names = labels(before.records)
-    columns = 1 if after is None else 2
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(
-            len(worst),
-            columns,
-            figsize=(WIDTH, 0.6 + 1.25 * len(worst)),
-            squeeze=False,
-            layout="constrained",
-            sharex="row",
-        )
-        for row, i in zip(axes, worst, strict=True):
-            time = before.records[i].time
-            for ax in row:
-                _draw_band(ax, floor)
-            row[0].plot(
-                time,
-                np.degrees(before.residuals[i]),
-                color=BEFORE,
-                lw=0.9,
-                label="error" if after is None else "error before",
-            )
-            if after is not None:
-                for ax in row:
-                    ax.plot(time, np.degrees(after.residuals[i]), color=AFTER, lw=0.9, label="error after")
-                row[1].set_title("after, on a finer scale", loc="left", fontsize=8, color="#5c6670")
-            row[0].set_title(names[i], loc="left", fontsize=9, parse_math=False)
-            row[0].set_ylabel("error, °")
-        for ax in axes[-1]:
-            ax.set_xlabel("time, s")
-        handles, texts = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, texts, loc="outside upper right", ncols=3, fontsize=8)
-        return _svg(figure)
-
-
-def residual_torque_figure(torques: Sequence[ResidualTorque]) -> str:
+def residual_torque_panels(torques: Sequence[ResidualTorque]) -> list[Panel]:
     """Draw the residual torque against angle, velocity, command and time, with means over bins."""
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(2, 2, figsize=(WIDTH, 5.4), sharey=True, layout="constrained")
-        torque = np.degrees(np.concatenate([r.torque for r in torques]))
-        noise = 2.0 * np.degrees(float(np.median(np.concatenate([r.sigma for r in torques]))))
-        against = {
-            "angle of the model, °": np.degrees(np.concatenate([r.angle for r in torques])),
-            "velocity of the model, °/s": np.degrees(np.concatenate([r.velocity for r in torques])),
-        }
-        if any(r.command is not None for r in torques):
-            commands = [np.zeros(len(r.time)) if r.command is None else r.command for r in torques]
-            against["command, °"] = np.degrees(np.concatenate(commands))
-        else:
-            axes[1, 1].set_axis_off()
-        for ax in axes.flat[: len(against) + 1]:
-            ax.axhspan(-noise, noise, color=FAINT, zorder=0, label="noise alone, ±2σ")
-        for ax, (label, x) in zip(axes.flat, against.items(), strict=False):
-            ax.plot(x, torque, ".", color=AFTER, ms=2.5, alpha=0.35, label="frame")
-            ax.plot(*_means(x, torque), "o-", color=MEASURED, ms=4, lw=1.2, label="mean")
-            ax.set_xlabel(label)
-        last = axes.flat[len(against)]
+    torque = np.degrees(np.concatenate([r.torque for r in torques]))
+    noise = 2.0 * np.degrees(float(np.median(np.concatenate([r.sigma for r in torques]))))
+    against = {
+        "angle of the model, °": np.degrees(np.concatenate([r.angle for r in torques])),
+        "velocity of the model, °/s": np.degrees(np.concatenate([r.velocity for r in torques])),
+    }
+    if any(r.command is not None for r in torques):
+        commands = [np.zeros(len(r.time)) if r.command is None else r.command for r in torques]
+        against["command, °"] = np.degrees(np.concatenate(commands))
+
+    def band(axes: Axes) -> None:
+        axes.axhspan(-noise, noise, color=FAINT, zorder=0, label="noise alone, ±2σ")
+
+    def draw(axes: Axes, x: Floats) -> None:
+        band(axes)
+        axes.plot(x, torque, ".", color=AFTER, ms=2.5, alpha=0.35, label="frame")
+        axes.plot(*_means(x, torque), "o-", color=MEASURED, ms=4, lw=1.2, label="mean")
+
+    def over_time(axes: Axes) -> None:
+        band(axes)
         for one in torques:
-            last.plot(one.time, np.degrees(one.torque), lw=0.8, label=one.name)
-        last.set_xlabel("time, s")
-        if len(torques) <= MOST_RECORDINGS:
-            handles, names = last.get_legend_handles_labels()
-            last.legend(handles[1:], names[1:], fontsize=7, ncols=2)
-        for ax in axes[:, 0]:
-            ax.set_ylabel("residual torque, °/s²")
-        handles, names = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, names, loc="outside upper right", ncols=3, fontsize=8)
-        return _svg(figure)
+            label = printable(one.name) if len(torques) <= MOST_RECORDINGS else None
+            axes.plot(one.time, np.degrees(one.torque), lw=0.8, label=label)
+
+    unit = "residual torque, °/s²"
+    drawn = [panel(unit, partial(draw, x=x), label) for label, x in against.items()]
+    return [Panel(svg) for svg in [*drawn, panel(unit, over_time)]]
 
 
-def experiment_figure(experiment: Experiment, verdict: Verdict) -> str:
+def experiment_panels(experiment: Experiment, verdict: Verdict) -> list[Panel]:
     """Draw the next command, and the differences between the predictions of the rivals and of the final model."""
     command = experiment.command
     if command is None:
         raise ValueError("a free swing has no command to draw")
     time = np.arange(0.0, experiment.duration, verdict.fitted[0].interval)
     expected = _predict_from_rest(verdict.after, command, time, verdict.fitted[0])
-    with plt.rc_context(STYLE):
-        figure, (top, bottom) = plt.subplots(
-            2, 1, figsize=(WIDTH, 3.6), sharex=True, height_ratios=(3, 2), layout="constrained"
-        )
-        _draw_command(top, command, time)
-        found = " + ".join(plain(a.effect.id) for a in verdict.accepted)
-        top.plot(time, np.degrees(expected), color=AFTER, lw=1.2, label=f"angle expected with {found}")
-        top.set_ylabel("angle, °")
-        _draw_band(bottom, verdict.noise.sigma)
+    found = " + ".join(plain(a.effect.id) for a in verdict.accepted)
+
+    def draw_command(axes: Axes) -> None:
+        _draw_command(axes, command, time)
+        axes.plot(time, np.degrees(expected), color=AFTER, lw=1.2, label=f"angle expected with {found}")
+
+    def draw_differences(axes: Axes) -> None:
+        _draw_band(axes, verdict.noise.sigma)
         for accepted in verdict.accepted:
             for name, fit in accepted.rivals.items():
                 difference = _predict_from_rest(fit, command, time, verdict.fitted[0]) - expected
-                bottom.plot(
-                    time,
-                    np.degrees(difference),
-                    lw=1.0,
-                    label=f"{plain(name)} instead of {plain(accepted.effect.id)}",
-                )
-        bottom.set(xlabel="time, s", ylabel="difference, °")
-        handles, names = top.get_legend_handles_labels()
-        more, others = bottom.get_legend_handles_labels()
-        figure.legend([*handles, *more], [*names, *others], loc="outside upper left", ncols=2, fontsize=8)
-        return _svg(figure)
+                label = f"{plain(name)} instead of {plain(accepted.effect.id)}"
+                axes.plot(time, np.degrees(difference), lw=1.0, label=label)
+
+    return [
+        Panel(panel("angle, °", draw_command), "the command to play"),
+        Panel(panel("difference, °", draw_differences), "what it would show"),
+    ]
 
 
 def labels(records: Sequence[Record]) -> list[str]:
@@ -254,7 +220,7 @@ def _means(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     return np.array([x[i].mean() for i in full]), np.array([y[i].mean() for i in full])
 
 
-def _worst(residuals: Sequence[Floats], most: int = MOST_RECORDINGS) -> list[int]:
+def worst(residuals: Sequence[Floats], most: int = MOST_RECORDINGS) -> list[int]:
     """Return the indices of the recordings with the largest errors, in ascending order."""
     size = [float(np.sqrt(np.mean(r**2))) for r in residuals]
     return sorted(sorted(range(len(size)), key=lambda i: -size[i])[:most])
@@ -271,24 +237,22 @@ def _draw_band(axes: Axes, floor: float) -> None:
     axes.axhspan(-2.0 * np.degrees(floor), 2.0 * np.degrees(floor), color=FAINT, zorder=0, label="noise, ±2σ")
 
 
-def _panels(names: Sequence[str], draw: Callable[[Axes, int], None], ylabel: str) -> str:
-    """Draw one panel for each recording, in two columns if there are several."""
-    n = len(names)
-    columns = 1 if n == 1 else 2
-    rows = -(-n // columns)
-    settings: dict[str, Any] = {"squeeze": False, "layout": "constrained", "sharey": True}
-    with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(rows, columns, figsize=(WIDTH, 0.6 + 1.45 * rows), **settings)
-        for i, ax in enumerate(axes.flat):
-            if i >= n:
-                ax.set_axis_off()
-                continue
-            draw(ax, i)
-            ax.set_title(names[i], loc="left", fontsize=9, parse_math=False)
-            if i % columns == 0:
-                ax.set_ylabel(ylabel)
-            if i >= n - columns:
-                ax.set_xlabel("time, s")
-        handles, texts = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, texts, loc="outside upper right", ncols=3, fontsize=8)
-        return _svg(figure)
+def _error_panels(
+    records: Sequence[Record],
+    curves: Sequence[dict[str, tuple[str, Floats]]],
+    shown: Sequence[int],
+    floor: float,
+    ylabel: str,
+    plot: str,
+) -> list[Panel]:
+    """Draw errors over time, (colour, rad) by name, for those of the recordings that are ``shown``."""
+    names = labels(records)
+
+    def draw(axes: Axes, i: int) -> None:
+        _draw_band(axes, floor)
+        for label, (colour, error) in curves[i].items():
+            axes.plot(records[i].time, np.degrees(error), color=colour, lw=0.9, label=label)
+
+    drawn = [(i, panel(ylabel, partial(draw, i=i))) for i in shown]
+    finer = ", on a finer scale" if plot == "error_after" else ""
+    return [Panel(svg, names[i] + finer, records[i], plot) for i, svg in drawn]

@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from anglecam import __version__
 from anglecam.data.series import AngleSeries
-from anglecam.effects import effect
-from anglecam.effects.unit_names import split_unit
+from anglecam.errors import printable
 from anglecam.identification.identified import Identified
-from anglecam.io.files import write_atomically
 from anglecam.io.session import CORRECTED, SERIES_ENDING
 from anglecam.loop.next_experiment.design import Experiment
-from anglecam.loop.refit import plant_of
-from anglecam.loop.residual_test import StructureTest
 from anglecam.loop.residual_torque import estimate_residual_torque
-from anglecam.loop.stepwise import applicable
 from anglecam.loop.verdict import Verdict
-from anglecam.loop.verdict_json import NEXT_COMMAND, size_of
+from anglecam.loop.verdict_json import NEXT_COMMAND
 from anglecam.report import loop_figures as figures
-from anglecam.report.free_form_figure import free_form_figure
-from anglecam.report.path_figure import path_figure
+from anglecam.report import page_rows as rows
+from anglecam.report.curves import curves_as_dict
+from anglecam.report.document import html_of, write_html
+from anglecam.report.free_form_figure import free_form_figures
+from anglecam.report.origin import Origin
+from anglecam.report.path_figure import effect_panels, signal_path
+from anglecam.report.session_curves import Watched, session_plots, watch
 from anglecam.report.wording import (
     free_form_sentence,
     free_run,
@@ -33,37 +31,17 @@ from anglecam.report.wording import (
     plain,
     remaining_structure,
     sentence,
-    summary_of,
-    with_uncertainty,
 )
+from anglecam.video.film import Film
 
 COLOURS = {
     "attributed": "#1f6f8b",
-    "nothing_missing": "#3d7a4a",
-    "unexplained": "#b5651d",
-    "partly_explained": "#8a6d1d",
+    "nothing_missing": "#2f6b3c",
+    "unexplained": "#a04f0c",
+    "partly_explained": "#7a5c00",
 }
-ESTIMATORS = {"ekf": "extended Kalman filter", "oe2": "output error"}
-STATION_NOTES = {
-    "command": "It acts on the command, before anything moves.",
-    "actuator": "It acts between the command and the body, in servo and linkage.",
-    "load": "It acts on the body.",
-    "camera": "It is an effect of the camera, not of the mechanism: the body moves as the model predicts, but the film "
-    "shows another angle or time.",
-}
-OPTIONAL_COLUMNS = {"sigma": "median σ, °", "bound": "6 px bound, °", "lever": "lever arm, px"}
-"""Columns of the table of recordings that are shown only if they are not empty."""
-SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-TESTS = {
-    "residual against angle": "residual as a function of the angle",
-    "residual against velocity": "residual as a function of the velocity",
-    "residual against command": "residual as a function of recent commands",
-    "residual against time": "slow drift of the residual over time",
-    "torque against angle": "torque as a function of the angle",
-    "torque against velocity": "torque as a function of the velocity",
-    "autocorrelation": "autocorrelation of the residual",
-}
-"""Names of the tests that need no effect, in words."""
+REMAINS = ("unexplained", "partly_explained")
+"""Verdicts that leave structure."""
 
 
 def write_report(
@@ -74,7 +52,11 @@ def write_report(
     experiment: Experiment | None,
     series: Sequence[AngleSeries],
     models: Sequence[Identified],
-    problems: Sequence[str],
+    problems: Sequence[object],
+    *,
+    shown: Sequence[AngleSeries] | None = None,
+    films: Mapping[str, Film] | None = None,
+    made: Origin | None = None,
 ) -> None:
     """Write the report on a verdict.
 
@@ -94,24 +76,24 @@ def write_report(
         The measured angles.
     models : sequence of Identified
         Base models to compare.
-    problems : sequence of str
+    problems : sequence
         Recordings that could not be used, with the cause.
+    shown : sequence of AngleSeries, optional
+        The same recordings with the angles that the loop starts from, where measuring corrected a camera effect.
+    films : mapping of str to Film, optional
+        Of those recordings that have one, by name.
+    made : Origin, optional
+        How the report was made.
     """
-    # autoescape, because names of files and recordings come from the user; the SVG figures are marked as safe
-    environment = Environment(loader=PackageLoader("anglecam.report", "."), autoescape=True, undefined=StrictUndefined)
-    decimals = (
-        4 if verdict.noise.sigma == 0.0 else int(np.clip(1 - np.floor(np.log10(np.degrees(verdict.noise.sigma))), 4, 6))
-    )
-    environment.filters |= {
-        "p": lambda p: f"{p:.3f}" if p >= 1e-3 else "< 0.001",
-        "in_words": p_in_words,
-        "plain": plain,
-        "deg": lambda value: f"{value:.{decimals}f}",
-    }
-    rows = [_series_row(s) for s in series]
-    text = environment.get_template("page.html").render(
-        title=title,
-        version=__version__,
+    watched = watch(verdict, series if shown is None else shown, films or {})
+    table = [rows.series_row(s) for s in series]
+    text = html_of(
+        "page.html",
+        contents=_contents(verdict),
+        made=made,
+        curves=curves_as_dict([one.curves for one in watched], session_plots(verdict, watched)),
+        filters={"p": _p, "in_words": p_in_words, "plain": plain, "deg": _degrees_filter(verdict)},
+        title=printable(title),
         colour=COLOURS[verdict.verdict],
         verdict=verdict,
         sentence=sentence(verdict),
@@ -123,27 +105,69 @@ def write_report(
         gain=verdict.gain,
         policy=verdict.policy,
         validation=validation_in_words(verdict),
-        series=rows,
-        columns=[{"key": key, "head": head} for key, head in OPTIONAL_COLUMNS.items() if any(row[key] for row in rows)],
+        series=table,
+        columns=[{"key": k, "head": head} for k, head in rows.OPTIONAL_COLUMNS.items() if any(r[k] for r in table)],
+        watched=[_watched_row(one, verdict) for one in watched],
+        bounded=any(one.series.bounds for one in watched),
+        filmed=any(one.pictures for one in watched),
+        uncorrected=shown is not None,
         problems=problems,
-        models=[_model_row(m) for m in models],
+        models=[rows.model_row(m) for m in models],
         driven=any(r.command is not None for r in verdict.fitted),
-        tests=_test_rows(verdict.first_test.tests),
-        candidates=_candidate_rows(verdict, result),
+        tests=rows.test_rows(verdict.first_test.tests),
+        candidates=rows.candidate_rows(verdict, result),
         drawn=figures.MOST_RECORDINGS,
-        effects=_effect_rows(verdict, result),
-        final=_final_rows(verdict, result),
+        effects=rows.effect_rows(verdict, result),
+        final=rows.final_rows(verdict, result),
         corrected=CORRECTED
         if any((path.parent / CORRECTED / f"{s.name}{SERIES_ENDING}").exists() for s in series)
         else "",
         experiment=experiment,
         next_command=NEXT_COMMAND,
-        detectable=_detectable_rows(result),
-        undetectable=_undetectable(verdict),
-        figures={name: environment.filters["safe"](svg) for name, svg in _figures(verdict, experiment, series).items()},
+        detectable=rows.detectable_rows(result),
+        undetectable=rows.undetectable(verdict),
+        path=signal_path(verdict),
+        figures=_figures(verdict, experiment, [one.series.name for one in watched]),
     )
-    with write_atomically(path) as stream:
-        stream.write(text)
+    write_html(path, text)
+
+
+def _contents(verdict: Verdict) -> dict[str, str]:
+    """Return the headings by anchor."""
+    last = {"torque": "The residual torque"} if verdict.verdict in REMAINS else {"detectable": "Detectable effects"}
+    headings = {
+        "measured": "Measured angles",
+        "base": "The base model",
+        "residual": "The residual test",
+        "candidates": "The candidates",
+        "verdict": "The verdict",
+        "errors": "Prediction error before and after",
+        "next": "Alternatives and the next recording",
+        **last,
+        "unused": "What could not be used or made",
+    }
+    return {anchor: f"{k} · {heading}" for k, (anchor, heading) in enumerate(headings.items(), 1)}
+
+
+def _p(p: float) -> str:
+    return f"{p:.3f}" if p >= 1e-3 else "< 0.001"
+
+
+def _degrees_filter(verdict: Verdict) -> Any:
+    """Return what formats degrees with as many digits as the noise leaves meaning."""
+    sigma = np.degrees(verdict.noise.sigma)
+    decimals = 4 if sigma == 0.0 else int(np.clip(1 - np.floor(np.log10(sigma)), 4, 6))
+    return lambda value: f"{value:.{decimals}f}"
+
+
+def _watched_row(one: Watched, verdict: Verdict) -> dict[str, Any]:
+    """Return a recording with the plots that it has, and their drawings for print."""
+    commands = {r.name: r.command for r in [*verdict.fitted, *verdict.held_out]}
+    plots = {"angle": "Angle"}
+    if "residual_before" in one.curves.columns:
+        plots["watched_residual"] = "Residual"
+    drawn = {"angle": figures.measured_panel(one.series, commands.get(one.series.name))}
+    return {"name": one.name, "plots": plots, "drawn": drawn, "pictures": one.pictures}
 
 
 def p_in_words(p: float) -> str:
@@ -167,157 +191,37 @@ def validation_in_words(verdict: Verdict) -> str:
     )
 
 
-def _figures(verdict: Verdict, experiment: Experiment | None, series: Sequence[AngleSeries]) -> dict[str, str]:
-    """Draw the figures for a verdict, as SVG by name."""
+def _figures(verdict: Verdict, experiment: Experiment | None, names: Sequence[str]) -> dict[str, Any]:
+    """Draw the figures for a verdict: panels by name; ``names`` are those of the recordings, in the page's order."""
     floor = verdict.noise.sigma
-    commands = {r.name: r.command for r in [*verdict.fitted, *verdict.held_out] if r.command is not None}
-    after = verdict.after_held_out if verdict.accepted else None
+    before, after = verdict.before_held_out, verdict.after_held_out if verdict.accepted else None
     drawn = {
-        "measured": figures.measured_figure(series, commands),
-        "prediction": figures.prediction_figure(verdict.fitted, verdict.before.residuals),
-        "residual": figures.residual_figure(verdict.fitted, verdict.before, floor),
-        "path": path_figure(verdict),
-        "held_out": figures.held_out_figure(verdict.before_held_out, after),
-        "errors": figures.error_figure(verdict.before_held_out, after, floor),
+        "prediction": figures.prediction_panels(verdict.fitted, verdict.before.residuals),
+        "residual": figures.residual_panels(verdict.fitted, verdict.before, floor),
+        "effects": [figures.Panel(svg, name) for name, svg in effect_panels(verdict)],
+        "held_out": figures.held_out_panels(before, after),
+        "errors": figures.error_panels(before, after, floor),
+        "candidates": [],
+        "residual_torque": [],
+        "free_form": [],
+        "experiment": [],
     }
     if verdict.candidates:
-        drawn["candidates"] = figures.candidate_figure(verdict.candidates, [a.effect.id for a in verdict.accepted])
-    if verdict.verdict in ("unexplained", "partly_explained"):
-        drawn["residual_torque"] = figures.residual_torque_figure(
-            estimate_residual_torque(verdict.after, verdict.fitted, verdict.noise)
-        )
+        found = [a.effect.id for a in verdict.accepted]
+        drawn["candidates"] = [figures.Panel(figures.candidate_figure(verdict.candidates, found))]
+    if verdict.verdict in REMAINS:
+        torques = estimate_residual_torque(verdict.after, verdict.fitted, verdict.noise)
+        drawn["residual_torque"] = figures.residual_torque_panels(torques)
     if verdict.free_form is not None:
-        drawn["free_form"] = free_form_figure(verdict.free_form)
+        drawn["free_form"] = [figures.Panel(svg) for svg in free_form_figures(verdict.free_form)]
     if experiment is not None and experiment.command is not None and experiment.separated:
-        drawn["experiment"] = figures.experiment_figure(experiment, verdict)
-    return drawn
+        drawn["experiment"] = figures.experiment_panels(experiment, verdict)
+    return {name: [_panel_row(one, panels, names) for one in panels] for name, panels in drawn.items()}
 
 
-def _series_row(series: AngleSeries) -> dict[str, Any]:
-    ok = series.ok
-    degrees = np.degrees(series.angle[ok])
-    lever = None
-    if series.mark_px is not None and series.pivot_px is not None:
-        lever = float(np.median(np.hypot(*(series.mark_px - series.pivot_px)[ok].T)))
-    bound = series.bounds.get(6.0)
-    return {
-        "name": series.name,
-        "seconds": f"{series.time[-1] - series.time[0]:.1f}",
-        "frames": len(ok),
-        "measured": int(ok.sum()),
-        "range": f"{degrees.min():.2f} … {degrees.max():.2f}".replace("-", "−"),
-        "sigma": _text(
-            np.degrees(np.nanmedian(series.sigma[ok])) if np.isfinite(series.sigma[ok]).any() else None, ".4f"
-        ),
-        "bound": _text(None if bound is None else np.degrees(np.nanmedian(bound[ok])), ".2f"),
-        "lever": _text(lever, ".1f"),
-    }
-
-
-def _model_row(model: Identified) -> dict[str, Any]:
-    cells = [with_uncertainty(v, s) for v, s in zip(model.values[:3], model.sigmas[:3], strict=True)]
-    cells += [""] * (3 - len(cells))
-    held_out = None if model.held_out is None else np.degrees(model.held_out.rmse)
-    return {
-        "name": ESTIMATORS[model.estimator],
-        "cells": [*cells, f"{np.degrees(model.fit.rmse):.4f}", _text(held_out, ".4f")],
-    }
-
-
-def _test_rows(tests: Sequence[StructureTest]) -> dict[str, list[dict[str, Any]]]:
-    """Divide the tests into those that need no effect and those for one effect, smallest p-value first."""
-    rows: dict[str, list[dict[str, Any]]] = {"any": [], "effect": []}
-    for test in sorted(tests, key=lambda t: t.p_value):
-        of_effect = test.name.startswith("effect ")
-        name = plain(test.name.removeprefix("effect ")) if of_effect else TESTS[test.name]
-        rows["effect" if of_effect else "any"].append({"name": name, "p_value": test.p_value})
-    return rows
-
-
-def _candidate_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any]]:
-    found = [a.effect.id for a in verdict.accepted]
-    return [
-        {
-            "name": plain(c.effect.id),
-            "found": c.effect.id in found,
-            "station": c.effect.station,
-            "gain": c.log_likelihood_gain,
-            "predictive_gain": None if c.cross_validated is None else c.predictive_gain,
-            "held_out": stated["held_out_rmse_deg"],
-            "relaxes": c.effect.relaxes,
-        }
-        for c, stated in zip(verdict.candidates, result["candidates"], strict=True)
-    ]
-
-
-def _effect_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any]]:
-    return [
-        {
-            "id": a.effect.id,
-            "name": plain(a.effect.id),
-            "summary": summary_of(a.effect, verdict.after),
-            "equation": a.effect.equation,
-            "fitted": [
-                {
-                    "symbol": parameter.symbol,
-                    "name": split_unit(parameter.name)[0],
-                    "value": with_uncertainty(stated["value"], stated["sigma"], _unit(parameter.name)),
-                }
-                for parameter, stated in zip(a.effect.parameters, shown["parameters"].values(), strict=True)
-            ],
-            "left_out": [p.symbol for p in effect(a.effect.id).parameters[len(a.effect.parameters) :]],
-            "relaxes": a.effect.relaxes,
-            "station_note": STATION_NOTES[a.effect.station],
-            "rivals": [
-                {"name": plain(name), "summary": summary_of(effect(name), rival), "station": effect(name).station}
-                for name, rival in a.rivals.items()
-            ],
-            "aliases": [plain(name) for name in a.effect.aliases],
-            "experiment": a.effect.separating_experiment,
-        }
-        for a, shown in zip(verdict.accepted, result["effects"], strict=True)
-    ]
-
-
-def _final_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, str]]:
-    """List a, b and c of the final model."""
-    count = plant_of(verdict.after).base_count
-    return [
-        {"name": split_unit(name)[0], "value": with_uncertainty(stated["value"], stated["sigma"], _unit(name))}
-        for name, stated in list(result["model"].items())[:count]
-    ]
-
-
-def _detectable_rows(result: dict[str, Any]) -> list[dict[str, Any]]:
-    return [
-        {
-            "name": plain(d["id"]),
-            "what": split_unit(size_of(d["id"]).name)[0],
-            "least": "at most" if size_of(d["id"]).inverse else "at least",
-            "size": _number(d["smallest"]),
-            "unit": _unit(size_of(d["id"]).name),
-        }
-        for d in sorted(result["detectable"], key=lambda d: d["id"])
-    ]
-
-
-def _undetectable(verdict: Verdict) -> list[str]:
-    """Name the effects that the residual test would not have detected at any size that was tried."""
-    detected = {*verdict.last_test.detectable, *(name for a in verdict.accepted for name in a.alias_set)}
-    return [plain(e.id) for e in applicable([*verdict.fitted, *verdict.held_out]) if e.id not in detected]
-
-
-def _unit(name: str) -> str:
-    """Return a parameter's unit as it follows a number."""
-    words = split_unit(name)[1].replace("deg", "°").replace("s2", "s²")
-    return words if words == "°" else " " + words
-
-
-def _number(value: float) -> str:
-    """Return a number with three digits, and with a power of ten if it is very large or small."""
-    mantissa, _, power = f"{float(f'{value:.3g}'):g}".partition("e")
-    return mantissa + (f"·10{str(int(power)).translate(SUPERSCRIPT)}" if power else "")
-
-
-def _text(value: float | None, form: str) -> str:
-    return "" if value is None or np.isnan(value) else format(value, form)
+def _panel_row(one: figures.Panel, panels: Sequence[figures.Panel], names: Sequence[str]) -> dict[str, Any]:
+    """Return a panel with the number of its recording, if the scripts may draw the whole recording in its place."""
+    same = [p for p in panels if p.record is not None and one.record is not None and p.record.name == one.record.name]
+    whole = len({id(p.record) for p in same}) == 1
+    number = names.index(one.record.name) if one.record is not None and one.plot and whole else None
+    return {"svg": one.svg, "title": one.title, "plot": one.plot, "number": number}

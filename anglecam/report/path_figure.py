@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import FancyBboxPatch
 
 from anglecam.data.command import Command
 from anglecam.data.record import Record
@@ -23,7 +22,7 @@ from anglecam.identification.fit import Fit
 from anglecam.loop.stepwise import applicable
 from anglecam.loop.verdict import Verdict
 from anglecam.models.added_acceleration import added_acceleration
-from anglecam.report.figures import AFTER, COMMAND, MEASURED, STYLE, _svg
+from anglecam.report.figures import AFTER, COMMAND, panel
 from anglecam.report.wording import plain
 
 STATIONS = {
@@ -54,29 +53,36 @@ class EffectCurve:
     """``y`` without the effect, for an effect that changes one curve into another."""
 
 
-def path_figure(verdict: Verdict) -> str:
-    """Draw the signal path as SVG: a box for each station, the effects considered, and attributed ones as curves."""
+@dataclass(frozen=True)
+class Station:
+    """A station of the signal path, and the effects that were considered there."""
+
+    name: str
+    caption: str
+    effects: tuple[tuple[str, str], ...]
+    """Name and standing of each: ``found``, ``rival`` (cannot be distinguished from one that was found) or empty."""
+
+    @property
+    def found(self) -> bool:
+        """Whether an effect was attributed here."""
+        return any(standing == "found" for _, standing in self.effects)
+
+
+def signal_path(verdict: Verdict) -> list[Station]:
+    """Return the stations of the signal path in order."""
     considered = applicable([*verdict.fitted, *verdict.held_out])
-    found = [a.effect for a in verdict.accepted]
-    instead = {name for a in verdict.accepted for name in a.rivals}
-    lists = {station: [e for e in considered if e.station == station] for station in STATIONS}
-    lines = max(len(listed) for listed in lists.values())
-    here = {station: [e for e in found if e.station == station] for station in STATIONS}
-    rows = max(len(effects) for effects in here.values())
-    heights = [0.75 + 0.17 * lines, *(2.0 for _ in range(rows))]
-    with plt.rc_context(STYLE):
-        figure = plt.figure(figsize=(9.6, sum(heights)), layout="constrained")
-        grid = figure.add_gridspec(1 + rows, len(STATIONS), height_ratios=heights)
-        path = figure.add_subplot(grid[0, :])
-        path.set(xlim=(0.0, 4.0), ylim=(-heights[0] + 0.75, 0.75))
-        path.set_axis_off()
-        for i, (station, caption) in enumerate(STATIONS.items()):
-            _draw_station(path, i, station, caption, bool(here[station]))
-            for line, effect in enumerate(lists[station]):
-                _draw_name(path, i, line, effect, effect.id in [e.id for e in found], effect.id in instead)
-            for row, effect in enumerate(here[station]):
-                _draw_curve(figure.add_subplot(grid[1 + row, i]), effect, verdict)
-        return _svg(figure)
+    standing = {name: "rival" for a in verdict.accepted for name in a.rivals}
+    standing |= {a.effect.id: "found" for a in verdict.accepted}
+    return [
+        Station(name, caption, tuple((plain(e.id), standing.get(e.id, "")) for e in considered if e.station == name))
+        for name, caption in STATIONS.items()
+    ]
+
+
+def effect_panels(verdict: Verdict) -> list[tuple[str, str]]:
+    """Draw each attributed effect as the function that it computes: its name and the SVG."""
+    found = [(plain(a.effect.id), curve_of(a.effect, verdict.after, verdict.fitted)) for a in verdict.accepted]
+    return [(name, panel(curve.ylabel, partial(_draw_curve, curve=curve), curve.xlabel)) for name, curve in found]
 
 
 def curve_of(effect: Effect, fit: Fit, records: Sequence[Record]) -> EffectCurve:
@@ -215,32 +221,7 @@ def _ordered(x: Floats, y: Floats, xlabel: str, ylabel: str, with_identity: bool
     return EffectCurve(x[order], y[order], xlabel, ylabel, x[order] if with_identity else None)
 
 
-def _draw_station(axes: Axes, i: int, station: str, caption: str, found: bool) -> None:
-    colour = AFTER if found else "white"
-    box = FancyBboxPatch((i + 0.06, 0.12), 0.82, 0.5, "round,pad=0,rounding_size=0.05", fc=colour, ec=AFTER, lw=1.2)
-    axes.add_patch(box)
-    ink = "white" if found else MEASURED
-    axes.text(i + 0.47, 0.44, station, ha="center", va="center", color=ink, fontsize=11, fontweight="bold")
-    axes.text(i + 0.47, 0.24, caption, ha="center", va="center", color=ink, fontsize=6.8)
-    if i + 1 < len(STATIONS):
-        axes.annotate("", (i + 1.06, 0.37), (i + 0.88, 0.37), arrowprops={"arrowstyle": "-|>", "color": AFTER})
-
-
-def _draw_name(axes: Axes, i: int, line: int, effect: Effect, found: bool, instead: bool) -> None:
-    y = -0.06 - 0.17 * line
-    mark = "● " if found else "? " if instead else ""
-    weight, colour = ("bold", AFTER) if found else ("normal", MEASURED if instead else "#5c6670")
-    axes.text(i + 0.1, y, mark + plain(effect.id), va="center", fontsize=8, fontweight=weight, color=colour)
-
-
-def _draw_curve(axes: Axes, effect: Effect, verdict: Verdict) -> None:
-    curve = curve_of(effect, verdict.after, verdict.fitted)
+def _draw_curve(axes: Axes, curve: EffectCurve) -> None:
     if curve.without is not None:
         axes.plot(curve.x, curve.without, color=COMMAND, lw=1.0, ls="--", label="without it")
     axes.plot(curve.x, curve.y, color=AFTER, lw=1.5, label="with it")
-    if curve.without is not None:
-        axes.legend(fontsize=7)
-    axes.set_xlabel(curve.xlabel, fontsize=8)
-    axes.set_ylabel(curve.ylabel, fontsize=8)
-    axes.set_title(plain(effect.id), fontsize=9, fontweight="bold", color=AFTER)
-    axes.tick_params(labelsize=7)

@@ -155,9 +155,10 @@ class Film:
 
     def _pictures(self, only: Set[int] | None) -> Iterator[Picture]:
         for index, row in enumerate(self.rows.read(None if only is None else only.__contains__)):
-            yield self._picture(index, row)
+            yield self.picture(index, row)
 
-    def _picture(self, index: int, row: Row) -> Picture:
+    def picture(self, index: int, row: Row) -> Picture:
+        """Return a row of the film as a picture that is converted when it is needed."""
         return Picture(index, *row, self.display, self.bottom_first)
 
     def sample(self, most: int) -> Sample:
@@ -183,7 +184,7 @@ class Film:
             stride = 1
             while len(first_of_each(stride, decoded)) > most:
                 stride *= 2
-            pictures = [self._picture(number, row) for number, row in first_of_each(stride, decoded)]
+            pictures = [self.picture(number, row) for number, row in first_of_each(stride, decoded)]
             frames = tuple(Frame(p.index, p.time, p.colours) for p in pictures)
             intact = self.rows.count - self.rows.undecodable if self.rows.is_read else len(decoded)
             self._samples[most] = Sample(frames, self.rows.count, intact)

@@ -66,6 +66,11 @@ class Picture:
         """(height, width, 1) as the codec stored it; ``None`` where it cannot be decoded."""
         return self._shown(to_brightness)
 
+    @property
+    def has_parts(self) -> bool:
+        """Whether a part of its colours can be converted without the rest."""
+        return self.stored is not None and self._is_as_stored(self.stored)
+
     def colours_in(self, part: tuple[slice, slice]) -> Image:
         """Return the colours of a part of a picture that can be decoded, the same as those of the whole one.
 
@@ -79,11 +84,31 @@ class Picture:
         ndarray
             (rows, columns, 3) bytes: blue, green, red.
         """
-        stored = self.stored
-        if "colours" not in self.__dict__ and stored is not None and self._is_as_stored(stored):
-            return _colours_in(stored, part)
+        if "colours" not in self.__dict__ and self.has_parts:
+            assert self.stored is not None
+            return _colours_in(self.stored, part)
         assert self.colours is not None
         return self.colours[part]
+
+    def colours_within(self, part: tuple[slice, slice]) -> Image | None:
+        """Return a picture in which a part has its colours, and the rest may have any.
+
+        Parameters
+        ----------
+        part : tuple of slice
+            As in `colours_in`.
+
+        Returns
+        -------
+        ndarray or None
+            (height, width, 3) bytes: blue, green, red; ``None`` where the picture cannot be decoded.
+        """
+        stored = self.stored
+        if stored is None or "colours" in self.__dict__ or not self.has_parts:
+            return self.colours
+        image = np.empty((stored.height, stored.width, 3), np.uint8)
+        image[part] = _colours_in(stored, part)
+        return image
 
     def is_same_as(self, other: Picture) -> bool:
         """Return whether two pictures are equal bit for bit, of which both can be decoded."""
@@ -115,10 +140,8 @@ class Picture:
 
 def to_colours(picture: av.VideoFrame) -> Image:
     """Convert a picture to (height, width, 3) bytes: blue, green, red."""
-    name, full = picture.format.name, picture.color_range == _FULL
-    if (name == "yuvj444p" or (name == "yuv444p" and full)) and picture.colorspace in _BT_601:
-        # FFmpeg differs by one grey level in a hundredth of the pixels, in four times the time
-        return np.asarray(_jpeg_colours(*(_plane(picture, k) for k in range(3))))
+    if _is_jpeg(picture):
+        return _jpeg_part(picture, (slice(0, picture.height), slice(0, picture.width)))
     return picture.to_ndarray(format="bgr24", threads=1)  # starting threads takes longer than they save
 
 
@@ -138,29 +161,56 @@ def to_brightness(picture: av.VideoFrame) -> Image:
     return (samples >> (bits - 8)).astype(np.uint8)[..., None]
 
 
+def _is_jpeg(picture: av.VideoFrame) -> bool:
+    """Return whether JPEG's equations give a picture's colours, pixel by pixel.
+
+    FFmpeg differs by one grey level in a hundredth of the pixels, in four times the time.
+    """
+    name, full = picture.format.name, picture.color_range == _FULL
+    return (name == "yuvj444p" or (name == "yuv444p" and full)) and picture.colorspace in _BT_601
+
+
+def _jpeg_part(picture: av.VideoFrame, part: tuple[slice, slice]) -> Image:
+    rows, columns = part
+    bright, of_blue, of_red = (_lines(picture, k) for k in range(3))
+    return np.asarray(_jpeg_colours(bright, of_blue, of_red, rows.start, rows.stop, columns.start, columns.stop))
+
+
 @njit(cache=True, nogil=True)
-def _jpeg_colours(brightness, blueness, redness):  # type: ignore[no-untyped-def]
-    """Convert planes by JPEG's equations (ITU-T T.871), in integers of 14 binary places as OpenCV does."""
-    height, width = brightness.shape
-    colours = np.empty((height, width, 3), np.uint8)
-    for row in range(height):
-        for column in range(width):
-            y = np.int32(brightness[row, column])
-            u, v = np.int32(blueness[row, column]) - 128, np.int32(redness[row, column]) - 128
-            colours[row, column, 0] = min(max(y + ((29049 * u + 8192) >> 14), 0), 255)
-            colours[row, column, 1] = min(max(y + ((-5636 * u - 11698 * v + 8192) >> 14), 0), 255)
-            colours[row, column, 2] = min(max(y + ((22987 * v + 8192) >> 14), 0), 255)
+def _jpeg_colours(brightness, blueness, redness, top, bottom, left, right):  # type: ignore[no-untyped-def]
+    """Convert a part of planes by JPEG's equations (ITU-T T.871), in integers of 14 binary places as OpenCV does."""
+    width = right - left
+    colours = np.empty((bottom - top, width, 3), np.uint8)
+    blue, green, red = np.empty(width, np.uint8), np.empty(width, np.uint8), np.empty(width, np.uint8)
+    for row in range(top, bottom):
+        bright, of_blue, of_red = brightness[row, left:right], blueness[row, left:right], redness[row, left:right]
+        for x in range(width):  # without the three interleaved: several pixels are converted at once
+            y = np.int32(bright[x])
+            u, v = np.int32(of_blue[x]) - 128, np.int32(of_red[x]) - 128
+            blue[x] = min(max(y + ((29049 * u + 8192) >> 14), 0), 255)
+            green[x] = min(max(y + ((-5636 * u - 11698 * v + 8192) >> 14), 0), 255)
+            red[x] = min(max(y + ((22987 * v + 8192) >> 14), 0), 255)
+        for x in range(width):
+            colours[row - top, x, 0], colours[row - top, x, 1], colours[row - top, x, 2] = blue[x], green[x], red[x]
     return colours
 
 
 def _plane(picture: av.VideoFrame, k: int) -> NDArray[np.uint8]:
     """Return one of the planes of a picture of 8 bits, (height, width)."""
     plane = picture.planes[k]
-    return np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)[: plane.height, : plane.width]
+    return _lines(picture, k)[: plane.height, : plane.width]
+
+
+def _lines(picture: av.VideoFrame, k: int) -> NDArray[np.uint8]:
+    """Return such a plane as it lies in memory: its lines may be longer than the picture is wide."""
+    plane = picture.planes[k]
+    return np.frombuffer(memoryview(plane), np.uint8).reshape(-1, plane.line_size)
 
 
 def _colours_in(picture: av.VideoFrame, part: tuple[slice, slice]) -> Image:
     """Convert a part of a picture in one of the formats of `_REDUCTION`."""
+    if _is_jpeg(picture):
+        return _jpeg_part(picture, part)
     rows, columns = part
     top, bottom = _aligned(rows, picture.height)
     left, right = _aligned(columns, picture.width)

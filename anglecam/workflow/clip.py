@@ -5,7 +5,7 @@ The command line, the batch and the Python API all measure through these functio
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,12 +17,20 @@ from anglecam.io.files import write_json
 from anglecam.io.netcdf_parquet import Also, write_also
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import write_series
-from anglecam.io.session import SERIES_ENDING, clip_beside, command_beside, rig_beside
+from anglecam.io.session import (
+    SERIES_ENDING,
+    clip_beside,
+    command_beside,
+    command_file_beside,
+    rig_beside,
+    rig_file_beside,
+)
 from anglecam.io.tracks.files import TRACKS_ENDINGS
 from anglecam.measurement.clip import Measurement, measure_clip
 from anglecam.measurement.clock_sync import offset_of, on_clip_clock
 from anglecam.measurement.step_response import Response, responses, responses_as_dicts
 from anglecam.measurement.tracks import MeasuredTracks, measure_tracks
+from anglecam.report.origin import Run, origin_of
 from anglecam.video.film import Film
 from anglecam.video.open_film import open_film
 
@@ -162,6 +170,44 @@ def write_measurement(
     plot_series(series, out / f"{series.name}.png")
     write_also(series, also, out / series.name)
     return answers
+
+
+def write_clip_page(
+    source: Source,
+    measurement: Measurement | MeasuredTracks,
+    answers: Sequence[Response],
+    out: Path,
+    run: Run | None = None,
+) -> None:
+    """Write the page of a clip, ``NAME.html``.
+
+    Parameters
+    ----------
+    source : Source
+        The clip.
+    measurement : Measurement or MeasuredTracks
+        Of it.
+    answers : sequence of Response
+        From `write_measurement`.
+    out : Path
+        Folder for the page.
+    run : Run, optional
+        How the command was called.
+    """
+    from anglecam.report.clip_page import write_clip_html
+
+    command = on_clip_clock(source.command, offset_of(source.command, measurement.series.evidence.lamp_s))
+    made = origin_of(inputs_of(source.path, source.rig, run), run)
+    write_clip_html(out, measurement, source.film, command, answers, made)
+
+
+def inputs_of(path: Path, rig: Rig, run: Run | None = None) -> list[Path]:
+    """Return the files that the measurement of a clip or of tracks depends on, whether they exist or not."""
+    declared = run.rig if run is not None and run.rig is not None else rig_file_beside(path)
+    calibration = rig.camera.calibration
+    clip = clip_beside(path) if path.suffix.lower() in TRACKS_ENDINGS else None
+    others = [command_file_beside(path), declared, None if calibration is None else Path(calibration), clip]
+    return [path, *(one for one in others if one is not None)]
 
 
 def write_clip_overlay(source: Source, measurement: Measurement | MeasuredTracks, out: Path) -> None:

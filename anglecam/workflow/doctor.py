@@ -95,7 +95,7 @@ def check_kernel_cache() -> Check:
     """Check that the folder where Numba keeps compiled kernels can be written to; otherwise every start compiles."""
     from anglecam.vision.registration.kernels import place_on_tile as kernel
 
-    folder = Path(kernel.stats.cache_path)
+    folder = Path(str(kernel.stats.cache_path))
     writable = _can_write(folder)
     problem = (
         None

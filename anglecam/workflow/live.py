@@ -26,7 +26,7 @@ from anglecam.measurement.live_meter import LiveMeter
 from anglecam.measurement.live_model import LiveAngle
 from anglecam.video.decode import Row
 from anglecam.video.live_source import LiveSource
-from anglecam.workflow.clip import Progress, measure_source, open_recording, write_measurement
+from anglecam.workflow.clip import Progress, measure_source, open_recording, write_clip_page, write_measurement
 from anglecam.workflow.live_learning import Learning, Lesson
 
 LATE_S = 0.1
@@ -126,9 +126,10 @@ def measure_live(
 
     name = recording_name(path)
     write_live(session.rows, out / f"{name}{LIVE_ENDING}")
-    measurement = measure_source(open_recording(path, rig, command), progress=progress)
+    recording = open_recording(path, rig, command)
+    measurement = measure_source(recording, progress=progress)
     assert isinstance(measurement, Measurement)  # a film is no file of tracks
-    write_measurement(measurement, command, out)
+    write_clip_page(recording, measurement, write_measurement(measurement, command, out), out)
     result = LiveResult(path, tuple(session.rows), measurement, session.learning.cause)
     plot_live(result.rows, out / f"{name}.live.png", name)
     return result

@@ -2,29 +2,38 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from anglecam.data.record import Record
+from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError
+from anglecam.identification.clocks import Clocks
 from anglecam.identification.export import fitted_model, transfer_as_dict, write_mat
 from anglecam.identification.identified import Identified
 from anglecam.identification.identify_records import identify_records
 from anglecam.io.files import write_json
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import write_series
-from anglecam.io.session import CORRECTED, SERIES_ENDING
+from anglecam.io.session import CORRECTED, SERIES_ENDING, Session, clip_beside
 from anglecam.loop.camera_correction import correct_camera_effects
 from anglecam.loop.close import with_free_form
 from anglecam.loop.cross_validation import split_records
 from anglecam.loop.next_experiment.design import Experiment
+from anglecam.loop.refit import plant_of
 from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import NEXT_COMMAND, next_experiment, verdict_as_dict, write_next_command
 from anglecam.neck.large_angle import LargeAngleNeck
+from anglecam.report.origin import Run, origin_of
 from anglecam.report.page import write_report
 from anglecam.terminal import make_folder
+from anglecam.video.film import Film
+from anglecam.video.open_film import open_film
+from anglecam.workflow.clip import inputs_of
+from anglecam.workflow.clock import session_clocks
 from anglecam.workflow.session import LoopInput, MeasuredSession, close_session, identify_session
 from anglecam.workflow.side_products import attempt
 
@@ -62,6 +71,7 @@ def write_identified(
         The model.
     """
     model = identify_session(measured, estimator, neck=neck)
+    model = replace(model, clock=session_clocks(measured, model.fitted))
     _write_model(model, out, "model")
     return model
 
@@ -73,6 +83,7 @@ def write_closed(
     *,
     hold_out: Sequence[str] = (),
     progress: Callable[[str], None] = lambda stage: None,
+    run: Run | None = None,
 ) -> Closed:
     """Close the loop; write the models, ``loop.json``, ``report.html`` and the command of the next experiment.
 
@@ -84,6 +95,8 @@ def write_closed(
         From `anglecam.workflow.session.loop_input`.
     out : Path
         Folder for the files.
+    run : Run, optional
+        How the command was called, for the report.
 
     Returns
     -------
@@ -99,9 +112,11 @@ def write_closed(
     verdict = attempt("free form", partial(with_free_form, verdict), missing) or verdict
     progress("extended Kalman filter")
     models = []
-    for estimator, name in (("ekf", "ekf"), ("oe2", "model")):
+    effects = plant_of(verdict.after).effects
+    clock = attempt("the clocks", lambda: session_clocks(measured, fitted, effects), missing)
+    for estimator, name, clocks in (("ekf", "ekf", None), ("oe2", "model", clock)):
         model = attempt(
-            f"{name}.json", partial(_identify, fitted, held_out, session.rig, estimator, out, name), missing
+            f"{name}.json", partial(_identify, fitted, held_out, session.rig, estimator, out, name, clocks), missing
         )
         models += [] if model is None else [model]
     progress("report")
@@ -112,22 +127,57 @@ def write_closed(
     title, page = session.directory.resolve().name, out / REPORT
     problems = [*map(str, measured.problems), *missing]
     page.unlink(missing_ok=True)  # an older report would contradict the verdict
-    attempt(
-        REPORT,
-        lambda: write_report(page, title, verdict, result, experiment, measured.series, models, problems),
-        missing,
-    )
+
+    def report() -> None:
+        uncorrected = _with_uncorrected(measured.series, shown) if shown.differs else None
+        films, made = _films(session), origin_of(_inputs(session, run), run)
+        write_report(
+            page, title, verdict, result, experiment, measured.series, models, problems,
+            shown=uncorrected, films=films, made=made,
+        )  # fmt: skip
+
+    attempt(REPORT, report, missing)
     write_json(out / "loop.json", result | {"missing": missing})
     return Closed(tuple(models), verdict, experiment, tuple(missing))
 
 
+def _with_uncorrected(measured: Sequence[AngleSeries], shown: LoopInput) -> list[AngleSeries]:
+    """Return the measured series, with the angles that the loop starts from where it uses them."""
+    used = {series.name: series for series in shown.series}
+    return [used.get(series.name, series) for series in measured]
+
+
+def _films(session: Session) -> dict[str, Film]:
+    """Open the films of a session's recordings for the pictures of the report; without one there are none."""
+    films = {}
+    for recording in session.recordings:
+        clip = recording.source if recording.is_clip else clip_beside(recording.source)
+        if recording.is_series or clip is None:
+            continue
+        with contextlib.suppress(InputError):  # a batch does not fetch films again that it has measured
+            films[recording.name] = open_film(clip, session.rig.frames)
+    return films
+
+
+def _inputs(session: Session, run: Run | None) -> list[Path]:
+    """Return the files that the results of a session depend on."""
+    found = [inputs_of(recording.source, session.rig, run) for recording in session.recordings]
+    return sorted({path for files in found for path in files})
+
+
 def _identify(
-    fitted: Sequence[Record], held_out: Sequence[Record], rig: Rig, estimator: str, out: Path, name: str
+    fitted: Sequence[Record],
+    held_out: Sequence[Record],
+    rig: Rig,
+    estimator: str,
+    out: Path,
+    name: str,
+    clock: Clocks | None,
 ) -> Identified:
     """Fit a model and write it; delete an older one first."""
     for ending in (".json", ".mat"):
         (out / f"{name}{ending}").unlink(missing_ok=True)
-    model = identify_records(fitted, rig, estimator, held_out=held_out)
+    model = replace(identify_records(fitted, rig, estimator, held_out=held_out), clock=clock)
     _write_model(model, out, name)
     return model
 

@@ -27,8 +27,6 @@ from benchmarks.blind.judged import Line, judge, read_lines, show, true_values
 from benchmarks.blind.sessions import HELD_OUT, residual_deg, scaled, session, spec_of
 
 SIGMA_DEG = 0.05
-COLOURED = 0.6
-"""AR(1) coefficient φ of the correlated noise from frame to frame, typical of a codec's block pattern."""
 PAIRS = (
     ("dead_time", "coulomb_friction"),
     ("actuator_lag", "stiffening_spring"),
@@ -40,6 +38,8 @@ PAIRS = (
     ("gravity_geometry", "rolling_shutter"),
 )
 """Pairs from different stages of the signal path; every kind of port occurs."""
+KINDS = ("coloured", "heavy-tailed", "quantised")
+"""Kinds of noise other than white."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -52,7 +52,8 @@ class Case:
     effects: tuple[str, ...] = ()
     ratio: float = 1.0
     """Residual of the base model without noise, over the noise."""
-    phi: float = 0.0
+    noise: str = "white"
+    """Kind of noise, as in `session`."""
 
 
 CASES = {
@@ -62,7 +63,8 @@ CASES = {
         *(Case(f"{name}/4", "one effect, a quarter of the noise", (name,), 0.25) for name in LEDGER),
         *(Case("+".join(pair), "two effects, each as large as the noise", pair) for pair in PAIRS),
         Case("nothing", "nothing missing, white noise"),
-        Case("nothing-coloured", f"nothing missing, AR(1) noise of {COLOURED:g}", phi=COLOURED),
+        *(Case(f"nothing-{kind}", f"nothing missing, {kind} noise", noise=kind) for kind in KINDS),
+        *(Case(f"{name}-quantised", "one effect, quantised angles", (name,), noise="quantised") for name in LEDGER),
         *(Case(name, "outside the ledger, as large as the noise", (name,)) for name in OUTSIDE),
     )
 }
@@ -77,7 +79,7 @@ def run(name: str, seed: int) -> Line:
         for effect in case.effects:
             drawn |= draw(effect, seed)
         effects = scaled(drawn, seed, case.ratio, sigma_deg=SIGMA_DEG)
-        records = session(effects, seed=seed, sigma_deg=SIGMA_DEG, phi=case.phi)
+        records = session(effects, seed=seed, sigma_deg=SIGMA_DEG, noise=case.noise)
         values = true_values(spec_of(effects, seed=seed), effects)
         start = time.perf_counter()
         verdict = close_records(records, held_out=HELD_OUT, seed=seed)
@@ -90,7 +92,8 @@ def run(name: str, seed: int) -> Line:
 
 
 def main(
-    seeds: Annotated[int, typer.Option(help="Sessions per case, from seed 0 on.")] = 20,
+    seeds: Annotated[int, typer.Option(help="Sessions per case.")] = 20,
+    first: Annotated[int, typer.Option(help="Seed of the first session.")] = 0,
     cases: Annotated[str, typer.Option(help="Comma-separated names of cases; all by default.")] = "",
     processes: Annotated[int, typer.Option(min=1)] = 2,
     out: Annotated[Path, typer.Option(help="File of lines to which results are appended.")] = Path(
@@ -104,7 +107,7 @@ def main(
         names = cases.split(",") if cases else list(CASES)
         if unknown := [name for name in names if name not in CASES]:
             raise typer.BadParameter(f"unknown case {unknown[0]}; the cases are {', '.join(CASES)}")
-        _run_all([(name, seed) for seed in range(seeds) for name in names], processes, out, console)
+        _run_all([(name, seed) for seed in range(first, first + seeds) for name in names], processes, out, console)
     order = list(CASES)
     lines = sorted(read_lines(summary or out), key=lambda line: (order.index(line["case"]), line["seed"]))
     show(lines, lambda line: CASES[line["case"]].group, console)

@@ -43,6 +43,12 @@ DECLARED = 0.25
 NEAR_M, SMALLER, FARTHER = 0.6, 0.5, 2.0
 """With lens distortion or perspective the camera is this close, m; with lens distortion the rig is this many times as
 large and as far from the middle."""
+PHI = 0.6
+"""AR(1) coefficient of correlated noise from frame to frame, typical of a codec's block pattern."""
+TAILS = 4
+"""Degrees of freedom of heavy-tailed noise."""
+STEP_DEG = 0.088
+"""Step of quantised angles, °: an encoder of 4,096 counts per turn."""
 SETTLED = 4
 """Iterations for the row of the mouth and the time of that row; they converge to far below a microsecond."""
 CLOSE = 0.02
@@ -58,7 +64,7 @@ def session(
     *,
     seed: int,
     sigma_deg: float = 0.05,
-    phi: float = 0.0,
+    noise: str = "white",
     fps: float = 30,
     plant: tuple[float, float, float] | None = None,
 ) -> list[Record]:
@@ -71,8 +77,11 @@ def session(
         A linkage's effect is fixed by its links, so its size is varied through the range of motion.
     seed : int
         Seed of plant, commands, camera and noise, which do not depend on the effects.
-    sigma_deg, phi : float
-        Standard deviation of the noise, and its correlation from frame to frame.
+    sigma_deg : float
+        Standard deviation of the noise.
+    noise : {"white", "coloured", "heavy-tailed", "quantised"}
+        AR(1) noise has the coefficient `PHI`; heavy tails are those of Student's t with `TAILS` degrees of freedom.
+        Quantised angles are rounded to `STEP_DEG`; an eighth of the noise acts before the rounding.
     fps : float
         Frames per second.
     plant : (a, b, c), optional
@@ -91,12 +100,12 @@ def session(
     spec = spec_of(effects, seed=seed, fps=fps, plant=plant)
     seen = look(spec)
     known = "constant_torque" in effects or _rng(seed, ZERO).random() < DECLARED
-    noise = np.random.default_rng(seed)
+    rng = np.random.default_rng(seed)
     records = []
     for take in perform(spec, seen):
         exact = _record(spec, seen, take, known)
-        added = math.radians(sigma_deg) * _coloured(noise, len(exact.time), phi)
-        records.append(_from_zero(replace(exact, angle=exact.angle + added)))
+        angle = _measured(exact.angle, math.radians(sigma_deg), noise, rng)
+        records.append(_from_zero(replace(exact, angle=angle)))
     return records
 
 
@@ -257,12 +266,18 @@ def _line(arm: Floats, mirrored: bool) -> Floats:
     return np.arctan2(-arm[..., 1], -arm[..., 0] if mirrored else arm[..., 0])
 
 
-def _coloured(rng: np.random.Generator, n: int, phi: float) -> Floats:
-    """Return AR(1) noise of unit variance."""
-    noise = rng.normal(size=n)
-    for i in range(1, n):
-        noise[i] = phi * noise[i - 1] + math.sqrt(1 - phi**2) * noise[i]
-    return noise
+def _measured(angle: Floats, sigma: float, noise: str, rng: np.random.Generator) -> Floats:
+    """Return angles with noise of standard deviation ``sigma``, rad, of a kind that `session` lists."""
+    if noise == "heavy-tailed":
+        return angle + sigma * math.sqrt((TAILS - 2) / TAILS) * rng.standard_t(TAILS, len(angle))
+    white = rng.normal(size=len(angle))
+    if noise == "quantised":
+        step = math.radians(STEP_DEG)
+        return np.asarray(step * np.round((angle + sigma / 8.0 * white) / step))
+    if noise == "coloured":
+        for i in range(1, len(white)):
+            white[i] = PHI * white[i - 1] + math.sqrt(1 - PHI**2) * white[i]
+    return angle + sigma * white
 
 
 def _rng(seed: int, purpose: int) -> np.random.Generator:

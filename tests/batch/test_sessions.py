@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from anglecam.batch.run import Options, run_batch
-from anglecam.batch.session_job import SessionJob, _configuration
+from anglecam.batch.session_job import SessionJob, _inputs
 from anglecam.batch.worker import Settings
 from anglecam.data.series import AngleSeries
 from anglecam.io.series_csv import write_series
@@ -112,5 +112,5 @@ def test_a_session_depends_on_tracks_that_replace_a_clip(tmp_path):
     found = []
     for x in (10.0, 11.0):
         tracks.write_text(f"scorer,a,a,a\nbodyparts,nose,nose,nose\ncoords,x,y,likelihood\n0,{x},20.0,0.9\n")
-        found.append(_configuration(job, settings))
+        found.append(_inputs(job, settings))
     assert found[0] != found[1]

@@ -27,7 +27,7 @@ def names(folder, sources):
 
 def test_a_folder_is_searched_with_all_folders_below_it_except_hidden_files_and_the_output_folder(tmp_path):
     touch(tmp_path, "b.avi", "a.MP4", "deep/er/c.mkv", "notes.txt", "._b.avi", ".trash/d.avi", "out/e.overlay.mp4")
-    found, problems = find_sources([str(tmp_path)], tmp_path / "out")
+    found, _, problems = find_sources([str(tmp_path)], tmp_path / "out")
     assert names(tmp_path, found) == ["a.MP4", "b.avi", "deep/er/c.mkv"]
     assert [source.below_root for source in found] == ["", "", "deep/er"]
     assert not problems
@@ -42,10 +42,10 @@ def test_globs_lists_and_single_clips_are_expanded(tmp_path):
         ("**/b.avi", ["tue/b.avi"]),
         ("odd[1].avi", ["odd[1].avi"]),
     ]:
-        found, problems = find_sources([str(tmp_path / asked)], tmp_path / "out")
+        found, _, problems = find_sources([str(tmp_path / asked)], tmp_path / "out")
         assert names(tmp_path, found) == expected
         assert not problems
-    found, _ = find_sources([f"@{tmp_path}/list.txt", str(tmp_path / "tue/a.avi")], tmp_path / "out")
+    found, *_ = find_sources([f"@{tmp_path}/list.txt", str(tmp_path / "tue/a.avi")], tmp_path / "out")
     assert names(tmp_path, found) == ["tue/a.avi", "tue/b.avi", "weird name.mov"]
     assert (
         find_sources([f"file://{tmp_path}/mon"], tmp_path / "out")[0]
@@ -57,7 +57,7 @@ def test_a_missing_folder_is_an_error_of_the_call_and_an_empty_one_a_problem(tmp
     for asked in (str(tmp_path / "nowhere"), f"@{tmp_path}/no-list.txt", "nonsense://lab/clips"):
         with pytest.raises(RigError, match=r"no such folder|cannot be read|no protocol"):
             find_sources([asked], tmp_path / "out")
-    _, problems = find_sources([str(tmp_path)], tmp_path / "out")
+    *_, problems = find_sources([str(tmp_path)], tmp_path / "out")
     assert [str(p) for p in problems] == [f"{tmp_path}: no clip in this folder"]
 
 
@@ -67,10 +67,10 @@ def test_clips_in_a_store_are_found_as_in_a_folder():
     for name in ("b.avi", "a.avi", "deep/c.mp4", ".hidden/d.avi", "notes.txt"):
         store.pipe(f"/{inside}/{name}", b"x")
     root = f"memory://{inside}"
-    found, _ = find_sources([root], Path("/nowhere"))
+    found, *_ = find_sources([root], Path("/nowhere"))
     assert [s.address for s in found] == [f"{root}/a.avi", f"{root}/b.avi", f"{root}/deep/c.mp4"]
     assert [s.below_root for s in found] == ["", "", "deep"]
-    globbed, _ = find_sources([f"{root}/*/c.mp4"], Path("/nowhere"))
+    globbed, *_ = find_sources([f"{root}/*/c.mp4"], Path("/nowhere"))
     assert globbed == [Source(f"{root}/deep/c.mp4", root)]
     store.rm(f"/{inside}", recursive=True)
 
@@ -94,7 +94,9 @@ def test_no_two_clips_share_an_output_path_and_the_first_keeps_its_path():
 
 
 def test_an_output_path_of_an_earlier_batch_is_not_assigned_again():
-    assert assign_clip_paths([Source("/lab/tue/a.avi", "/lab/tue")], {"a"}) == {"/lab/tue/a.avi": "tue/a"}
+    assert assign_clip_paths([Source("/lab/tue/a.avi", "/lab/tue")], {"a": "/lab/mon/a.avi"}) == {
+        "/lab/tue/a.avi": "tue/a"
+    }
 
 
 def test_no_output_path_leads_out_of_the_output_folder():
@@ -107,10 +109,10 @@ def test_no_output_path_leads_out_of_the_output_folder():
 
 def test_a_session_is_a_folder_with_commands_all_of_whose_clips_are_in_the_batch(tmp_path):
     touch(tmp_path, "s/a.avi", "s/b.avi", "s/a.command.csv", "plain/c.avi", "orphan/d.avi", "orphan/x.command.csv")
-    found, _ = find_sources([str(tmp_path)], tmp_path / "out")
+    found, *_ = find_sources([str(tmp_path)], tmp_path / "out")
     assert [(s[0], s[2]) for s in find_sessions(found)] == [
         (f"{tmp_path}/s", (f"{tmp_path}/s/a.avi", f"{tmp_path}/s/b.avi"))
     ]
-    part, _ = find_sources([str(tmp_path / "s/a.avi")], tmp_path / "out")
+    part, *_ = find_sources([str(tmp_path / "s/a.avi")], tmp_path / "out")
     assert not find_sessions(part)
     assert assign_session_folders([("/x/mon", "/x/mon"), ("/x/tue", "/x/tue")]) == {"/x/mon": "", "/x/tue": "tue"}

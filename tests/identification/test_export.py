@@ -91,6 +91,14 @@ def test_the_mat_file_is_a_struct_with_names_units_and_covariance(tmp_path):
     assert [str(struct[key][0]) for key in ("input_unit", "output_unit")] == ["deg", "deg"]
 
 
+def test_the_mat_file_depends_on_the_model_alone(tmp_path, monkeypatch):
+    model = second_order([[1.0, 0.1, 0.0], [0.1, 4.0, 0.2], [0.0, 0.2, 9.0]])
+    write_mat(model, tmp_path / "now.mat")
+    monkeypatch.setattr("time.asctime", lambda *_: "Thu Jan  1 00:00:00 1970")
+    write_mat(model, tmp_path / "then.mat")
+    assert (tmp_path / "now.mat").read_bytes() == (tmp_path / "then.mat").read_bytes()
+
+
 @pytest.mark.parametrize("estimator", ["oe2", "oe3"])
 def test_model_json_keeps_the_covariance(identified, estimator, tmp_path):
     found = identified[estimator]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import replace
 from html import unescape
 
@@ -53,12 +54,21 @@ def write(model, tmp_path):
     return page
 
 
-@pytest.mark.parametrize(("verdict", "svgs"), [("nothing_missing", 7), ("unexplained", 8)])
-def test_the_page_states_the_verdict(write, dragged, verdict, svgs):
+def labels_of_figures(page):
+    """Return what each figure of a page shows."""
+    return Counter(label.partition(":")[0] for label in re.findall(r'<figure[^>]* aria-label="([^"]*)"', page))
+
+
+@pytest.mark.parametrize("verdict", ["nothing_missing", "unexplained"])
+def test_the_page_states_the_verdict(write, dragged, verdict):
     found = replace(dragged, verdict=verdict, accepted=(), after=dragged.before, after_held_out=dragged.before_held_out)
     text = write(found)
     page = unescape(text)
-    assert page.count("<svg") == svgs
+    figures = labels_of_figures(page)
+    assert [figures[f"{what} of {r.name} over time"] for r in found.fitted for what in ("Angle", "Residual")] == [1] * 6
+    assert figures["Residual"] == figures["Prediction error"] == len(found.fitted)
+    assert figures["Residual torque"] == (4 if verdict == "unexplained" else 0)
+    assert figures["The effect as fitted"] == 0
     assert f"{np.degrees(found.before_held_out.rmse):.4f}" in page
     assert sentence(found) in page
     assert "No further recording is needed" not in page
@@ -79,12 +89,14 @@ def test_without_held_out_recordings_the_page_names_block_cross_validation(write
     page = unescape(write(dragged, problems=[ValueError("swing.avi: no mouth")]))
     assert sentence(dragged) in page
     assert "blocks of 0.25 s, one in every 1.25 s, were predicted by a model" in page
-    assert page.count("<svg") == 7
+    figures = labels_of_figures(page)
+    assert figures["The effect as fitted"] == 1
+    assert figures["Prediction error"] == 2 * len(dragged.fitted)  # before and after, and after on a finer scale
     assert "swing.avi: no mouth" in page
     assert re.search(r"− q·θ̇·\|θ̇\|</i> with q = [\d.]+ ± [\d.]+", page)
     assert "No further recording is needed to attribute the error." in page
     for record in dragged.fitted:
-        assert f"{record.name}</text>" in page
+        assert f"<figcaption>{record.name}</figcaption>" in page
 
 
 def test_every_candidate_has_a_prediction_error(dragged):
@@ -108,7 +120,7 @@ def test_rivals_are_named_with_the_command_to_play_next(write, dragged):
     assert "(or dead time, which these recordings cannot distinguish from it)" in sentence(doubted)
     assert "Record this next:</b> one step to 10° and back, 4 s in all" in page
     assert "next.command.csv" in page
-    assert page.count("<svg") == 8
+    assert labels_of_figures(page)["The next experiment"] == 2
     (stated,) = verdict_as_dict(doubted, experiment)["effects"]
     assert stated["alias_set"] == list(pair)
     assert stated["separating_experiment"].startswith(found.effect.separating_experiment)

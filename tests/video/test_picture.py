@@ -34,6 +34,17 @@ def test_a_part_has_the_colours_of_the_whole(form):
         np.testing.assert_array_equal(_picture(stored).colours_in((rows, columns)), whole[rows, columns])
 
 
+@pytest.mark.parametrize("form", ["yuvj420p", "yuvj444p", "bgr0"])
+def test_colours_within_a_part_are_those_of_the_whole_and_the_rest_need_not_be(form):
+    stored, part = _stored(form), (slice(33, 70), slice(41, 90))
+    whole, picture = _picture(stored).colours, _picture(stored)
+    within = picture.colours_within(part)
+    assert within.shape == whole.shape
+    np.testing.assert_array_equal(within[part], whole[part])
+    assert ("colours" in picture.__dict__) is not picture.has_parts
+    assert Picture(1, 0.1, None, Display(SIZE), None).colours_within(part) is None
+
+
 def test_a_part_of_a_turned_picture_is_that_of_the_shown_one():
     stored = _stored("yuv420p")
     turned = Display((stored.width, stored.height), transposed=True, mirrored=True)

@@ -103,3 +103,20 @@ def test_a_part_beside_the_verdict_that_fails_is_missing_and_the_verdict_is_writ
     assert all("SVD did not converge" in line for line in written["missing"])
     assert "SVD did not converge" in (out / "report.html").read_text()
     assert not (out / "ekf.json").exists()
+
+
+def test_the_model_file_states_the_clock_of_every_recording(session):
+    path = session / "chirp.command.csv"
+    rows = np.loadtxt(path, delimiter=",", skiprows=1)
+    rows[:, 0] -= 0.25
+    np.savetxt(path, rows, "%.6f", ",", header="time_s,command_deg", comments="")
+    out = session / "out"
+    out.mkdir()
+    model = session_results.write_identified(measure_session(read_session(session)), out)
+    clock = json.loads((out / "model.json").read_text())["clock"]
+    for name, offset in (("stairs", 0.0), ("chirp", 0.25)):
+        assert abs(clock[name]["offset_s"]["value"] - offset) < 4.0 * clock[name]["offset_s"]["sigma"] < 0.01
+        assert abs(clock[name]["drift_ppm"]["value"]) < 4.0 * clock[name]["drift_ppm"]["sigma"]
+    assert clock["alias"]["effects"] == ["dead_time", "actuator_lag"]
+    assert clock["alias"]["equal_offsets_p_value"] < 1e-3
+    assert any("chirp: the motion comes 0.25" in doubt for doubt in model.doubts)

@@ -13,6 +13,7 @@ from typing import Any
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
@@ -69,6 +70,22 @@ class Patch:
     """Whether it touches the picture's edge; its region is then not whole."""
 
 
+@dataclass(frozen=True)
+class FilledPatch:
+    """A patch after threshold, Canny and fill; the pictures show the patch and a margin, bytes of 0 or 1."""
+
+    part: tuple[slice, slice]
+    """Rows and columns of the whole picture that they show."""
+    inner: Image
+    """The thresholded patch alone."""
+    edges: Image
+    """Canny edges along it."""
+    outline_px: NDArray[Any]
+    """(k, 1, 2) outer contour of both, px of this part."""
+    filled: Image
+    """Everything within the contour."""
+
+
 def find_regions(image: Image, model: ColourModel, areas_px2: tuple[float, float], opening_px: int = 0) -> list[Region]:
     """Find the regions of the mark's colour in an image.
 
@@ -112,19 +129,32 @@ def _is_cut(outline: NDArray[Any], picture: Image) -> bool:
     return left <= 0 or top <= 0 or left + across >= width or top + down >= height
 
 
+def fill_patch(patch: Patch) -> FilledPatch:
+    """Join a thresholded patch with the Canny edges along it, and fill the outer contour."""
+    height, width = patch.fraction.shape
+    left, top, across, down = cv2.boundingRect(patch.contour_px)
+    x0, y0 = max(left - MARGIN_PX, 0), max(top - MARGIN_PX, 0)
+    rows = slice(y0, min(top + down + MARGIN_PX, height))
+    columns = slice(x0, min(left + across + MARGIN_PX, width))
+    part = rows, columns
+    inner = np.zeros_like(patch.core[part])
+    cv2.drawContours(inner, [patch.contour_px], -1, 1, cv2.FILLED, offset=(-x0, -y0))
+    step = (FULL_LEVEL - EMPTY_LEVEL) / 2.0
+    along: Image = cv2.dilate(inner, disc(1))
+    edges = cv2.Canny(patch.smooth[part], step, 2.0 * step) // 255 & along
+    contours, _ = cv2.findContours(inner | edges, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    outline = max(contours, key=len)
+    filled = cv2.drawContours(np.zeros_like(inner), [outline], -1, 1, cv2.FILLED)
+    return FilledPatch(part, inner, edges, outline, filled)
+
+
 def measure(patch: Patch, model: ColourModel) -> Region | None:
     """Measure one patch; ``None`` where nothing of it remains after its neighbours are excluded."""
     fraction, smooth, core = patch.fraction, patch.smooth, patch.core
-    height, width = fraction.shape
-    left, top, across, down = cv2.boundingRect(patch.contour_px)
-    right, bottom = left + across, top + down
-    x0, y0 = max(left - MARGIN_PX, 0), max(top - MARGIN_PX, 0)
-    box = np.s_[y0 : min(bottom + MARGIN_PX, height), x0 : min(right + MARGIN_PX, width)]
-    inner = np.zeros_like(core[box])
-    cv2.drawContours(inner, [patch.contour_px], -1, 1, cv2.FILLED, offset=(-x0, -y0))
+    shape = fill_patch(patch)
+    box, inner, filled = shape.part, shape.inner, shape.filled
+    start = np.array([box[1].start, box[0].start])
     others = core[box] & (1 - inner)
-    outline = _outline(smooth[box], inner)
-    filled = cv2.drawContours(np.zeros_like(inner), [outline], -1, 1, cv2.FILLED)
     reach = _reach(smooth[box], filled, model)
     near, touched = reach, False
     if others.any():
@@ -138,39 +168,58 @@ def measure(patch: Patch, model: ColourModel) -> Region | None:
     # A highlight or the teeth inside the outline belong to the mark: away from the edge the outline is filled.
     weight[cv2.erode(filled, disc(_FOOT_PX)) > 0] = 1.0
 
-    area = float(weight.sum())
+    of_weight, of_edge = _sums(weight)
+    area = float(of_weight[0, 0])
     if area <= 0.0:
         return None
-    centre, moments = _moments(weight, area)
+    centre = of_weight[0, 1:] / area
     slope = float(np.linalg.norm(model.weights)) / (1.0 - 2.0 * low)
-    soft = ((weight > 0.0) & (weight < 1.0)).astype(float)
     return Region(
-        centre_px=centre + [x0, y0],
+        centre_px=centre + start,
         area_px2=area,
-        moments_px2=moments,
-        noise_px2=(slope / area) ** 2 * _moments(soft, 1.0, centre)[1],
-        contour_px=(outline.reshape(-1, 2) + [x0, y0]).astype(np.int32),
+        moments_px2=_about(centre, of_weight) / area,
+        noise_px2=(slope / area) ** 2 * _about(centre, of_edge),
+        contour_px=(shape.outline_px.reshape(-1, 2) + start).astype(np.int32),
         whole=not (patch.cut or touched),
     )
 
 
-def _moments(weight: Floats, total: float, about: Floats | None = None) -> tuple[Floats, Floats]:
-    """Return the centroid (2,) of weights (h, w) and the second moments (2, 2) about it, or about another place."""
-    columns, rows = weight.sum(axis=0), weight.sum(axis=1)
-    x, y = np.arange(len(columns), dtype=float), np.arange(len(rows), dtype=float)
-    centre = np.array([columns @ x, rows @ y]) / total if about is None else about
-    dx, dy = x - centre[0], y - centre[1]
-    xy = dy @ weight @ dx
-    return centre, np.array([[columns @ dx**2, xy], [xy, rows @ dy**2]]) / total
+@njit(cache=True, nogil=True)
+def _sums(weight):  # type: ignore[no-untyped-def]
+    """Return the sums of weights (h, w) by the products of 1, x and y, and those of the pixels between 0 and 1.
+
+    Of each, an upper triangle (3, 3).
+    """
+    of_weight, of_edge = np.zeros((3, 3)), np.zeros((3, 3))
+    for y in range(weight.shape[0]):
+        one = x1 = x2 = edge = edge_x1 = edge_x2 = 0.0
+        for x in range(weight.shape[1]):
+            share = np.float64(weight[y, x])
+            if share > 0.0:
+                one, x1, x2 = one + share, x1 + share * x, x2 + share * x * x
+                if share < 1.0:
+                    edge, edge_x1, edge_x2 = edge + 1.0, edge_x1 + x, edge_x2 + x * x
+        _add_row(of_weight, y, one, x1, x2)
+        _add_row(of_edge, y, edge, edge_x1, edge_x2)
+    return of_weight, of_edge
 
 
-def _outline(smooth: Image, inner: Image) -> NDArray[Any]:
-    """Join the thresholded patch with the Canny edges along it, and return the outer contour."""
-    step = (FULL_LEVEL - EMPTY_LEVEL) / 2.0
-    edges = cv2.Canny(smooth, step, 2.0 * step) // 255
-    along: Image = cv2.dilate(inner, disc(1))
-    contours, _ = cv2.findContours(inner | (edges & along), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    return max(contours, key=len)
+@njit(cache=True, inline="always")
+def _add_row(sums, y, one, x1, x2):  # type: ignore[no-untyped-def]
+    sums[0, 0] += one
+    sums[0, 1] += x1
+    sums[1, 1] += x2
+    sums[0, 2] += one * y
+    sums[1, 2] += x1 * y
+    sums[2, 2] += one * y * y
+
+
+def _about(centre: Floats, sums: Floats) -> Floats:
+    """Return the second moments (2, 2) about a centre (2,), of sums as from `_sums`."""
+    (one, sum_x, sum_y), (_, sum_xx, sum_xy), (_, _, sum_yy) = sums.tolist()
+    x, y = centre.tolist()
+    xy = sum_xy - x * sum_y - y * sum_x + one * x * y
+    return np.array([[sum_xx - 2.0 * x * sum_x + one * x * x, xy], [xy, sum_yy - 2.0 * y * sum_y + one * y * y]])
 
 
 def _reach(smooth: Image, filled: Image, model: ColourModel) -> Image:

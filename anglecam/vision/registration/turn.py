@@ -23,7 +23,7 @@ from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.transforms import rotation
 from anglecam.vision.registration.appearance import HIDDEN_MISFIT, TileAppearance, TileFit
 from anglecam.vision.registration.tiles import TILE_SIDE_PX, FrameView, MotionPlane, tile_middles, tile_reach
-from anglecam.vision.registration.turn_kernel import frame_equations, weigh_tiles
+from anglecam.vision.registration.turn_kernel import copied_share, frame_equations, weigh_tiles
 
 _MAX_STEPS = 3
 """Gauss-Newton steps."""
@@ -32,6 +32,7 @@ _SETTLED = 5.0
 the median over a film's frames), so 0.05 of an uncertainty at most."""
 _NO_GROUND = np.zeros((0, 0, 2))
 """For pictures whose pixels need not be mapped to the plane of motion."""
+_NO_IMAGE = np.zeros((0, 0, 1), np.uint8)
 _SOME = 3
 """The first step is made by every so many-th tile: it needs no accuracy."""
 _APPROACH_PX = 1.0
@@ -117,6 +118,27 @@ class BodyAppearance:
     def middles_in(self, view: FrameView) -> Floats:
         """Return (tiles, 2) places of the tiles' middles in the picture of a frame, px."""
         return tile_middles(self.tiles.corners, self.parallax_px, view, self.plane, self.pivot_px)
+
+    def part_seen(self, turn: float, size: tuple[int, int]) -> tuple[slice, slice]:
+        """Return the part of the picture in which `find_turn` looks at pixels, for a camera at rest.
+
+        Parameters
+        ----------
+        turn : float
+            Angle at which the search begins, rad.
+        size : tuple of int
+            Width and height of the picture, px.
+
+        Returns
+        -------
+        tuple of slice
+            Rows and columns.
+        """
+        middles = self.middles_in(FrameView(_NO_IMAGE, turn, self.pivot_px))
+        reach = max(tile_reach(self.plane), float(TILE_SIDE_PX))
+        left, top = np.clip(middles.min(axis=0) - reach, 0, size).astype(int).tolist()
+        right, bottom = np.clip(middles.max(axis=0) + reach + 2, 0, size).astype(int).tolist()
+        return slice(top, bottom), slice(left, right)
 
     def compare(self, view: FrameView, turn: float, middles_px: Floats) -> TileFit:
         """Compare the tiles with a frame at an assumed angle.
@@ -228,7 +250,8 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
     pose2 = noise_share * max(birge2 * whole**2 - noise**2, 0.0)
     if before is not None:
         misfit = noise * np.sqrt(noise_share * last.count)
-        pose2 += (_COPY * _copied_share(view.image, before, middles[clear]) * misfit) ** 2
+        share = copied_share(view.image, before, middles[clear].round().astype(np.int64), TILE_SIDE_PX // 2)
+        pose2 += (_COPY * share * misfit) ** 2
     return TurnEstimate(float(turn), noise, float(np.sqrt(pose2)), pivot_sensitivity, last.usual, clear)
 
 
@@ -366,14 +389,3 @@ def group_scatter(normal: Floats, gradient: Floats, groups: NDArray[np.intp]) ->
     information, score = belongs @ normal[..., 0, 0], belongs @ gradient[..., 0]
     seen = information > 0
     return float((score[seen] ** 2 / information[seen]).sum()), int(seen.sum())
-
-
-def _copied_share(image: Image, before: Image, centres_px: Floats) -> float:
-    """Return the share of the tiles' pixels that equal those of the previous frame."""
-    half = TILE_SIDE_PX // 2
-    shares = []
-    for x, y in centres_px.round().astype(int):
-        part = np.s_[max(y - half, 0) : y + half, max(x - half, 0) : x + half]
-        if image[part].size:
-            shares.append(float((image[part] == before[part]).mean()))
-    return float(np.mean(shares)) if shares else 0.0

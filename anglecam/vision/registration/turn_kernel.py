@@ -406,3 +406,38 @@ def weigh_tiles(normal, gradient, squares, count, light, variance, excess, hidde
             normals[t] = normal[t, :3, :3] / (variance[t] * scale * excess[t])
             gradients[t] = gradient[t, :3] / (variance[t] * scale * excess[t])
     return usual, clear, normals, gradients
+
+
+@njit(cache=True, nogil=True)
+def copied_share(image, before, middles, half):  # type: ignore[no-untyped-def]
+    """Return the share of the tiles' pixels that equal those of the previous frame, the mean over the tiles.
+
+    Parameters
+    ----------
+    image, before : ndarray
+        (h, w, planes) bytes.
+    middles : ndarray
+        (tiles, 2) column and row of the tiles' middles in the picture.
+    half : int
+        Half of a tile's side, px.
+
+    Returns
+    -------
+    float
+        0 where no tile is in the picture.
+    """
+    height, width, planes = image.shape
+    total, tiles = 0.0, 0
+    for x, y in middles:
+        top, bottom = max(y - half, 0), min(y + half, height)
+        left, right = max(x - half, 0), min(x + half, width)
+        if top >= bottom or left >= right:
+            continue
+        equal = 0
+        for row in range(top, bottom):
+            for column in range(left, right):
+                for plane in range(planes):
+                    equal += image[row, column, plane] == before[row, column, plane]
+        total += equal / ((bottom - top) * (right - left) * planes)
+        tiles += 1
+    return total / tiles if tiles else 0.0

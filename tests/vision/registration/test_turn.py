@@ -1,5 +1,7 @@
 """Angles from the whole body on a film whose truth is known to a ten-thousandth of a degree."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import yaml
@@ -7,6 +9,9 @@ import yaml
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.video.open_film import open_film
+from anglecam.vision.registration.tiles import FrameView
+from anglecam.vision.registration.turn import find_turn
+from anglecam.vision.registration.turn_kernel import copied_share
 from synth.session import render
 
 SPEC = {
@@ -50,3 +55,30 @@ def test_the_marks_place_in_a_frame_is_the_one_seen_in_that_frame(swing):
     measured, truth = swing
     off = measured.series.mark_px - np.column_stack([truth["mouth_x_px"], truth["mouth_y_px"]])
     assert np.hypot(*off.T).max() < 0.5
+
+
+def test_pixels_outside_the_part_that_is_seen_do_not_matter(swing, tmp_path_factory):
+    measured, _ = swing
+    registered = measured.angles.registered
+    body, film = registered.appearance, open_film(next(tmp_path_factory.getbasetemp().rglob("swing.avi")))
+    for frame in list(film.frames())[10:80:20]:
+        view = FrameView(frame.image, float(registered.turn[frame.index]) + 2e-3, body.pivot_px)
+        part = body.part_seen(view.turn, film.size)
+        other = np.full_like(frame.image, 77)
+        other[part] = frame.image[part]
+        assert other[part].size < 0.6 * other.size
+        before = np.roll(frame.image, 1, axis=0)
+        whole, partly = find_turn(body, view, before), find_turn(body, replace(view, image=other), before)
+        assert (whole.turn, whole.noise, whole.pose) == (partly.turn, partly.noise, partly.pose)
+
+
+def test_the_copied_share_is_that_of_equal_pixels_of_the_tiles_in_the_picture():
+    image = np.zeros((40, 50, 3), np.uint8)
+    before = image.copy()
+    before[:20] = 1
+    middles = np.array([[20, 20], [25, 30], [0, 38], [90, 20]])
+    shares = 0.5, 1.0, 1.0  # the last is outside
+    assert copied_share(image, before, middles, 8) == pytest.approx(np.mean(shares))
+    before[..., 1] = 1
+    assert copied_share(image, before, middles, 8) == pytest.approx(2.0 / 3.0 * np.mean(shares))
+    assert copied_share(image, before, middles[3:], 8) == 0.0

@@ -1,0 +1,31 @@
+"""End a process when its parent ends, however the parent ends: by itself, by a crash, or by SIGKILL.
+
+On Linux the kernel ends the process: `prctl(2)`, ``PR_SET_PDEATHSIG``. The signal arrives even while a library holds
+Python's interpreter lock, as compilation and decoding do for seconds. Elsewhere the process ends when it reads the end
+of its standard input, of which only the parent holds the other end (see `anglecam.batch.serve`); it can then outlive
+its parent by the time that such a library takes.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+
+_PR_SET_PDEATHSIG = 1
+"""Number of the request in ``linux/prctl.h``."""
+
+
+def end_with_parent(parent: int) -> None:
+    """Have the kernel end this process with the thread that started it, where the kernel can.
+
+    Parameters
+    ----------
+    parent : int
+        Process id of the parent. If it has ended already, this process ends at once.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL))
+    if os.getppid() != parent:  # it ended before the request
+        os._exit(1)

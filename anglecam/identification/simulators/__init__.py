@@ -1,0 +1,1 @@
+"""An identified mechanism for simulators: one joint with its actuator, in their file formats."""

@@ -1,0 +1,123 @@
+"""``certificate.html``: a servo's quantities with intervals, likelihoods and conditions, on one page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from rich.table import Table
+
+from anglecam import __version__
+from anglecam.certificate.certificate_json import certificate_as_dict, command_gain
+from anglecam.certificate.certify import Certificate, Certified
+from anglecam.certificate.profile import THRESHOLD
+from anglecam.io.files import write_atomically
+from anglecam.report.figures import AFTER, BEFORE, FAINT, MEASURED, STYLE, _svg
+
+COLOURS = {True: "#1f6f8b", False: "#b5651d"}
+STATES = {"measured": "measured", "bounded": "bound", "not_determined": "not determined"}
+TALLEST = 12.0
+"""Largest deviance that a figure shows; beyond it the value is excluded without any doubt."""
+
+
+def write_certificate_page(
+    path: Path, title: str, certificate: Certificate, inputs: Sequence[tuple[str, str]], problems: Sequence[str]
+) -> None:
+    """Write the page of a certificate as one HTML file without external resources.
+
+    Parameters
+    ----------
+    path : Path
+        The HTML file.
+    title : str
+        The session's name.
+    certificate : Certificate
+        From `anglecam.certificate.certify.certify`.
+    inputs : sequence of (str, str)
+        Names and SHA-256 sums of the files that were certified.
+    problems : sequence of str
+        Recordings that could not be used and parts that failed, with the cause.
+    """
+    environment = Environment(loader=PackageLoader("anglecam.report", "."), autoescape=True, undefined=StrictUndefined)
+    content = certificate_as_dict(certificate)
+    rows = [
+        _row(one, shown, certificate) for one, shown in zip(certificate.quantities, content["quantities"], strict=True)
+    ]
+    drawn = [one for one in certificate.quantities if one.profile is not None and len(one.profile.values) > 2]
+    text = environment.get_template("certificate.html").render(
+        title=title,
+        version=__version__,
+        day=f"{date.today():%d %B %Y}".lstrip("0"),
+        colour=COLOURS[certificate.holds],
+        content=content,
+        rows=rows,
+        figure=environment.filters["safe"](_figure(drawn)) if drawn else "",
+        inputs=inputs,
+        problems=problems,
+    )
+    with write_atomically(path) as stream:
+        stream.write(text)
+
+
+def certificate_table(certificate: Certificate) -> Table:
+    """Tabulate a certificate for the terminal."""
+    content = certificate_as_dict(certificate)
+    table = Table("quantity, 95 %", "", title=content["doubt"], title_justify="left")
+    for one in content["quantities"]:
+        lines = list(one["aliases"])
+        if one["determined_by"]:
+            file = f" ({one['command_file']})" if one["command_file"] else ""
+            lines.append(f"play this to determine it: {one['determined_by']}{file}")
+        table.add_row(one["statement"], "\n".join(lines))
+    return table
+
+
+def _row(one: Certified, content: dict[str, Any], certificate: Certificate) -> dict[str, Any]:
+    """Return a quantity's row; a torque also in degrees of command."""
+    gain, command = command_gain(certificate), ""
+    if one.quantity.is_torque and gain is not None and one.state != "not_determined":
+        low, high = (end / gain for end in one.quantity.interval_in_file(*one.interval))
+        command = {
+            "measured": f"{low:.3g}° to {high:.3g}°",
+            "bounded": f"above {low:.2g}°" if one.quantity.is_limit else f"below {high:.2g}°",
+        }[one.state]
+    return content | {"state": STATES[one.state], "name": one.quantity.name, "command": command}
+
+
+def _figure(drawn: Sequence[Certified]) -> str:
+    """Draw the profile likelihoods as SVG: deviance over the quantity, with the 95 % level and the interval."""
+    columns = min(4, len(drawn))
+    lines = -(-len(drawn) // columns)
+    with plt.rc_context(STYLE):
+        figure, axes = plt.subplots(lines, columns, figsize=(9, 2.2 * lines), layout="constrained", squeeze=False)
+        for ax in axes.flat[len(drawn) :]:
+            ax.set_visible(False)
+        for ax, one in zip(axes.flat, drawn, strict=False):
+            _draw_profile(ax, one)
+        for ax in axes[:, 0]:
+            ax.set_ylabel("2·loss of log L")
+        return _svg(figure)
+
+
+def _draw_profile(ax: Any, one: Certified) -> None:
+    assert one.profile is not None
+    quantity, near = one.quantity, one.profile.deviances <= TALLEST
+    # a limit is drawn as its reciprocal, whose 0 is no limit
+    factor = 1.0 / quantity.to_file if quantity.is_limit else quantity.to_file
+    unit = f"1/({quantity.unit.strip()})" if quantity.is_limit else quantity.unit.strip()
+    ax.plot(factor * one.profile.values[near], one.profile.deviances[near], color=AFTER, lw=1.2, marker=".", ms=3)
+    ax.axhline(THRESHOLD, color=BEFORE, lw=0.8, ls="--")
+    ends = [end for end in one.interval if np.isfinite(end)]
+    if len(ends) == 2:
+        ax.axvspan(factor * ends[0], factor * ends[1], color=FAINT, alpha=0.6, zorder=0)
+    ax.axvline(factor * one.profile.estimate, color=MEASURED, lw=0.8)
+    ax.set_title(quantity.name, loc="left", fontsize=9)
+    ax.set_xlabel(("1/limit, " if quantity.is_limit else "") + unit, fontsize=8)
+    ax.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
+    ax.locator_params(axis="x", nbins=4)
+    ax.set_ylim(0.0, TALLEST)

@@ -1,0 +1,130 @@
+"""The data that the scripts of a page draw: named columns of every recording, and plots that name them.
+
+A page holds each column once, however many plots show it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from anglecam.data.series import AngleSeries
+from anglecam.data.typing import Floats
+from anglecam.errors import printable
+from anglecam.report.figures import AFTER, COMMAND, MEASURED, NORMAL_95, SHADE
+
+DECIMALS = 6
+"""Of seconds and degrees; as many as ``NAME.angles.csv`` has."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve of a plot."""
+
+    column: str
+    label: str
+    colour: str
+    style: str = "line"
+    """``line``, ``dots`` or ``step``."""
+
+
+@dataclass(frozen=True)
+class Band:
+    """A shaded band of a plot."""
+
+    label: str
+    colour: str
+    half: str | float
+    """Column of half its width, or half its width, °."""
+    centre: str | None = None
+    """Column of its middle; ``None``: zero."""
+    factor: float = 1.0
+    """By which ``half`` is multiplied."""
+    shown: bool = True
+    """Whether it is shown without being asked for."""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A diagram over time."""
+
+    label: str
+    """Of the vertical axis, with the unit."""
+    curves: tuple[Curve, ...]
+    bands: tuple[Band, ...] = ()
+    from_zero: bool = False
+    """Whether the axis begins at zero."""
+
+
+@dataclass(frozen=True)
+class Columns:
+    """One recording's columns, and the number of its first frame."""
+
+    name: str
+    first_frame: int
+    columns: Mapping[str, Floats]
+    """``time`` (s) and others (°), each (n,) with NaN where there is no value."""
+
+
+SIGMA_BAND = Band("95 % interval (1.96 σ)", SHADE, "sigma", "angle", NORMAL_95)
+"""What is known of a measured angle."""
+
+
+def angle_plot(series: Sequence[Columns], curves: Sequence[Curve] = ()) -> Plot:
+    """Return the plot of the measured angle, with its uncertainty and, on demand, its worst-case bounds."""
+    names = {name for one in series for name in one.columns}
+    command = [Curve("command", "command", COMMAND, "step")] if "command" in names else []
+    bands = [SIGMA_BAND] if "sigma" in names else []
+    radii = sorted((n for n in names if n.startswith("bound")), key=lambda n: float(n.removeprefix("bound")))
+    bands += [Band(f"{n.removeprefix('bound')} px bound", "#f3e3c3", n, "angle", shown=False) for n in radii[::-1]]
+    return Plot("angle, °", (*command, *curves, Curve("angle", "angle", MEASURED)), tuple(bands))
+
+
+def sigma_plot() -> Plot:
+    """Return the plot of the standard uncertainty."""
+    return Plot("σ, °", (Curve("sigma", "σ of the angle", AFTER),), from_zero=True)
+
+
+def series_columns(series: AngleSeries, command: Floats | None = None) -> dict[str, Floats]:
+    """Return the columns of a measured series.
+
+    Parameters
+    ----------
+    series : AngleSeries
+        The recording, of n rows.
+    command : (n,) ndarray, optional
+        The command at each row, rad.
+
+    Returns
+    -------
+    dict of str to (n,) ndarray
+        ``time`` in s, and in degrees ``angle`` and, where there are any, ``sigma``, ``bound6``, ``bound10``, …,
+        ``command``.
+    """
+    found = {"time": series.time, "angle": np.degrees(series.angle)}
+    if np.isfinite(series.sigma).any():
+        found["sigma"] = np.degrees(series.sigma)
+    found |= {f"bound{radius:g}": np.degrees(bound) for radius, bound in series.bounds.items()}
+    return found if command is None else found | {"command": np.degrees(command)}
+
+
+def curves_as_dict(recordings: Sequence[Columns], plots: Mapping[str, Plot]) -> dict[str, Any]:
+    """Return the data of a page, as its scripts read it."""
+    return {
+        "recordings": [
+            {
+                "name": printable(one.name),
+                "first": one.first_frame,
+                "columns": {name: _numbers(values) for name, values in one.columns.items()},
+            }
+            for one in recordings
+        ],
+        "plots": {name: asdict(plot) for name, plot in plots.items()},
+    }
+
+
+def _numbers(values: Floats) -> list[float | None]:
+    return [value if np.isfinite(value) else None for value in np.round(values, DECIMALS).tolist()]

@@ -1,0 +1,134 @@
+"""Predictions from the first seconds of small films against what the whole films give."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+
+import numpy as np
+import pytest
+
+from anglecam.check.sigma_terms import SPREAD
+from anglecam.cli import app as cli
+from anglecam.workflow.check import MOST, check_clip
+from anglecam.workflow.clip import measure_source, open_source
+from support import things
+
+TIME = np.arange(165) / things.RATE_HZ
+SWING_DEG = 25.0 * np.exp(-0.1 * TIME) * np.cos(2.0 * np.pi * 0.8 * TIME)
+THINGS = {
+    "large": things.ball((190, 30, 35), 14.0),
+    "small": things.ball((190, 30, 35), 6.0),
+    "short": things.ball((190, 30, 35), 10.0, length=80.0),
+    "pale": things.ball((190, 120, 120), 10.0),
+}
+
+
+@pytest.fixture(scope="module")
+def films(tmp_path_factory):
+    """Film a ball of several sizes, lengths and colours; 165 frames, of which `check` reads 121."""
+    folder = tmp_path_factory.mktemp("films")
+    return {name: things.film(folder / f"{name}.avi", draw, SWING_DEG) for name, draw in THINGS.items()}
+
+
+@pytest.fixture(scope="module")
+def predictions(films):
+    return {name: check_clip(clip) for name, clip in films.items()}
+
+
+@pytest.mark.parametrize("name", THINGS)
+def test_sigma_of_the_whole_film_is_predicted_within_the_stated_spread(films, predictions, name):
+    series = measure_source(open_source(films[name])).series
+    ok, found = series.ok, predictions[name]
+    achieved = float(np.sqrt(np.mean(series.sigma[ok] ** 2)))
+    assert 1.0 / SPREAD < found.whole.sigma / achieved < SPREAD
+    error = (series.angle - np.radians(SWING_DEG))[ok]
+    assert np.std(error) < 2.0 * found.whole.sigma
+    assert found.frames_read == 121
+    assert found.frames_read <= MOST
+
+
+def test_the_terms_combine_to_the_sigma_that_measure_states(films, predictions):
+    found = predictions["large"]
+    series = measure_source(open_source(films["large"], frames=(0, 120))).series
+    assert found.part.sigma == pytest.approx(float(np.sqrt(np.mean(series.sigma[series.ok] ** 2))), rel=0.02)
+
+
+def test_the_ranking_follows_the_physics(predictions):
+    scatter = {name: found.whole.scatter for name, found in predictions.items()}
+    assert scatter["short"] > scatter["large"]
+    assert scatter["small"] > scatter["large"]
+    assert predictions["pale"].contrast_grey < 0.7 * predictions["large"].contrast_grey
+    advised = {one.change: one for one in predictions["pale"].advice}
+    assert 0.0 < advised["contrast"].sigma_factor < 1.0
+    assert "contrast" in advised
+    assert "codec" not in advised  # FFV1 loses nothing
+
+
+def test_a_larger_mark_brings_about_what_is_advised(predictions):
+    # from a radius of 6 px to 14 px: more than twice the diameter
+    advised = next(one for one in predictions["small"].advice if one.change == "larger_mark")
+    achieved = predictions["large"].whole.noise / predictions["small"].whole.noise
+    assert advised.sigma_factor == pytest.approx(math.sqrt(0.5), abs=0.05)
+    assert 0.5 * advised.sigma_factor < achieved < 1.5 * advised.sigma_factor
+
+
+def test_sizes_are_those_of_a_swing(predictions):
+    sizes = predictions["large"].sizes
+    assert sizes is not None
+    frequency = math.sqrt(sizes.parameters[1]) / (2.0 * math.pi)
+    assert frequency == pytest.approx(0.8, rel=0.01)
+    ids = {one.effect.id for one in sizes.smallest}
+    assert {"coulomb_friction", "quadratic_drag"} <= ids
+    assert "dead_time" not in ids  # a free swing has no command
+
+
+@pytest.fixture
+def status(monkeypatch, capsys):
+    """Return a function that calls anglecam as a user does and gives (exit status, output, standard error)."""
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["anglecam", *map(str, arguments)])
+        with pytest.raises(SystemExit) as left:
+            cli.main()
+        said = capsys.readouterr()
+        return int(left.value.code or 0), said.out, said.err
+
+    return call
+
+
+def test_the_command_prints_tables_and_writes_its_file(films, tmp_path, status):
+    command = tmp_path / "steps.csv"
+    command.write_text("time_s,command_deg\n0,0\n1,10\n2.3,-10\n3.7,5\n5,0\n")
+    code, said, told = status("check", films["small"], "--command", command, "--out", tmp_path)
+    assert code == 0, told
+    for words in ("sigma of a frame", "what would help", "dead_time", "a mark of twice the diameter"):
+        assert words in said
+    found = json.loads((tmp_path / "small.check.json").read_text())
+    assert found["read"]["frames"] == 121
+    low, high = found["sigma_deg"]["whole_interval_90"]
+    assert low < found["sigma_deg"]["whole"] < high
+    whole = math.sqrt(sum(term**2 for term in found["terms_deg"].values()))
+    assert whole == pytest.approx(found["sigma_deg"]["whole"])
+    delay = next(one for one in found["smallest"] if one["id"] == "dead_time")
+    assert delay["unit"] == "s"
+    assert 0.0 < delay["smallest"] < 0.1
+    assert found["session"]["duration_s"] == pytest.approx(6.0)
+    assert all(one["sigma_factor"] > 0.0 for one in found["advice"])
+
+
+def test_a_clip_in_which_nothing_turns_is_one_line_that_says_what_would_mend_it(tmp_path, status):
+    still = things.film(tmp_path / "still.avi", things.ball((190, 30, 35), 10.0), np.zeros(70))
+    code, _, told = status("check", still)
+    assert code == 1
+    assert len(told.strip().splitlines()) == 1
+    assert "still.avi" in told
+    assert "rig.yaml" in told or "--from" in told
+
+
+def test_a_file_that_is_no_film_is_one_line(tmp_path, status):
+    (tmp_path / "no.avi").write_text("no film")
+    code, _, told = status("check", tmp_path / "no.avi")
+    assert code == 1
+    assert len(told.strip().splitlines()) == 1

@@ -1,0 +1,47 @@
+"""Effects of twice the predicted smallest size are detected in most sessions, of 0.3 times in few."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from anglecam.check.smallest import best_command, duration_of, smallest_sizes
+from anglecam.data.command import Command
+from anglecam.loop.close import close_records
+from benchmarks.check_films import SCATTER, TRUE, plan, session_with
+
+SEEDS = 2
+TRIED = ("dead_time", "quadratic_drag", "backlash")
+
+
+@pytest.fixture(scope="module")
+def sizes():
+    return {one.effect.id: one for one in smallest_sizes(plan(), TRUE, SCATTER, SCATTER)}
+
+
+def test_twice_the_smallest_size_is_detected_in_most_and_a_third_of_it_in_few(sizes):
+    def detected(multiple):
+        sessions = [session_with(sizes[name], multiple, seed) for name in TRIED for seed in range(SEEDS)]
+        return sum(close_records(one).verdict != "nothing_missing" for one in sessions)
+
+    assert detected(2.0) >= len(TRIED) * SEEDS - 1
+    assert detected(0.3) <= 1
+
+
+def test_sizes_grow_with_the_uncertainty(sizes):
+    coarse = {one.effect.id: one.size for one in smallest_sizes(plan(), TRUE, 4.0 * SCATTER, 4.0 * SCATTER)}
+    assert coarse["dead_time"] == pytest.approx(4.0 * sizes["dead_time"].size, rel=0.3)
+    assert coarse["quadratic_drag"] > 2.0 * sizes["quadratic_drag"].size
+
+
+def test_a_command_that_shows_more_keeps_within_the_limits(sizes):
+    found = best_command(plan(), TRUE, SCATTER)
+    assert found is not None
+    assert found.factor < 1.0
+    assert np.abs(found.command.angle).max() <= np.radians(12.0) + 1e-6
+
+
+def test_a_recording_lasts_as_long_as_its_command():
+    command = Command(np.array([0.0, 3.0]), np.zeros(2))
+    assert duration_of(command, 20.0) == 4.0
+    assert duration_of(None, 20.0) == 20.0
