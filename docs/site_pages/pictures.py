@@ -1,0 +1,46 @@
+"""The pictures of the site, made by the programs that they show."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import av
+import numpy as np
+
+from anglecam.workflow.self_test import write_film
+
+ROOT = Path(__file__).resolve().parents[2]
+SPECS = ("demo", "hard-scene", "paper-neck", "quadratic-drag")
+"""Specs whose first frames are shown."""
+SHOWN_FRAME = 20
+
+
+def draw(folder: Path) -> None:
+    """Write all pictures into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory() as name:
+        work = Path(name)
+        _stick(work, folder)
+        for verb, picture in (("response", "step"), ("kinematics", "linkage")):
+            _run("anglecam", "neck", verb, "--out", work)
+            (work / f"{picture}.png").replace(folder / f"{picture}.png")
+    _run("synth", "gallery", *(ROOT / f"configs/{spec}.yaml" for spec in SPECS), "--out", folder)
+
+
+def _stick(work: Path, folder: Path) -> None:
+    time = np.arange(60) / 30.0
+    write_film(work / "stick.mkv", np.radians(12.0) * np.exp(-time) * np.cos(2.0 * np.pi * 1.5 * time))
+    _run("anglecam", "measure", work / "stick.mkv", "--out", work, "--overlay")
+    (work / "stick.png").replace(folder / "stick.png")
+    with av.open(str(work / "stick.overlay.mp4")) as film:
+        frames = film.decode(video=0)
+        picture = next(frame for number, frame in enumerate(frames) if number == SHOWN_FRAME)
+        picture.to_image(width=3 * picture.width, height=3 * picture.height).save(folder / "stick-overlay.png")
+
+
+def _run(program: str, *arguments: object) -> None:
+    call = [Path(sys.executable).with_name(program), *map(str, arguments)]
+    subprocess.run(call, check=True, capture_output=True)
