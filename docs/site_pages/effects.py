@@ -53,7 +53,9 @@ def _row(parameter: Parameter) -> str:
     low, high = sorted(parameter.in_file_unit(value)[0] for value in (parameter.lower, parameter.upper))
     remark = "fitted only if the data support it" if parameter.staged else ""
     null = parameter.in_file_unit(parameter.null)[0]
-    return f"| `{parameter.name}` | {parameter.symbol} | {_number(null)} | {_number(low)} … {_number(high)} | {remark} |"
+    return (
+        f"| `{parameter.name}` | {parameter.symbol} | {_number(null)} | {_number(low)} … {_number(high)} | {remark} |"
+    )
 
 
 def _number(value: float) -> str:

@@ -10,7 +10,10 @@ from typing import Any
 
 def page() -> str:
     """Return the page: a table for each schema."""
-    parts = ["# Keys of JSON files", "Generated from the schemas in `anglecam/io/schemas`. `[]` stands for each item of a list."]
+    parts = [
+        "# Keys of JSON files",
+        "Generated from the schemas in `anglecam/io/schemas`. `[]` stands for each item of a list.",
+    ]
     for path in sorted((files("anglecam.io") / "schemas").iterdir(), key=lambda path: path.name):
         schema = json.loads(path.read_text())
         rows = "\n".join(_rows(schema, schema, ""))
