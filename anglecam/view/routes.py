@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import anyio.to_thread
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Route
@@ -33,6 +34,7 @@ _PAGE_FILES = {
     "view.css": "text/css",
     "icon.svg": "image/svg+xml",
 }
+_THREADS = ThreadPoolExecutor(8)
 _KEPT = {"cache-control": "private, max-age=3600"}
 """For pictures: the page's address of one names the version of its clip, or the mark."""
 _SANDBOX = {"content-security-policy": "sandbox allow-scripts; default-src 'unsafe-inline' data: blob:"}
@@ -227,7 +229,7 @@ def _answered_with_body(answer: Callable[[Request, Any], Response]) -> Callable[
 
 async def _in_thread(answer: Callable[[], Response]) -> Response:
     """Answer in a thread; when the server ends, it does not wait for a search that is under way."""
-    return await anyio.to_thread.run_sync(_or_fault, answer, abandon_on_cancel=True)
+    return await asyncio.get_running_loop().run_in_executor(_THREADS, _or_fault, answer)
 
 
 def _or_fault(answer: Callable[[], Response]) -> Response:
