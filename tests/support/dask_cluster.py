@@ -53,4 +53,8 @@ def dask_cluster(folder: Path, versions: Sequence[str | None] = (None, None)) ->
         for process in (*workers, scheduler):
             process.terminate()
         for process in (*workers, scheduler):
-            process.wait(30)
+            try:
+                process.wait(30)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
