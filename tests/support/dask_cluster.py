@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from distributed import Client
+
 _PROGRAM = "from dask.__main__ import main; main()"
 
 
@@ -48,7 +50,10 @@ def dask_cluster(folder: Path, versions: Sequence[str | None] = (None, None)) ->
         while not file.exists() or not file.read_text():
             assert time.monotonic() < until
             time.sleep(0.05)
-        yield Cluster(json.loads(file.read_text())["address"], scheduler, workers)
+        address = json.loads(file.read_text())["address"]
+        with Client(address, timeout=60) as client:
+            client.wait_for_workers(len(workers), timeout=120)
+        yield Cluster(address, scheduler, workers)
     finally:
         for process in (*workers, scheduler):
             process.terminate()
