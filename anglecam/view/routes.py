@@ -19,6 +19,7 @@ from anglecam.io.files import json_text
 from anglecam.io.rig import Rig, read_rig
 from anglecam.io.rig_update import changed_rig, read_rig_text, update_rig
 from anglecam.io.session import rig_beside
+from anglecam.measurement.mark_pass import MarkNotFoundError
 from anglecam.view.clips import Clips, OpenClip, version_of
 from anglecam.view.folder import Folder
 from anglecam.view.jobs import Jobs
@@ -124,9 +125,12 @@ class Api:
         return _picture(self._image(request), request.path_params["kind"])
 
     def learn(self, request: Request, content: Any) -> Response:
-        """Find the mark with the page's settings; answer with its key and what it is."""
+        """Find the mark with the page's settings; answer with its key and what it is, or why there is none."""
         rig = changed_rig(self.folder.rig_file, _sections(content))
-        key = self.clips.learn(self._clip(request), rig)
+        try:
+            key = self.clips.learn(self._clip(request), rig)
+        except MarkNotFoundError as cause:  # an answer and no fault: its body or outline may be measured
+            return _json({"none": str(cause)})
         found = self.clips.mark(key).found
         return _json({"key": key, "rgb": found.model.mean_rgb, "cue": found.cue, "area_px2": found.area_px2})
 
@@ -186,7 +190,7 @@ class Api:
     def _rig(self) -> Rig:
         path = self.folder.rig_file
         # numbered pictures may have their rig file beside their folder
-        return read_rig(path) if path.exists() or self.folder.is_session else rig_beside(self.folder.clips[0])
+        return read_rig(path) if path.exists() else rig_beside(self.folder.clips[0])
 
     def _open(self, request: Request) -> OpenClip:
         try:

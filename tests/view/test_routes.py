@@ -91,8 +91,8 @@ def test_the_mark_is_learnt_again_when_the_settings_change(page: TestClient) -> 
     first = page.post("/api/clips/0/mark", json={"sections": {}}).json()["key"]
     assert page.post("/api/clips/0/mark", json={"sections": {}}).json()["key"] == first
     green = page.post("/api/clips/0/mark", json={"sections": {"mark": {"rgb": [0, 250, 0]}}})
-    assert green.status_code == 422
-    assert "no mark found" in green.json()["problem"]
+    assert green.status_code == 200
+    assert "no mark found" in green.json()["none"]
     assert page.get("/api/clips/0/frames/0/found", params={"mark": "other"}).status_code == 422
 
 
@@ -181,6 +181,19 @@ def test_a_cancelled_job_ends_and_leaves_nothing_unfinished(page: TestClient, la
     assert not results.exists() or [p.name for p in results.iterdir() if p.name.startswith(".")] == []
     follower = page.post("/api/jobs", json={"kind": "measure", "clip": 1}).json()
     assert _ended(page, follower["id"])["status"] == "done"
+
+
+def test_without_a_rig_file_everything_works_and_saving_makes_one(page: TestClient, lab: Path) -> None:
+    (lab / "rig.yaml").unlink()
+    assert page.get("/api/rig").json() == {"sections": {}, "version": "", "has_comments": False}
+    assert page.get("/api/clips/0/series").json() is None
+    assert page.post("/api/clips/0/mark", json={"sections": {}}).status_code == 200
+    state = _ended(page, page.post("/api/jobs", json={"kind": "measure", "clip": 0}).json()["id"])
+    assert state["status"] == "done", state
+    assert len(page.get("/api/clips/0/series").json()["angle_deg"]) == FRAMES
+    saved = page.put("/api/rig", json={"sections": {"neutral": 2.5}, "version": ""})
+    assert saved.json()["sections"] == {"neutral": 2.5}
+    assert read_rig(lab / "rig.yaml").neutral == 2.5
 
 
 def test_a_wrong_rig_file_is_one_line_and_frames_are_still_seen(page: TestClient, lab: Path) -> None:

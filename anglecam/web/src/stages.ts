@@ -30,8 +30,12 @@ export function startStages(): void {
     const now = ++asked;
     byId("learnt").textContent = "looking for the mark in frames of the whole clip …";
     try {
-      const learnt = await ask<LearntMark>(`/api/clips/${state.clip}/mark`, "POST", { sections: state.changes });
+      const learnt = await ask<LearntMark | { none: string }>(`/api/clips/${state.clip}/mark`, "POST", { sections: state.changes });
       if (now !== asked) return;
+      if ("none" in learnt) {
+        byId("learnt").textContent = `${learnt.none} Measuring then follows the body or its outline.`;
+        return;
+      }
       byId("learnt").textContent = describe(learnt);
       set({ learnt });
     } catch (fault) {
