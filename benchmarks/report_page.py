@@ -1,9 +1,9 @@
-"""How large is the page of a clip of 10,000 frames, and how soon does it answer in a browser?
+"""Size of the page of a clip of 10,000 frames, and the time until it answers in a browser.
 
     .venv/bin/python -m benchmarks.report_page [--frames N] [--out DIR]
 
-The page is that of a measured clip whose pictures are noise on top of a still scene, which compresses badly. The time is from the
-start of the navigation to the moment at which the curves are drawn and answer to the pointer, the median of five loads.
+The pictures of the page are noise on top of a still scene, which compresses badly. The time is from the start of the
+navigation to the moment at which the curves are drawn and answer to the pointer, the median of five loads.
 """
 
 from __future__ import annotations
