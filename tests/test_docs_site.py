@@ -1,4 +1,4 @@
-"""The documentation site builds without a warning and without the network, the notebook runs, and every link leads on."""
+"""The documentation site builds without a warning or the network, the notebook runs, and every link leads on."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 from anglecam.effects import LEDGER
 
 ROOT = Path(__file__).parents[1]
-OFFLINE = {name: "http://127.0.0.1:9" for name in ("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY")}
+OFFLINE = dict.fromkeys(("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"), "http://127.0.0.1:9")
 """A proxy that nobody answers at."""
 
 

@@ -1,7 +1,7 @@
 """The tutorials' commands and code run as they stand, in their order, and lead to what the pages say.
 
-A page is executed block by block in a folder of its own: ``sh`` by line, ``python`` in one namespace, and a ``yaml`` block
-whose first line names a file is written to it.
+A page is executed block by block in a separate folder: ``sh`` by line, ``python`` in one namespace; a ``yaml`` block
+is written to the file that its first line names.
 """
 
 from __future__ import annotations
@@ -97,4 +97,4 @@ def test_hidden_backlash(tmp_path, monkeypatch):
 
 def test_add_an_effect(tmp_path, monkeypatch):
     space = run_page("add-an-effect", tmp_path, monkeypatch)
-    assert space["sigma"] < 0.1 * space["p"]
+    assert space["sigma"] < 0.1 * space["error"]
