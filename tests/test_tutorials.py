@@ -19,7 +19,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from anglecam.workflow.self_test import write_film
+from anglecam.workflow.self_test import HEIGHT, WIDTH, write_film
 from support.tracked import nod, write_deeplabcut, write_sleap
 
 ROOT = Path(__file__).parents[1]
@@ -52,8 +52,8 @@ def film_by_phone(path: Path, angles: np.ndarray) -> None:
     write_film(lossless, angles)
     with av.open(str(lossless)) as source, av.open(str(path), mode="w") as container:
         stream = container.add_stream("libx264", rate=Fraction(30), options={"crf": "16"})
+        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
         for frame in source.decode(video=0):
-            stream.width, stream.height, stream.pix_fmt = frame.width, frame.height, "yuv420p"
             container.mux(stream.encode(frame.reformat(format="yuv420p")))
         container.mux(stream.encode())
     lossless.unlink()
