@@ -72,7 +72,7 @@ test: venv-module test-packages $(DEV) ## everything that must pass
 check: venv-module $(DEV) ## style, types, docstrings and the direction of imports, in seconds
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy && $(BIN)/lint-imports --no-logo
 
-docs: venv-module $(DEV) ## the documentation site, in build/site
+docs: venv-module test-packages $(DEV) ## the documentation site in build/site, its notebook executed; nothing is fetched
 	$(BIN)/python docs/build_site.py
 
 lock: setup ## pin the dependencies anew

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import nbformat
+from jupyter_client import AsyncKernelManager
 from nbclient import NotebookClient
 
 SECONDS = 600
@@ -16,7 +17,8 @@ SECONDS = 600
 def render(notebook: Path, folder: Path) -> None:
     """Execute a notebook and write it as a page with its pictures; an error in a cell is an error here."""
     content = nbformat.read(notebook, as_version=4)
-    NotebookClient(content, timeout=SECONDS, kernel_name="python3").execute()
+    kernel = AsyncKernelManager(kernel_name="python3", transport="ipc")
+    NotebookClient(content, timeout=SECONDS, km=kernel).execute()
     parts: list[str] = []
     for number, cell in enumerate(content.cells):
         if cell.cell_type == "markdown":
