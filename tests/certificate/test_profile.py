@@ -64,9 +64,9 @@ def test_an_end_beyond_the_bound_is_infinite_and_a_second_maximum_is_inside():
     assert _end(lambda value: 0.0, 1.0, 0.5, 10.0, 0.0) == np.inf
 
     def two_maxima(value):
-        return min(abs(value - 1.0), abs(value - 2.5)) * 40.0
+        return min(40.0 * abs(value - 1.0), 10.0 * abs(value - 1.7))
 
-    assert _end(two_maxima, 1.0, 0.05, 10.0, 0.0) == pytest.approx(2.5 + THRESHOLD / 40.0, abs=0.05)
+    assert _end(two_maxima, 1.0, 0.05, 10.0, 0.0) == pytest.approx(1.7 + THRESHOLD / 10.0, abs=0.05)
 
 
 def test_breakaway_friction_is_the_ledgers_with_another_parameter():
