@@ -2,10 +2,13 @@
 
 At each value v of the parameter all other parameters are fitted again. The interval holds every v with
 
-    2·(log L_max − log L(v)) / k ≤ 3.84,      k = u²/u₀² ≥ 1
+    (C(v) − C_min) / (k·s²) ≤ 3.84,      k = u²/u₀² ≥ 1
 
-3.84 is the 95 % point of χ² with one degree of freedom. u₀ is the standard uncertainty that white residuals would give,
-and u includes correlated residuals and systematic errors of the measurement (Chandler and Bate, Biometrika 94, 2007).
+C is the sum of squared whitened residuals, so that the left side is twice the loss of log-likelihood for noise of the
+residuals' variance s², divided by k. 3.84 is the 95 % point of χ² with one degree of freedom. u₀ is the standard
+uncertainty that white residuals would give, and u includes correlated residuals and systematic errors of the
+measurement (Chandler and Bate, Biometrika 94, 2007).
+
 Where the interval reaches the value at which the effect is absent, its other end is an upper bound. The same threshold
 serves for both, so the choice between bound and interval, which the data make, does not lower the confidence; a bound
 then has at least 97.5 % (Feldman and Cousins, Phys. Rev. D 57, 1998; Self and Liang, J. Am. Stat. Assoc. 82, 1987).
@@ -28,7 +31,6 @@ from anglecam.identification.noise import Noise
 from anglecam.identification.output_error import fit_output_error
 from anglecam.identification.systematic import full_sigma
 from anglecam.identification.variable_projection import point_at
-from anglecam.loop.candidates import log_likelihood_gain
 from anglecam.loop.refit import plant_of
 from anglecam.models.plant import Plant
 
@@ -41,6 +43,8 @@ SMALLEST_STEP = 1e-3
 FARTHER = (0.5, 2.0)
 """Multiples of the distance from an end to the null, or to the estimate if that is farther, at which the likelihood is
 computed once more: it may have a second maximum."""
+SMALLEST_SIGMA = 1e-9
+"""rad; data without noise are taken to have this, because models and files are no more accurate."""
 MOST_DEVIANCE = 1e6
 """Larger deviances count as this, also those of a model that diverges."""
 BETTER = 0.1
@@ -146,8 +150,10 @@ def _profile_once(
     sigma, inflation = _uncertainty(best, name, records, noise, extra_sigma)
     held: dict[float, Fit] = {}
 
+    variance = max(best.cost / max(1, len(best.white) - best.slopes.rank), SMALLEST_SIGMA**2)
+
     def lost(fit: Fit) -> float:
-        return 2.0 * log_likelihood_gain(fit.cost, best.cost, len(best.white))
+        return (fit.cost - best.cost) / variance
 
     def loss(value: float) -> float:
         """Return twice the loss of log-likelihood at a value."""

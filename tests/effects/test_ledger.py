@@ -177,3 +177,11 @@ def test_a_lag_of_any_length_is_as_accurate_with_a_nonlinear_effect_as_alone(lag
     exact = alone.predict(np.array([26.0, 524.0, 508.0, lag]), time, command, np.zeros(2))
     near = beside.predict(np.array([26.0, 524.0, 508.0, lag, 0.0]), time, command, np.zeros(2))
     assert np.degrees(np.abs(near - exact)).max() < 1e-4
+
+
+def test_parameters_that_are_fixed_one_after_another_keep_their_places():
+    friction = effect("coulomb_friction")
+    once = friction.with_fixed({"asymmetry_deg_per_s2": 0.3, "friction_deg_per_s2": 2.0})
+    twice = friction.with_fixed({"asymmetry_deg_per_s2": 0.3}).with_fixed({"friction_deg_per_s2": 2.0})
+    assert once == twice
+    np.testing.assert_array_equal(twice.complete(np.array([0.5, 0.1])), [2.0, 0.3, 0.5, 0.1])

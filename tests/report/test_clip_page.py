@@ -37,7 +37,7 @@ def test_the_page_has_pictures_numbers_and_the_origin(measured, tmp_path):
     page = unescape(
         write(measured, tmp_path, Run("anglecam measure swing.avi", "2026-11-25T10:00:00+00:00")).read_text()
     )
-    assert page.count('class="picture') == len(measurement.series.time)  # a short film is shown whole
+    assert page.count('<li class="picture') == len(measurement.series.time)  # a short film is shown whole
     assert "turning point" in page
     assert "the command changes" in page
     assert f"measured in {measurement.series.ok.sum()} of 45 frames" in page

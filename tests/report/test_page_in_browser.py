@@ -210,5 +210,5 @@ def test_a_report_of_ten_thousand_frames_is_small(verdict, tmp_path):
     write_report(
         path, "long", long, verdict_as_dict(verdict), None, [filmed(record)], [], [], films={record.name: film}
     )  # fmt: skip
-    assert len(re.findall('class="picture', path.read_text())) == 60
+    assert len(re.findall('<li class="picture', path.read_text())) == 60
     assert path.stat().st_size < 15e6
