@@ -29,7 +29,7 @@ system = @missing=""; \
 	fi
 
 .DEFAULT_GOAL := help
-.PHONY: help setup venv-module test-packages demo test check lock clean
+.PHONY: help setup venv-module test-packages demo test check docs lock clean
 
 help: ## list what there is
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-8s %s\n", $$1, $$2}'
@@ -71,6 +71,9 @@ test: venv-module test-packages $(DEV) ## everything that must pass
 
 check: venv-module $(DEV) ## style, types, docstrings and the direction of imports, in seconds
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy && $(BIN)/lint-imports --no-logo
+
+docs: venv-module $(DEV) ## the documentation site, in build/site
+	$(BIN)/python docs/build_site.py
 
 lock: setup ## pin the dependencies anew
 	$(COMPILE) requirements/build.in -o requirements/build.lock

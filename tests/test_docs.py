@@ -20,8 +20,9 @@ README_WORDS = 1500
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_links_lead_to_files(page: Path) -> None:
     targets = re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text())
-    missing = [t for t in targets if not t.startswith("http") and not (page.parent / t).exists()]
-    assert missing == []
+    made = {f"effects/{effect.id}.md" for effect in LEDGER}  # by docs/build_site.py, like the pictures
+    missing = [t for t in targets if not t.startswith(("http", "pictures/")) and not (page.parent / t).exists()]
+    assert set(missing) <= made
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

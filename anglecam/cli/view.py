@@ -31,6 +31,7 @@ def view(
             webbrowser.open(address)
 
     serve(open_folder(path), port, ready)
+    os._exit(0)  # a search for the mark may be under way in a thread; nothing waits for its result
 
 
 def _has_screen() -> bool:

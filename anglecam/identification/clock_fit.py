@@ -31,6 +31,8 @@ from anglecam.models.plant import FASTEST
 MOST_DRIFT_SIGMA = 0.01
 """Standard uncertainty of a drift, 10,000 ppm, above which the recordings do not determine it; clocks are then fitted
 without drift. A nominal frame rate is wrong by less."""
+MOST_RECORDINGS = 60
+"""Recordings of more are not fitted: the whole Jacobian would need gigabytes."""
 LEFT_OUT = ("dead_time", "clock_scale")
 """Effects that the clocks stand for."""
 
@@ -51,27 +53,27 @@ class ClockFit:
     """Plant and clocks."""
 
 
-def fit_clocks(records: Sequence[Record], effects: Sequence[Effect] = ()) -> ClockFit | None:
+def fit_clocks(records: Sequence[Record], effects: Sequence[tuple[Effect, Floats]] = ()) -> ClockFit | None:
     """Fit the clocks of all driven recordings together with the plant.
 
     Parameters
     ----------
     records : sequence of Record
         Of one rig; those without a command are left out.
-    effects : sequence of Effect
-        Of the plant; those that the clocks stand for are left out.
+    effects : sequence of (Effect, (k,) ndarray)
+        Of the plant, with starting values of their parameters, SI; those that the clocks stand for are left out.
 
     Returns
     -------
     ClockFit or None
-        ``None`` where no recording has a command.
+        ``None`` where no recording has a command, and for more than `MOST_RECORDINGS`.
     """
     driven = [r for r in records if r.command is not None]
-    if not driven:
+    if not 0 < len(driven) <= MOST_RECORDINGS:
         return None
     coarse = np.array([coarse_offset(r) for r in driven])
     moved = [replace(r, command=on_clock(r.command, c)) for r, c in zip(driven, coarse, strict=True)]
-    kept = tuple(e for e in effects if e.id not in LEFT_OUT)
+    kept = [(e, values) for e, values in effects if e.id not in LEFT_OUT]
     for with_drift in (True, False):
         fit = _fit(moved, kept, with_drift)
         clocks = np.array([nuisance[[OFFSET, DRIFT][: 1 + with_drift]] for nuisance in fit.nuisance])
@@ -85,13 +87,13 @@ def fit_clocks(records: Sequence[Record], effects: Sequence[Effect] = ()) -> Clo
     return ClockFit(tuple(r.name for r in driven), delays, drifts, covariance, fit)
 
 
-def _fit(records: Sequence[Record], effects: tuple[Effect, ...], with_drift: bool) -> Fit:
+def _fit(records: Sequence[Record], effects: Sequence[tuple[Effect, Floats]], with_drift: bool) -> Fit:
     """Fit plant and clocks, first without the noise's AR(1) coefficient and then with that of the residual."""
     starts = start_parameters(records)
     fastest = max(FASTEST, *(float(np.sqrt(start[1])) for start in starts))
-    plant = ClockedPlant(effects, fastest=fastest, with_drift=with_drift)
-    more = [p.starts[0] if p.starts else p.null for e in effects for p in e.parameters]
-    fit = fit_output_error(plant, records, [np.append(start, more) for start in starts])
+    plant = ClockedPlant(tuple(e for e, _ in effects), fastest=fastest, with_drift=with_drift)
+    more = [values for _, values in effects]
+    fit = fit_output_error(plant, records, [np.concatenate([start, *more]) for start in starts])
     phi = autoregression(fit.residuals, RESIDUAL).phi
     return fit_output_error(plant, records, [fit.parameters], nuisance=fit.nuisance, phi=phi)
 

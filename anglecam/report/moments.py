@@ -58,7 +58,7 @@ def choose_moments(
     --------
     >>> swing = AngleSeries("a", np.arange(5.0), np.array([0, 1, 0, -1, 0.0]), np.full(5, 0.1), ("ok",) * 5)
     >>> [(m.row, m.why) for m in choose_moments(swing, None, "", [2.0], 5)]
-    [(0, 'evenly spaced'), (1, 'turning point'), (2, 'the command changes'), (3, 'turning point'), (4, 'evenly spaced')]
+    [(0, 'evenly spaced'), (1, 'turning point'), (2, 'the command changes'), (3, 'evenly spaced'), (4, 'evenly spaced')]
     """
     n = len(series.time)
     quota = max(1, most // SHARE)

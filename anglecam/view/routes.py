@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Route
 
 from anglecam.data.typing import Image
-from anglecam.errors import AnglecamError, InputError, RigError, printable
+from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.io.files import json_text
 from anglecam.io.rig import Rig, read_rig
 from anglecam.io.rig_update import changed_rig, read_rig_text, update_rig
@@ -33,10 +34,18 @@ _PAGE_FILES = {
     "view.css": "text/css",
     "icon.svg": "image/svg+xml",
 }
+_THREADS = ThreadPoolExecutor(8)
 _KEPT = {"cache-control": "private, max-age=3600"}
 """For pictures: the page's address of one names the version of its clip, or the mark."""
 _SANDBOX = {"content-security-policy": "sandbox allow-scripts; default-src 'unsafe-inline' data: blob:"}
 """For the report: its scripts run, but cannot reach this server."""
+
+
+class _MissingError(AnglecamError):
+    """What was asked for does not exist."""
+
+    def __init__(self) -> None:
+        super().__init__("there is no such thing")
 
 
 class Api:
@@ -125,7 +134,7 @@ class Api:
         """Answer with the picture of a stage of the mark search."""
         stage = request.path_params["stage"]
         if stage not in STAGES:
-            raise LookupError
+            raise _MissingError
         mark = self.clips.mark(request.query_params.get("mark", ""))
         return _picture(stage_picture(self._image(request), mark.found, stage), "png")
 
@@ -163,7 +172,7 @@ class Api:
         """Answer with the report of the closed loop."""
         path = self.folder.inside(self.folder.results / REPORT)
         if not path.is_file():
-            raise LookupError
+            raise _MissingError
         return FileResponse(path, headers=_SANDBOX)
 
     def _clip(self, request: Request) -> Path:
@@ -171,7 +180,7 @@ class Api:
 
     def _number(self, number: Any) -> Path:
         if not isinstance(number, int) or not 0 <= number < len(self.folder.clips):
-            raise LookupError
+            raise _MissingError
         return self.folder.inside(self.folder.clips[number])
 
     def _rig(self) -> Rig:
@@ -187,9 +196,12 @@ class Api:
         return self.clips.open(self._clip(request), rig)
 
     def _image(self, request: Request) -> Image:
-        image = self._open(request).image(request.path_params["number"])
+        opened, number = self._open(request), request.path_params["number"]
+        if number >= len(opened.reader.times):
+            raise _MissingError
+        image = opened.image(number)
         if image is None:
-            raise InputError(f"frame {request.path_params['number']} cannot be decoded")
+            raise InputError(f"frame {number} cannot be decoded")
         return image
 
 
@@ -197,7 +209,7 @@ def _answered(answer: Callable[[Request], Response]) -> Callable[[Request], Any]
     """Return an endpoint that works in a thread and turns faults into answers."""
 
     async def endpoint(request: Request) -> Response:
-        return await run_in_threadpool(_or_fault, lambda: answer(request))
+        return await _in_thread(lambda: answer(request))
 
     return endpoint
 
@@ -210,18 +222,22 @@ def _answered_with_body(answer: Callable[[Request, Any], Response]) -> Callable[
             return PlainTextResponse("not JSON\n", status_code=400)
         if not isinstance(content, dict):
             return PlainTextResponse("not an object\n", status_code=400)
-        return await run_in_threadpool(_or_fault, lambda: answer(request, content))
+        return await _in_thread(lambda: answer(request, content))
 
     return endpoint
 
 
+async def _in_thread(answer: Callable[[], Response]) -> Response:
+    """Answer in a thread; when the server ends, it does not wait for a search that is under way."""
+    return await asyncio.get_running_loop().run_in_executor(_THREADS, _or_fault, answer)
+
+
 def _or_fault(answer: Callable[[], Response]) -> Response:
     try:
-        return answer()
+        with blame(Path("anglecam view")):
+            return answer()
     except AnglecamError as problem:
-        return _json({"problem": str(problem)}, status=422)
-    except LookupError:
-        return PlainTextResponse("there is no such thing\n", status_code=404)
+        return _json({"problem": str(problem)}, status=404 if isinstance(problem, _MissingError) else 422)
 
 
 def _sections(content: Any) -> dict[str, Any]:
@@ -237,11 +253,11 @@ def _json(content: Any, status: int = 200) -> Response:
 
 def _picture(image: Image, kind: str) -> Response:
     if kind not in MEDIA_TYPES:
-        raise LookupError
+        raise _MissingError
     return Response(encode_picture(image, kind), media_type=MEDIA_TYPES[kind], headers=_KEPT)
 
 
 def _page_file(name: str) -> Response:
     if name not in _PAGE_FILES:
-        raise LookupError
+        raise _MissingError
     return FileResponse(STATIC / name, media_type=_PAGE_FILES[name])

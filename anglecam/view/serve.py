@@ -76,7 +76,7 @@ def serve(folder: Folder, port: int, ready: Callable[[str], None]) -> None:
     port, token = listener.getsockname()[1], secrets.token_urlsafe(24)
     config = uvicorn.Config(
         application(folder, port, token),
-        log_level="warning",
+        log_level="critical",
         access_log=False,
         server_header=False,
         timeout_graceful_shutdown=_GRACE_S,

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from anglecam.data.record import Record
+from anglecam.data.typing import Floats
 from anglecam.effects import Effect
 from anglecam.identification.clock_fit import fit_clocks
 from anglecam.identification.clocks import Clocks, clocks_of
@@ -14,7 +15,7 @@ from anglecam.workflow.session import MeasuredSession
 
 
 def session_clocks(
-    measured: MeasuredSession, records: Sequence[Record], effects: Sequence[Effect] = ()
+    measured: MeasuredSession, records: Sequence[Record], effects: Sequence[tuple[Effect, Floats]] = ()
 ) -> Clocks | None:
     """Return offset and drift of the clocks of some recordings.
 
@@ -24,13 +25,13 @@ def session_clocks(
         From `anglecam.workflow.session.measure_session`; its lamps separate clock offsets from the dead time.
     records : sequence of Record
         The recordings to fit.
-    effects : sequence of Effect
-        Of the plant.
+    effects : sequence of (Effect, (k,) ndarray)
+        Of the plant, with starting values of their parameters, SI.
 
     Returns
     -------
     Clocks or None
-        ``None`` where no recording has a command.
+        ``None`` as of `anglecam.identification.clock_fit.fit_clocks`.
     """
     commands = {recording.name: recording.command for recording in measured.session.recordings}
     as_filed = [replace(r, command=commands[r.name]) if r.command is not None else r for r in records]

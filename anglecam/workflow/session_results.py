@@ -8,11 +8,16 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from anglecam.data.record import Record
 from anglecam.data.series import AngleSeries
+from anglecam.data.typing import Floats
+from anglecam.effects import Effect
 from anglecam.errors import InputError
 from anglecam.identification.clocks import Clocks
 from anglecam.identification.export import fitted_model, transfer_as_dict, write_mat
+from anglecam.identification.fit import Fit
 from anglecam.identification.identified import Identified
 from anglecam.identification.identify_records import identify_records
 from anglecam.io.files import write_json
@@ -71,7 +76,7 @@ def write_identified(
         The model.
     """
     model = identify_session(measured, estimator, neck=neck)
-    model = replace(model, clock=session_clocks(measured, model.fitted))
+    model = replace(model, clock=attempt("the clocks", lambda: session_clocks(measured, model.fitted), []))
     _write_model(model, out, "model")
     return model
 
@@ -112,7 +117,7 @@ def write_closed(
     verdict = attempt("free form", partial(with_free_form, verdict), missing) or verdict
     progress("extended Kalman filter")
     models = []
-    effects = plant_of(verdict.after).effects
+    effects = _fitted_effects(verdict.after)
     clock = attempt("the clocks", lambda: session_clocks(measured, fitted, effects), missing)
     for estimator, name, clocks in (("ekf", "ekf", None), ("oe2", "model", clock)):
         model = attempt(
@@ -163,6 +168,13 @@ def _inputs(session: Session, run: Run | None) -> list[Path]:
     """Return the files that the results of a session depend on."""
     found = [inputs_of(recording.source, session.rig, run) for recording in session.recordings]
     return sorted({path for files in found for path in files})
+
+
+def _fitted_effects(fit: Fit) -> list[tuple[Effect, Floats]]:
+    """Return the effects of a fitted plant with their fitted parameters."""
+    plant = plant_of(fit)
+    edges = plant.base_count + np.cumsum([0, *(len(e.parameters) for e in plant.effects)])
+    return [(e, fit.parameters[i:j]) for e, i, j in zip(plant.effects, edges, edges[1:], strict=False)]
 
 
 def _identify(

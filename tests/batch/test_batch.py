@@ -167,7 +167,7 @@ def test_a_wrong_rig_file_affects_its_folder_only_and_gives_exit_status_2(tmp_pa
     (lab / "wrong" / "rig.yaml").write_text("pivott: {}\n")
     call = batch_here(lab, "--out", tmp_path / "out", "--quiet")
     assert call.returncode == 2
-    assert call.stderr.splitlines() == [f"{lab}/wrong/rig.yaml: unknown key pivott"]
+    assert call.stderr.splitlines() == [f"{lab}/wrong/rig.yaml: unknown key pivott; did you mean pivot?"]
     assert (tmp_path / "out" / "good" / "a.angles.csv").exists()
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anglecam.effects import effect
 from anglecam.identification.clock_fit import fit_clocks
 from anglecam.identification.clocks import clocks_of
 from anglecam.identification.identify_records import identify_records
@@ -14,6 +15,8 @@ from anglecam.io.rig import Rig
 from support.motion import Plant as TruePlant
 from support.motion import Recording
 from support.series import record, session
+
+FIXED = {"asymmetry_deg_per_s2": 0.0, "breakaway_excess_deg_per_s2": 0.0, "stribeck_speed_deg_per_s": 0.0}
 
 
 def _on_other_clocks(records, offsets, drifts):
@@ -97,3 +100,11 @@ def test_a_significant_offset_is_a_doubt_about_the_model():
     entry = model.as_dict()["clock"]["steps"]
     assert entry["offset_s"]["value"] == pytest.approx(0.05, abs=4.0 * entry["offset_s"]["sigma"])
     assert set(entry["drift_ppm"]) == {"value", "sigma"}
+
+
+def test_clocks_are_fitted_together_with_the_effects_of_the_plant():
+    records = _on_other_clocks(session(TruePlant(coulomb=2.0), 8)[:3], [0.2, 0.0, -0.1], np.zeros(3))
+    found = fit_clocks(records, [(effect("coulomb_friction").with_fixed(FIXED), np.array([1.0]))])
+    sigma = np.sqrt(np.diag(found.covariance))[:3]
+    assert np.all(np.abs(found.delays - [0.2, 0.0, -0.1]) < 4.0 * sigma)
+    assert found.fit.parameters[3] == pytest.approx(2.0, rel=0.05)

@@ -197,4 +197,4 @@ def test_measure_writes_both_formats_next_to_the_csv(tmp_path, monkeypatch, caps
         assert (left.value.code or 0) == status
     assert "excel" in capsys.readouterr().err
     found = {path.name for path in (tmp_path / "out").iterdir()}
-    assert found == {"nod.angles.csv", "nod.angles.nc", "nod.angles.parquet", "nod.png"}
+    assert found == {"nod.angles.csv", "nod.angles.nc", "nod.angles.parquet", "nod.html", "nod.png"}

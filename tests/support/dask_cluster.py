@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from distributed import Client
+
 _PROGRAM = "from dask.__main__ import main; main()"
 _ENDS_WITH_TEST = f"from anglecam.batch.parent import end_with_parent; end_with_parent({os.getpid()}); "
 
@@ -50,9 +52,16 @@ def dask_cluster(folder: Path, versions: Sequence[str | None] = (None, None)) ->
         while not file.exists() or not file.read_text():
             assert time.monotonic() < until
             time.sleep(0.05)
-        yield Cluster(json.loads(file.read_text())["address"], scheduler, workers)
+        address = json.loads(file.read_text())["address"]
+        with Client(address, timeout=60) as client:
+            client.wait_for_workers(len(workers), timeout=120)
+        yield Cluster(address, scheduler, workers)
     finally:
         for process in (*workers, scheduler):
             process.terminate()
         for process in (*workers, scheduler):
-            process.wait(30)
+            try:
+                process.wait(30)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()

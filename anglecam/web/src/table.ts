@@ -8,7 +8,7 @@ export function sortable(table: HTMLTableElement): void {
       const down = head.getAttribute("aria-sort") === "ascending";
       table.querySelectorAll("th[aria-sort]").forEach((other) => other.removeAttribute("aria-sort"));
       head.setAttribute("aria-sort", down ? "descending" : "ascending");
-      const rows = [...body.rows].sort((a, b) => compare(key(a, column), key(b, column)) * (down ? -1 : 1));
+      const rows = [...body.rows].sort((a, b) => compare(key(a, column), key(b, column), down));
       body.append(...rows);
     });
   });
@@ -37,9 +37,10 @@ function key(row: HTMLTableRowElement, column: number): string {
   return cell.dataset["key"] ?? cell.textContent ?? "";
 }
 
-/** Numbers by size, words by letters, what is empty last. */
-function compare(a: string, b: string): number {
+/** Numbers by size, words by letters; what is empty is last in both directions. */
+function compare(a: string, b: string, down: boolean): number {
   if (a === "" || b === "") return a === b ? 0 : a === "" ? 1 : -1;
   const difference = Number(a) - Number(b);
-  return Number.isNaN(difference) ? a.localeCompare(b, "en", { numeric: true }) : difference;
+  const order = Number.isNaN(difference) ? a.localeCompare(b, "en", { numeric: true }) : difference;
+  return down ? -order : order;
 }
