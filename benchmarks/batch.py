@@ -136,8 +136,8 @@ def killed_and_resumed(lab: Path, unbroken: Path, out: Path, kills: int, span: f
         shutil.rmtree(out)
     same = "equal byte by byte each time" if not differing else f"differing: {', '.join(sorted(differing)[:5])}"
     return (
-        f"{len(gone_after)} kills, every process gone after {max(gone_after, default=0.0):.2f} s at most; the batch then "
-        f"ended by itself {ends} times; {len(expected)} files, {same}"
+        f"{len(gone_after)} kills, every process gone after {max(gone_after, default=0.0):.2f} s at most; "
+        f"the batch then ended by itself {ends} times; {len(expected)} files, {same}"
     )
 
 
