@@ -1,6 +1,7 @@
 """The overhead of a batch, the gain of a second job, and the state of the results after 20 kills.
 
     PYTHONPATH=tests .venv/bin/python benchmarks/batch.py [clips] [kills]
+    PYTHONPATH=tests .venv/bin/python benchmarks/batch.py sessions [kills]
 
 The clips have thirty frames each, 320 × 240, of a body that turns about its pivot. Ten different clips are copied under
 many names. A batch with one job and a batch with two jobs measure all of them. Sixty are also measured by a plain
@@ -16,6 +17,8 @@ repeatedly.
   batch takes without kills. Every second time, one of its measuring processes is killed first. The batch is repeated
   with `--retry-failed` until it ends by itself. All its files, except for wall times, are then compared byte by byte
   with those of the batch that was not killed. This is repeated until the number of kills is reached.
+- Sessions: the same kills of a batch with ``--close`` of two sessions, each of four series and a tiny clip. After each
+  kill, the time until the last process of the batch is gone is measured.
 """
 
 from __future__ import annotations
@@ -36,6 +39,7 @@ import numpy as np
 
 from support.drawn import RATE_HZ, Look, draw_frames
 from support.tiny import batch_command, children, is_alive, results, unfinished
+from support.tiny_session import tiny_session
 
 CLIPS, FEW, KILLS = 1_000, 60, 20
 SIZE, FRAMES, DIFFERENT = (320, 240), 30, 10
@@ -111,44 +115,71 @@ def overhead(out: Path, took: float, jobs: int) -> float:
     return (took * jobs - busy) / (took * jobs)
 
 
-def killed_and_resumed(lab: Path, unbroken: Path, out: Path, kills: int, span: float) -> str:
+def killed_and_resumed(lab: Path, unbroken: Path, out: Path, kills: int, span: float, *options: str) -> str:
     """Kill a batch repeatedly, let it end by itself, and return how its files compare."""
     rng, expected = random.Random(7), results(unbroken)
-    hit = ends = 0
+    ends, gone_after = 0, []
     differing: set[str] = set()
-    while hit < kills or out.exists():
-        patience = rng.uniform(0.0, span) if hit < kills else None
-        running = subprocess.Popen(batch_command(lab, "--out", out, "--jobs", 2, "--quiet", "--retry-failed"))
+    while len(gone_after) < kills or out.exists():
+        patience = rng.uniform(0.0, span) if len(gone_after) < kills else None
+        command = batch_command(lab, "--out", out, "--jobs", 2, "--quiet", "--retry-failed", *options)
+        running = subprocess.Popen(command, stderr=subprocess.DEVNULL)
         try:
             status = running.wait(patience)
         except subprocess.TimeoutExpired:
-            kill(running, worker_first=bool(hit % 2), rng=rng)
-            hit += 1
+            gone_after.append(kill(running, worker_first=bool(len(gone_after) % 2), rng=rng))
             continue
         found = results(out)
         differing |= {name for name in found.keys() | expected.keys() if found.get(name) != expected.get(name)}
-        differing |= set(unfinished(out)) | ({f"status {status}"} if status else set())
+        differing |= set(unfinished(out)) | ({f"status {status}"} if status != (1 if options else 0) else set())
         ends += 1
         shutil.rmtree(out)
     same = "equal byte by byte each time" if not differing else f"differing: {', '.join(sorted(differing)[:5])}"
-    return f"{hit} kills; the batch then ended by itself {ends} times; {len(expected)} files, {same}"
+    return (
+        f"{len(gone_after)} kills, every process gone after {max(gone_after, default=0.0):.2f} s at most; "
+        f"the batch then ended by itself {ends} times; {len(expected)} files, {same}"
+    )
 
 
-def kill(running: subprocess.Popen[bytes], *, worker_first: bool, rng: random.Random) -> None:
-    """Kill a batch, with ``worker_first`` after one of its measuring processes, and wait until all of it is gone."""
+def kill(running: subprocess.Popen[bytes], *, worker_first: bool, rng: random.Random) -> float:
+    """Kill a batch, with ``worker_first`` after one of its measuring processes.
+
+    Returns
+    -------
+    float
+        Time in s until the last of its processes is gone.
+    """
     workers = children(running.pid)
     if worker_first and workers:
         os.kill(rng.choice(workers), signal.SIGKILL)
         time.sleep(rng.uniform(0.0, 0.2))
     workers = children(running.pid)
     running.kill()
+    began = time.perf_counter()
     running.wait()
     while any(map(is_alive, workers)):
-        time.sleep(0.01)
+        time.sleep(0.001)
+    return time.perf_counter() - began
+
+
+def killed_sessions(top: Path, kills: int) -> None:
+    """Print how a batch that closes loops survives being killed."""
+    lab, unbroken = top / "lab", top / "unbroken"
+    for seed, name in enumerate(("mon", "tue")):
+        tiny_session(lab / name, seed)
+    began = time.perf_counter()
+    subprocess.run(batch_command(lab, "--out", unbroken, "--jobs", 2, "--quiet", "--close"), check=False)
+    span = time.perf_counter() - began
+    print(f"two sessions with --close: {span:.0f} s")
+    print(killed_and_resumed(lab, unbroken, top / "killed", kills, span, "--close"))
 
 
 def main() -> None:
     """Run the benchmark and print its figures."""
+    if sys.argv[1:2] == ["sessions"]:
+        with tempfile.TemporaryDirectory() as folder:
+            killed_sessions(Path(folder), int(sys.argv[2]) if len(sys.argv) > 2 else KILLS)
+        return
     clips = int(sys.argv[1]) if len(sys.argv) > 1 else CLIPS
     kills = int(sys.argv[2]) if len(sys.argv) > 2 else KILLS
     with tempfile.TemporaryDirectory() as folder:

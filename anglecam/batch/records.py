@@ -34,7 +34,7 @@ class ClipRecord:
     call_is_wrong: bool = False
     """Whether the cause of the failure is a rig file, not the clip."""
     transient: bool = False
-    """Whether the failure may disappear without any change of the inputs: a full disk, a clip still being written."""
+    """Whether the failure may disappear without any change of the inputs: a clip still being written."""
     removed: bool = False
     """Whether the clip was missing when its folder was last searched."""
     inputs: dict[str, str | None] = field(default_factory=dict)

@@ -218,8 +218,8 @@ def _out_of_reach(search: Search, records: Sequence[ClipRecord]) -> list[Angleca
     for folder in search.empty:
         lost = sum(r.address.startswith(join(folder, "")) and r.in_place is not None for r in records)
         if lost:
-            what = f"is empty, and {lost} clips were measured from it; their results stay as they were; is it mounted?"
-            found.append(InputError(f"{folder}: {what}"))
+            what = f"is empty, although clips were measured from it ({lost}); is it mounted?"
+            found.append(InputError(f"{folder}: {what} Their results stay as they were"))
     return found
 
 

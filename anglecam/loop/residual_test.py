@@ -21,7 +21,7 @@ that an effect with many directions takes no power from the tests with one.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -32,7 +32,7 @@ from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit, whiten
 from anglecam.identification.joined import join
-from anglecam.identification.quantisation import quantisation
+from anglecam.identification.quantisation import Grid, quantisation
 from anglecam.identification.slopes import Slopes
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.screen import Direction
@@ -47,6 +47,12 @@ LEAST_P = 1e-300
 """Smaller p-values count as this one, so that they have a logarithm."""
 LAGS = 15
 """Lags of the autocorrelation test, in frames."""
+MOST_DOUBLE = 2**25
+"""Most values that all draws together keep in double precision, 256 MB; more are kept in single precision. Shares of
+energy, which are sums over all frames, need no more.
+"""
+AT_ONCE = 2**21
+"""Values of the draws that are made or multiplied at once, 16 MB. A test of fewer frames has the draws of one block."""
 
 
 @dataclass(frozen=True)
@@ -114,9 +120,8 @@ def run_residual_test(
         With a p-value from `DRAWS` bootstrap draws.
     """
     n, free = len(fit.white), len(fit.white) - fit.slopes.rank
-    draws, quantised = _noise_draws(fit, records, rng)
-    both = fit.slopes.without_followed(np.column_stack([fit.white, draws]))
-    energy = np.sum(both**2, axis=0)
+    both, quantised = _data_and_draws(fit, records, rng)
+    energy = np.concatenate([np.sum(block**2, axis=0) for block in _blocks(both)])
     energy[energy == 0.0] = 1.0
 
     p_each, competing, gains = {}, {}, [np.zeros(1 + DRAWS)]
@@ -150,17 +155,57 @@ def run_residual_test(
     return ResidualTest(float(p_value), tests, further_gain, competing, detectable, rates.false_alarm_rate)
 
 
-def _noise_draws(fit: Fit, records: Sequence[Record], rng: np.random.Generator) -> tuple[Floats, bool]:
-    """Return (N, DRAWS) whitened residuals that noise alone would leave, and whether they are those of a quantiser.
+def _data_and_draws(fit: Fit, records: Sequence[Record], rng: np.random.Generator) -> tuple[Floats, bool]:
+    """Return (N, 1 + DRAWS) residuals that the fit cannot follow, the data's first, and whether they are quantised.
+
+    The others are those that noise alone would leave.
+    """
+    n = len(fit.white)
+    both = np.empty((n, 1 + DRAWS), np.float64 if n * (1 + DRAWS) <= MOST_DOUBLE else np.float32)
+    both[:, 0] = fit.slopes.without_followed(fit.white)
+    drawn, quantised = _noise_draws(fit, records, rng)
+    column = 1
+    for block in drawn:
+        both[:, column : column + block.shape[1]] = fit.slopes.without_followed(block)
+        column += block.shape[1]
+    return both, quantised
+
+
+def _blocks(both: Floats) -> Iterator[Floats]:
+    """Yield a few columns at a time, in double precision."""
+    width = _width(len(both))
+    return (both[:, k : k + width].astype(float, copy=False) for k in range(0, both.shape[1], width))
+
+
+def _width(frames: int) -> int:
+    return max(1, AT_ONCE // frames) if frames * (1 + DRAWS) > MOST_DOUBLE else 1 + DRAWS
+
+
+def _noise_draws(fit: Fit, records: Sequence[Record], rng: np.random.Generator) -> tuple[Iterator[Floats], bool]:
+    """Return (N, DRAWS) whitened residuals, in blocks, that noise alone would leave, and whether of a quantiser.
 
     The scatter that the quantiser does not explain is white noise that acted before it. From a standard deviation of
     one step on, such noise makes the quantiser's error white as well.
     """
-    joined, grid = join(records, fit.phi), quantisation(records)
-    white = rng.standard_normal((len(fit.white), DRAWS))
+    n, width = len(fit.white), _width(len(fit.white))
+    whites = (rng.standard_normal((n, min(width, DRAWS - k))) for k in range(0, DRAWS, width))
+    grid = quantisation(records)
     before = math.sqrt(max(fit.rmse**2 - grid.sigma**2, 0.0)) if grid else math.inf
     if grid is None or before >= grid.step:
-        return white, False
+        return whites, False
+    return _quantised(fit, records, grid, before, rng, whites), True
+
+
+def _quantised(
+    fit: Fit,
+    records: Sequence[Record],
+    grid: Grid,
+    before: float,
+    rng: np.random.Generator,
+    whites: Iterator[Floats],
+) -> Iterator[Floats]:
+    """Yield rounding errors of motions with other parameters among those that the recordings leave possible."""
+    joined, scale = join(records, fit.phi), None
     path = joined.angle - np.concatenate(fit.residuals)
 
     def rounded(paths: Floats) -> Floats:
@@ -169,14 +214,19 @@ def _noise_draws(fit: Fit, records: Sequence[Record], rng: np.random.Generator) 
     def followed(values: Floats) -> Floats:
         return values - fit.slopes.without_followed(values)
 
-    # the fit's parameters follow the rounding errors, which are less independent than white noise: the more so, the
-    # longer the motion rests. Errors at another phase in each recording show by how much
-    phase = grid.step * rng.uniform(-0.5, 0.5, (len(records), PHASES))[joined.runs.owner] + path[:, None]
-    size = np.linalg.norm(followed(joined.whiten(rounded(phase + before * white[:, :PHASES]) - phase)))
-    other = rng.standard_normal(white.shape)
-    scale = float(size / np.linalg.norm(followed(other[:, :PHASES])))
-    exact = path[:, None] + scale * followed(other)
-    return joined.whiten(rounded(exact + before * white) - exact), True
+    for white in whites:
+        # the fit's parameters follow the rounding errors, which are less independent than white noise: the more so,
+        # the longer the motion rests. Errors at another phase in each recording show by how much
+        if scale is None:
+            few = white[:, :PHASES]
+            phases = rng.uniform(-0.5, 0.5, (len(records), few.shape[1]))
+            phase = grid.step * phases[joined.runs.owner] + path[:, None]
+            size = np.linalg.norm(followed(joined.whiten(rounded(phase + before * few) - phase)))
+        other = rng.standard_normal(white.shape)
+        if scale is None:
+            scale = float(size / np.linalg.norm(followed(other[:, :PHASES])))
+        exact = path[:, None] + scale * followed(other)
+        yield joined.whiten(rounded(exact + before * white) - exact)
 
 
 def _exponential_scale(p: Floats) -> tuple[float, float]:
@@ -226,7 +276,7 @@ def _p_of_directions(each: Sequence[Direction], residuals: Floats, energy: Float
 
     For white noise in n dimensions the share of the energy in one of them has the distribution Beta(1/2, (n − 1)/2).
     """
-    along = np.stack([direction.change / direction.size for direction in each]) @ residuals
+    along = _times(np.stack([direction.change / direction.size for direction in each]), residuals)
     share = np.minimum(along**2 / energy, 1.0)
     if not each[0].one_sided:
         largest = share.max(axis=0)
@@ -306,8 +356,13 @@ def _p_of_space(basis: Floats, slopes: Slopes, residuals: Floats, energy: Floats
     k = u.shape[1]
     if k == 0:
         return np.ones(residuals.shape[1]), np.zeros(residuals.shape[1])
-    share = np.minimum(np.sum((u.T @ residuals) ** 2, axis=0) / energy, 1.0)
+    share = np.minimum(np.sum(_times(u.T, residuals) ** 2, axis=0) / energy, 1.0)
     return special.betaincc(0.5 * k, 0.5 * (free - k), share), _gain(share, free)
+
+
+def _times(rows: Floats, residuals: Floats) -> Floats:
+    """Return a product with residuals in their precision, without a copy of them in another."""
+    return np.asarray(rows.astype(residuals.dtype) @ residuals, dtype=float)
 
 
 def _portmanteau(residuals: Floats, energy: Floats, records: Sequence[Record]) -> Floats:
@@ -316,9 +371,9 @@ def _portmanteau(residuals: Floats, energy: Floats, records: Sequence[Record]) -
     n = len(residuals)
     total = np.zeros(residuals.shape[1])
     for lag in range(1, LAGS + 1):
-        product = np.zeros(residuals.shape[1])
-        for start, stop in pairwise(edges):
-            part = residuals[start:stop]
-            product += np.sum(part[lag:] * part[:-lag], axis=0)
-        total += n * (n + 2) / (n - lag) * (product / energy) ** 2
+        products = []
+        for block in _blocks(residuals):
+            parts = [block[start:stop] for start, stop in pairwise(edges)]
+            products.append(sum(np.sum(part[lag:] * part[:-lag], axis=0) for part in parts))
+        total += n * (n + 2) / (n - lag) * (np.concatenate(products) / energy) ** 2
     return total

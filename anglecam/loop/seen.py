@@ -127,9 +127,9 @@ def largest_shares(
         one = one * _inverse(np.linalg.norm(one, axis=0), whole[0::2])
         two = two - one * np.sum(one * two, axis=0)
         two = two * _inverse(np.linalg.norm(two, axis=0), whole[1::2])
-        explained = (one.T @ residuals) ** 2 + (two.T @ residuals) ** 2
-        found = np.maximum(found, explained.max(axis=0))
-    energy = np.sum(residuals**2, axis=0)
+        along = [pair.T.astype(residuals.dtype) @ residuals for pair in (one, two)]  # no copy in another precision
+        found = np.maximum(found, (along[0] ** 2 + along[1] ** 2).max(axis=0))
+    energy = np.einsum("ij,ij->j", residuals, residuals, dtype=float)
     return np.minimum(found / np.where(energy > 0.0, energy, 1.0), 1.0)
 
 

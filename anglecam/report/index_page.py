@@ -13,7 +13,7 @@ from urllib.parse import quote
 
 from anglecam.io.session import SERIES_ENDING
 from anglecam.report.document import html_of
-from anglecam.report.origin import Run, now, origin_of
+from anglecam.report.origin import origin_of
 from anglecam.report.page_names import THUMBNAIL_ENDING, page_name
 
 HEADS = (
@@ -50,7 +50,7 @@ def index_html(rows: Sequence[Mapping[str, Any]], folder: Path) -> str:
     return html_of(
         "index.html",
         contents={},
-        made=origin_of((), Run(date=now())),
+        made=origin_of(()),
         images="'self' file: data:",
         rows=[_row(row, folder) for row in rows],
         counts=dict(sorted(Counter(row["status"] for row in rows).items())),

@@ -1,8 +1,7 @@
 """How a page was made: date and command of the run, versions, and the SHA-256 of every input.
 
 Date and command belong to a run on the command line. A batch leaves them out, so that the page of a clip depends on the
-clip and what is declared about it, and a batch that was stopped and resumed gives the same files as one that was not;
-the index of the batch states both.
+clip and what is declared about it, and a batch that was stopped and resumed gives the same files as one that was not.
 """
 
 from __future__ import annotations

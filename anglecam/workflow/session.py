@@ -33,6 +33,10 @@ if TYPE_CHECKING:
     from anglecam.neck.large_angle import LargeAngleNeck
 
 
+MOST_FRAMES = 200_000
+"""Most frames of a session whose loop is closed. The residual test keeps 4 kB for each; with more, it takes hours."""
+
+
 @dataclass(frozen=True)
 class MeasuredSession:
     """A session whose recordings have been measured or read."""
@@ -264,13 +268,17 @@ def close_session(
     Raises
     ------
     AnglecamError
-        As `MeasuredSession.split`, and where no model can be fitted.
+        As `MeasuredSession.split`, where the session has more than `MOST_FRAMES`, and where no model can be fitted.
     """
     from anglecam.identification.identify_records import declared_start
     from anglecam.loop.close import close_records
 
     rig = measured.session.rig
     measured.split(hold_out)
+    frames = sum(len(record.time) for record in measured.records)
+    if frames > MOST_FRAMES:
+        what = f"{frames:,} frames, and a loop can be closed over {MOST_FRAMES:,}"
+        raise InputError(f"{measured.session.directory}: {what}; give fewer or shorter recordings, or a lower rate")
     records = (loop_input(measured) if shown is None else shown).records
     names = list(dict.fromkeys((*rig.held_out, *hold_out)))
     return close_records(records, held_out=names, starts=[declared_start(rig)], progress=progress)

@@ -154,7 +154,7 @@ def test_a_failed_clip_is_measured_again_on_request_or_after_a_change(tmp_path):
     whole = clip.read_bytes()
     clip.write_bytes(b"")
     assert [str(p) for p in run_batch([str(clip)], out, QUIET).problems] == [f"{clip}: empty file"]
-    assert sorted(p.name for p in out.iterdir()) == [".anglecam", "index.csv", "index.parquet"]
+    assert sorted(p.name for p in out.iterdir()) == [".anglecam", "index.csv", "index.html", "index.parquet"]
     clip.write_bytes(whole)
     result = run_batch([str(clip)], out, Options(jobs=1, quiet=True, time_limit=0.001))
     assert [str(p) for p in result.problems] == [f"{clip}: took longer than its time limit of 0.001 s"]

@@ -196,7 +196,7 @@ TRIALS = (
     Trial(mistyped_rig, "mon/rig.yaml: unknown key pivott", "mon/rig.yaml: unknown key pivott"),
     Trial(calibration_missing, "lens.yaml: calibration cannot be read", "lens.yaml: calibration cannot be read"),
     Trial(store_down, "shelf: cannot be read (503: no answer)", "shelf: cannot be read (503: no answer)"),
-    Trial(share_unmounted, "", "tue: is empty, and 1 clips were measured from it", lines=0),
+    Trial(share_unmounted, "", "tue: is empty, although clips were measured from it (1)", lines=0),
     Trial(time_limit, "mon/a.avi: took longer", "mon/a.avi: took longer than its time limit", (MON,), lines=3),
     Trial(clip_replaced_by_garbage, "mon/a.avi: not a readable", "a.avi: not a readable video file", (MON,)),
     Trial(clip_deleted, "", "", (MON,), lines=0),

@@ -14,6 +14,7 @@ from anglecam.batch.run import Options
 from anglecam.batch.run import run_batch as run_here
 from anglecam.errors import RigError
 from support.tiny import batch_command, children, is_alive, results, tiny_clip, tiny_lab, unfinished
+from support.tiny_session import tiny_session
 
 pytestmark = pytest.mark.usefixtures("shared_processes")
 
@@ -75,6 +76,23 @@ def test_a_batch_that_is_killed_and_resumed_gives_the_files_of_one_that_is_not_k
     assert not run_here([str(lab)], out, Options(jobs=1, quiet=True)).problems
     assert results(out) == unbroken
     assert unfinished(out) == []
+
+
+def test_a_batch_that_closes_a_loop_survives_a_kill_and_all_its_processes_end(tmp_path):
+    session, out = tiny_session(tmp_path / "lab" / "neck"), tmp_path / "out"
+    closing = Options(jobs=1, quiet=True, close=True)
+    run_here([str(session)], tmp_path / "unbroken", closing)
+    batch = start(session, "--out", out, "--jobs", 1, "--quiet", "--close")
+    wait_until(lambda: (out / "nod.angles.csv").exists() and list((out / ".anglecam/unfinished").glob("*/*/out")))
+    workers = children(batch.pid)  # the session is being fitted
+    assert workers
+    batch.kill()
+    end_of(batch)
+    wait_until(lambda: not any(map(is_alive, workers)), 5.0)
+    run_here([str(session)], out, closing)
+    assert results(out) == results(tmp_path / "unbroken")
+    assert "model.mat" in results(out)
+    assert "loop.json" in results(out)
 
 
 @pytest.mark.parametrize("sent", [signal.SIGSEGV, signal.SIGKILL])

@@ -7,20 +7,16 @@ import json
 import shutil
 
 import fsspec
-import numpy as np
 import pytest
 
 from anglecam.batch.run import Options, run_batch
 from anglecam.batch.session_job import SessionJob, _inputs
 from anglecam.batch.worker import Settings
-from anglecam.data.series import AngleSeries
-from anglecam.io.series_csv import write_series
 from anglecam.io.session import read_session
 from anglecam.workflow.session import measure_session
 from anglecam.workflow.session_results import write_identified
-from support.motion import Plant
-from support.series import session as make_records
 from support.tiny import tiny_clip, tiny_lab
+from support.tiny_session import tiny_session
 
 pytestmark = pytest.mark.usefixtures("shared_processes")
 
@@ -36,16 +32,9 @@ def lab(made_once, tmp_path):
 @pytest.fixture(scope="module")
 def made_once(tmp_path_factory):
     """Return a folder with one session of four series and a clip, and with a folder that is no session."""
-    folder = tiny_lab(tmp_path_factory.mktemp("made"), ["plain/a.avi", "neck/nod.avi"])
-    (folder / "neck" / "nod.command.csv").write_text("time_s,command_deg\n0,0\n0.1,5\n")
-    for record in make_records(Plant(dead_time_s=0.04), 4):
-        n = len(record.time)
-        series = AngleSeries(record.name, record.time, record.angle, np.full(n, np.radians(0.05)), ("ok",) * n)
-        write_series(series, folder / "neck" / f"{record.name}.angles.csv")
-        rows = np.column_stack([record.command.time, np.degrees(record.command.angle)])
-        text = "\n".join(f"{t:.6f},{u:.6f}" for t, u in rows)
-        (folder / "neck" / f"{record.name}.command.csv").write_text(f"time_s,command_deg\n{text}\n")
-    (folder / "neck" / "rig.yaml").write_text("held_out: [random]\n")
+    folder = tmp_path_factory.mktemp("made")
+    tiny_clip(folder / "plain" / "a.avi")
+    tiny_session(folder / "neck", 1)
     return folder
 
 

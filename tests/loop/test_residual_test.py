@@ -87,6 +87,21 @@ def test_a_disturbance_as_large_as_the_noise_is_found_at_its_frequency(fit, reco
     assert result.further_gain > 0.25 * len(change)
 
 
+def test_long_series_are_tested_in_blocks_of_single_precision_with_the_same_result(fit, records, monkeypatch):
+    noise = SIGMA * np.random.default_rng(4).standard_normal(len(fit.white))
+    noisy = replace(fit, white=fit.slopes.without_followed(noise))
+    chosen = directions(noisy, records, changes(noisy, records, [effect("quadratic_drag"), effect("cogging")]))
+    whole = run_residual_test(noisy, records, chosen, np.random.default_rng(1), 0.0)
+    monkeypatch.setattr(residual_test, "MOST_DOUBLE", 0)
+    monkeypatch.setattr(residual_test, "AT_ONCE", 7 * len(fit.white))
+    parts = run_residual_test(noisy, records, chosen, np.random.default_rng(1), 0.0)
+    found, expected = (
+        [test.p_value for test in result.tests if "effect" not in test.name] for result in (parts, whole)
+    )
+    assert found == pytest.approx(expected, rel=1e-3)  # of the data alone, not of the draws
+    assert parts.p_value == pytest.approx(whole.p_value, abs=0.05)  # with other draws
+
+
 def _change(fit, records, frequency):
     """Return the change by a periodic disturbance, (N,) rad, that the fit cannot follow."""
     (record,), (own,) = records, fit.nuisance

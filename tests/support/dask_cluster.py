@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -14,6 +15,7 @@ from pathlib import Path
 from distributed import Client
 
 _PROGRAM = "from dask.__main__ import main; main()"
+_ENDS_WITH_TEST = f"from anglecam.batch.parent import end_with_parent; end_with_parent({os.getpid()}); "
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ def dask_cluster(folder: Path, versions: Sequence[str | None] = (None, None)) ->
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
 
     def start(program: str, *arguments: object) -> subprocess.Popen[bytes]:
-        return subprocess.Popen([sys.executable, "-c", program, *map(str, arguments)], **quiet)
+        return subprocess.Popen([sys.executable, "-c", _ENDS_WITH_TEST + program, *map(str, arguments)], **quiet)
 
     scheduler = start(
         _PROGRAM, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", file

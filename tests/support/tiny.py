@@ -59,19 +59,11 @@ def run_batch(*arguments: object, **options: object) -> subprocess.CompletedProc
 
 
 def results(out: Path) -> dict[str, bytes]:
-    """Return every file that a batch has written for the user, by its path.
-
-    The index as a page, which states its date, is left out, and the wall times of the table.
-    """
+    """Return every file that a batch has written for the user, by its path; the index without its wall times."""
     found = {}
     for path in sorted(out.rglob("*")):
         inside = path.relative_to(out)
-        if (
-            path.is_file()
-            and inside.parts[0] != ".anglecam"
-            and inside.suffix != ".parquet"
-            and str(inside) != "index.html"
-        ):
+        if path.is_file() and inside.parts[0] != ".anglecam" and inside.suffix != ".parquet":
             found[str(inside)] = path.read_bytes()
     found["index.csv"] = b"\n".join(_without_wall_time(found["index.csv"]))
     return found

@@ -49,6 +49,13 @@ def test_identify_in_python_takes_every_estimator_and_holds_out_by_name(session)
         anglecam.identify(session, "magic")
 
 
+def test_a_loop_over_more_frames_than_can_be_tested_is_refused_before_the_work(session, monkeypatch):
+    monkeypatch.setattr("anglecam.workflow.session.MOST_FRAMES", 479)
+    says = "480 frames, and a loop can be closed over 479; give fewer or shorter recordings, or a lower rate"
+    with pytest.raises(InputError, match=f"^{session}: {says}$"):
+        anglecam.close_loop(session)
+
+
 def test_a_recording_that_does_not_exist_cannot_be_held_out(session):
     with pytest.raises(RigError, match="hold out nobody: no such recording"):
         anglecam.close_loop(session, hold_out=["nobody"])
