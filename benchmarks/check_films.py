@@ -38,7 +38,7 @@ from benchmarks.hostile.draw import DARK, Film, ball, box, room, stick, texture,
 
 LENGTH_S = 6.0
 SUBFRAMES = 5
-"""Instants of which a blurred frame is the mean."""
+"""Instants whose pictures are averaged into a blurred frame."""
 WALL = np.array([176.0, 170.0, 160.0])
 RED = np.array([190.0, 30.0, 35.0])
 SURFACE = texture((90, 150), 50, 3.0, 40.0)

@@ -2,7 +2,7 @@
 
 On Linux the kernel ends the process: `prctl(2)`, ``PR_SET_PDEATHSIG``. The signal arrives even while a library holds
 Python's interpreter lock, as compilation and decoding do for seconds. Elsewhere the process ends when it reads the end
-of its standard input, of which only the parent holds the other end (see `anglecam.batch.serve`); it can then outlive
+of its standard input, whose other end only the parent holds (see `anglecam.batch.serve`); it can then outlive
 its parent by the time that such a library takes.
 """
 

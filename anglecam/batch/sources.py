@@ -36,7 +36,7 @@ class Source:
 
 @dataclass
 class Search:
-    """Which folders a call has searched, so that a clip that is not found can be told from one that is out of reach."""
+    """Which folders a call has searched: a clip may be gone, or its folder out of reach."""
 
     folders: list[str] = field(default_factory=list)
     """Folders that were searched and hold clips."""

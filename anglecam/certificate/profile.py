@@ -270,7 +270,7 @@ def _inflation_at(
 
 
 def _without_bounds(plant: Plant, name: str) -> Plant:
-    """Return a plant of which one parameter has no bounds."""
+    """Return a plant with one parameter unbounded."""
 
     def free(p: Parameter) -> Parameter:
         return replace(p, lower=-math.inf, upper=math.inf) if p.name == name else p

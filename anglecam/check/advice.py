@@ -4,8 +4,8 @@ A position error e turns the line by e/R, with the lever R in pixels. The error 
 
     e ∝ n·√w / (C·√N)       noise n, contrast C (grey levels), width w of the edge, N pixels along it
 
-so a camera that is z times nearer divides the angle's error by z^1.5: R grows by z, and N by z. A body of which the
-largest possible number of tiles is compared shows no more edge pixels, and gains z. Shot noise falls relative to the
+so a camera that is z times nearer divides the angle's error by z^1.5: R grows by z, and N by z. A body that is
+already compared in the largest number of tiles shows no more edge pixels, and gains z. Shot noise falls relative to the
 contrast as the square root of the light. Errors of codec and pixel grid have a size in pixels. Pivot and zero are
 measured in the same pictures and follow the mixture of both.
 """

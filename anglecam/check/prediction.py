@@ -41,7 +41,7 @@ class Prediction:
     highest: float
     """Sigma of the part's surest and least sure frame, rad."""
     sizes: Sizes | None
-    """``None`` where the part shows no motion of which sizes could be predicted."""
+    """``None`` where the part shows too little motion to predict sizes from."""
     why_no_sizes: str | None
     played: Played | None
     advice: tuple[Advice, ...]

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
 from anglecam.cli.json_output import report_file
-from anglecam.cli.options import Out, SessionFolder
+from anglecam.cli.options import HoldOut, Out, SessionFolder
 from anglecam.cli.progress import end, progress_bars
-from anglecam.cli.sessions import _measure
+from anglecam.cli.sessions import measure_recordings
 from anglecam.io.session import read_session
 from anglecam.terminal import screen
 
@@ -17,9 +13,7 @@ from anglecam.terminal import screen
 def certify(
     session: SessionFolder,
     out: Out,
-    hold_out: Annotated[
-        list[str] | None, typer.Option("--hold-out", metavar="NAME", help="A recording to predict only; repeatable.")
-    ] = None,
+    hold_out: HoldOut = None,
 ) -> None:
     """Certify a servo: backlash, friction, dead time, lag, speed and torque limit with 95 % intervals, as one page."""
     from anglecam.report.certificate_page import certificate_table
@@ -28,7 +22,7 @@ def certify(
 
     opened = read_session(session)
     require_recordings(opened, hold_out or ())
-    measured = _measure(opened, out)
+    measured = measure_recordings(opened, out)
     with progress_bars() as bars:
         bar = bars.add_task("", total=None)
         certificate = write_certificate(

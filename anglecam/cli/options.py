@@ -15,4 +15,7 @@ FirstFrame = Annotated[
     int | None, typer.Option("--from", min=0, help="Number of the first frame that is measured; the clip's first is 0.")
 ]
 LastFrame = Annotated[int | None, typer.Option("--to", min=0, help="Number of the last frame that is measured.")]
+HoldOut = Annotated[
+    list[str] | None, typer.Option("--hold-out", metavar="NAME", help="A recording to predict only; repeatable.")
+]
 SessionFolder = Annotated[Path, typer.Argument(metavar="SESSION", help="Folder of clips or *.angles.csv of one rig.")]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from anglecam.cli.json_output import report, report_file
-from anglecam.cli.options import Out, SessionFolder
+from anglecam.cli.options import HoldOut, Out, SessionFolder
 from anglecam.cli.progress import end, progress_bars
 from anglecam.cli.this_run import this_run
 from anglecam.errors import InputError, RigError, printable
@@ -43,7 +43,7 @@ def identify(
         users = " or ".join(f"--estimator {entry.id}" for entry in ESTIMATORS.values() if entry.takes_neck)
         raise RigError(f"--neck {neck}: used by {users} only")
     declared = read_neck(neck).large_angle if takes_neck else None
-    measured = _measure(read_session(session), out)
+    measured = measure_recordings(read_session(session), out)
     model = write_identified(measured, out, estimator, declared)
     screen.print(model_table([model]))
     report_file("model", out / "model.json")
@@ -58,9 +58,7 @@ def identify(
 def close(
     session: SessionFolder,
     out: Out,
-    hold_out: Annotated[
-        list[str] | None, typer.Option("--hold-out", metavar="NAME", help="A recording to predict only; repeatable.")
-    ] = None,
+    hold_out: HoldOut = None,
 ) -> None:
     """Find what the model lacks: loop.json, report.html and, where it helps, the command to play next."""
     from anglecam.report.session_tables import loop_table, model_table
@@ -69,7 +67,7 @@ def close(
 
     opened = read_session(session)
     require_recordings(opened, hold_out or ())
-    measured = _measure(opened, out)
+    measured = measure_recordings(opened, out)
     shown = loop_input(measured)
     if shown.differs:
         errors.print(
@@ -98,7 +96,7 @@ def close(
     end(measured.problems)
 
 
-def _measure(opened: Session, out: Path) -> MeasuredSession:
+def measure_recordings(opened: Session, out: Path) -> MeasuredSession:
     """Measure a session's clips and write their series to ``out``."""
     from anglecam.workflow.session import measure_session
 

@@ -1,4 +1,4 @@
-"""Clock offset and dead time of a session, as far as its recordings tell them apart.
+"""Clock offset and dead time of a session, as far as its recordings distinguish them.
 
 The motion shows the sum d_r = δ_r + τ of a recording's clock offset and the dead time of the mechanism. A delay acts
 alike before and after anything that does not change with time, such as a torque limit or a lag, so no motion separates
@@ -43,7 +43,7 @@ class Clocks:
 
     @property
     def alias(self) -> str:
-        """What the offsets cannot be told apart from, in a sentence."""
+        """What the offsets cannot be distinguished from, in a sentence."""
         if self.dead_time is not None:
             return "a lamp dates the command, so the offsets are those of the clocks alone"
         common = (

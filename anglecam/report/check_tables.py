@@ -38,7 +38,9 @@ def prediction_table(found: Prediction) -> Table:
     terms = {_CAUSES[f.name]: getattr(found.whole, f.name) ** 2 for f in fields(found.whole)}
     shares = sorted(terms.items(), key=lambda item: -item[1])
     total = max(sum(terms.values()), 1e-300)
-    table.add_row("of which", ", ".join(f"{name} {v / total:.0%}" for name, v in shares if v >= 0.01 * total))
+    table.add_row(
+        "shares of its variance", ", ".join(f"{name} {v / total:.0%}" for name, v in shares if v >= 0.01 * total)
+    )
     return table
 
 

@@ -31,7 +31,7 @@ def _page(effect: Effect) -> str:
 | port of the model | {effect.port} |
 | relaxes | {_cell(effect.relaxes)} |
 | can be mistaken for | {aliases or "none"} |
-| record this to tell them apart | {_cell(effect.separating_experiment)} |
+| record this to distinguish them | {_cell(effect.separating_experiment)} |
 | sought in free swings | {"yes" if effect.in_free_swing else "no"} |
 | source | {_cell(effect.source)} |
 

@@ -27,7 +27,7 @@ THINGS = {
 
 @pytest.fixture(scope="module")
 def films(tmp_path_factory):
-    """Film a ball of several sizes, lengths and colours; 165 frames, of which `check` reads 121."""
+    """Film a ball of several sizes, lengths and colours; 165 frames; `check` reads 121 of them."""
     folder = tmp_path_factory.mktemp("films")
     return {name: things.film(folder / f"{name}.avi", draw, SWING_DEG) for name, draw in THINGS.items()}
 
@@ -101,8 +101,8 @@ def status(monkeypatch, capsys):
 def test_the_command_prints_tables_and_writes_its_file(films, tmp_path, status):
     command = tmp_path / "steps.csv"
     command.write_text("time_s,command_deg\n0,0\n1,10\n2.3,-10\n3.7,5\n5,0\n")
-    code, said, told = status("check", films["small"], "--command", command, "--out", tmp_path)
-    assert code == 0, told
+    code, said, err = status("check", films["small"], "--command", command, "--out", tmp_path)
+    assert code == 0, err
     for words in ("sigma of a frame", "what would help", "dead_time", "a mark of twice the diameter"):
         assert words in said
     found = json.loads((tmp_path / "small.check.json").read_text())
@@ -120,15 +120,15 @@ def test_the_command_prints_tables_and_writes_its_file(films, tmp_path, status):
 
 def test_a_clip_in_which_nothing_turns_is_one_line_that_says_what_would_mend_it(tmp_path, status):
     still = things.film(tmp_path / "still.avi", things.ball((190, 30, 35), 10.0), np.zeros(70))
-    code, _, told = status("check", still)
+    code, _, err = status("check", still)
     assert code == 1
-    assert len(told.strip().splitlines()) == 1
-    assert "still.avi" in told
-    assert "rig.yaml" in told or "--from" in told
+    assert len(err.strip().splitlines()) == 1
+    assert "still.avi" in err
+    assert "rig.yaml" in err or "--from" in err
 
 
 def test_a_file_that_is_no_film_is_one_line(tmp_path, status):
     (tmp_path / "no.avi").write_text("no film")
-    code, _, told = status("check", tmp_path / "no.avi")
+    code, _, err = status("check", tmp_path / "no.avi")
     assert code == 1
-    assert len(told.strip().splitlines()) == 1
+    assert len(err.strip().splitlines()) == 1

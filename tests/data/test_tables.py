@@ -19,7 +19,7 @@ from anglecam.io.series_csv import write_series
 
 @pytest.fixture
 def series() -> AngleSeries:
-    """Five frames, the third of which is covered."""
+    """Five frames; the third is covered."""
     gap = np.array([1.0, 1.0, np.nan, 1.0, 1.0])
     return AngleSeries(
         "swing",

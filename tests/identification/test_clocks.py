@@ -1,4 +1,4 @@
-"""Offset and drift of the command's clock from the motion alone, and what tells an offset from a dead time."""
+"""Offset and drift of the command's clock from the motion alone, and what distinguishes an offset from a dead time."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def verdict():
 
 @pytest.fixture(scope="module")
 def report(verdict, tmp_path_factory):
-    """Return the report of recordings, the first of which begins with frame 7 of its film."""
+    """Return the report of recordings; the first begins with frame 7 of its film."""
     path = tmp_path_factory.mktemp("report") / "report.html"
     series = [filmed(r, first_frame=7 if k == 0 else 0) for k, r in enumerate(verdict.fitted)]
     films = {s.name: film_of(numbered) for s in series[:-1]}
