@@ -6,52 +6,57 @@ the batch's output folder. The scheduler runs the door on every worker, also on 
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Callable
 from typing import Any
 
-import cloudpickle  # type: ignore[import-untyped]
 import distributed
 
 from anglecam.batch.worker import Settings
 
 
-class Door(distributed.WorkerPlugin):
-    """Gives an admitted worker a resource of the name of the batch's run.
+def name_of(settings: Settings) -> str:
+    """Return the name of the resource that admitted workers have."""
+    return f"anglecam-{settings.run}"
 
-    Parameters
-    ----------
-    settings : Settings
-        The settings of the batch.
+
+def reason_to_refuse(settings: Settings) -> Callable[[], str | None]:
+    """Return a function that states on a worker why it is refused; ``None`` if it is admitted.
+
+    It is defined here because Dask sends a local function by its content: a worker of another version need not have
+    this module.
     """
+    values = vars(settings)
 
-    def __init__(self, settings: Settings) -> None:
-        self.name = f"anglecam-{settings.run}"
-        self._settings = vars(settings)
-
-    def reason(self) -> str | None:
-        """Return why the worker that calls this is refused; ``None`` if it is admitted."""
+    def reason() -> str | None:
         try:
             from anglecam.batch import worker
 
-            return worker.refusal(worker.Settings(**self._settings))
+            return worker.refusal(worker.Settings(**values))
         except (ImportError, AttributeError, TypeError) as problem:  # no anglecam there, or another version
             return f"another version of anglecam, or none ({problem})"
 
-    async def setup(self, worker: Any) -> None:
-        """Admit a worker, or leave it to other programs."""
-        if self.reason() is None:
-            await worker.set_resources(**{self.name: worker.state.nthreads})
-
-    async def teardown(self, worker: Any) -> None:
-        """Take the resource back at the end of the batch."""
-        if self.name in worker.state.total_resources:
-            await worker.set_resources(**{self.name: 0})
-
-    def refused(self, client: distributed.Client) -> list[str]:
-        """Return a line for each worker that is refused."""
-        reasons = client.run(self.reason)
-        return sorted(f"worker {address} gets no jobs: {why}" for address, why in reasons.items() if why is not None)
+    return reason
 
 
-# the module itself is sent with its objects: a worker of another version need not have it
-cloudpickle.register_pickle_by_value(sys.modules[__name__])
+def door(settings: Settings) -> distributed.WorkerPlugin:
+    """Return the plugin that gives an admitted worker the resource; a local class, for the same reason."""
+    resource, reason = name_of(settings), reason_to_refuse(settings)
+
+    class Door(distributed.WorkerPlugin):
+        name = resource
+
+        async def setup(self, worker: Any) -> None:
+            if reason() is None:
+                await worker.set_resources(**{resource: worker.state.nthreads})
+
+        async def teardown(self, worker: Any) -> None:
+            if resource in worker.state.total_resources:
+                await worker.set_resources(**{resource: 0})
+
+    return Door()
+
+
+def refused(client: distributed.Client, settings: Settings) -> list[str]:
+    """Return a line for each worker that is refused."""
+    reasons = client.run(reason_to_refuse(settings))
+    return sorted(f"worker {address} gets no jobs: {why}" for address, why in reasons.items() if why is not None)

@@ -25,7 +25,7 @@ try:
     from distributed.client import FutureCancelledError
     from distributed.comm import CommClosedError
 
-    from anglecam.batch.dask_door import Door
+    from anglecam.batch.dask_door import door, name_of, refused
 except ImportError as missing:
     raise RigError("--dask: Dask is not installed; pip install 'anglecam[dask]'") from missing
 
@@ -58,7 +58,8 @@ class DaskPool(Generic[Job, Done]):
         self, work: Callable[[Job, MeasuringProcess], Done], address: str, size: int, settings: Settings
     ) -> None:
         self._work = work
-        self._door = Door(settings)
+        self._settings = settings
+        self._resource = name_of(settings)
         self._address = address
         self._size = size
 
@@ -90,9 +91,8 @@ class DaskPool(Generic[Job, Done]):
         RigError
             If all are refused.
         """
-        self._client.register_plugin(self._door, name=self._door.name)
-        refused = self._door.refused(self._client)
-        for line in refused:
+        self._client.register_plugin(door(self._settings), name=self._resource)
+        for line in refused(self._client, self._settings):
             errors.print(f"--dask {self._address}: {line}")
         if not self._admitted():
             self.__exit__()
@@ -102,11 +102,11 @@ class DaskPool(Generic[Job, Done]):
         """Return the number of threads of the workers that get jobs."""
         assert self._client.scheduler is not None
         workers = self._client.sync(self._client.scheduler.identity)["workers"].values()
-        return sum(worker["nthreads"] for worker in workers if self._door.name in worker["resources"])
+        return sum(worker["nthreads"] for worker in workers if self._resource in worker["resources"])
 
     def __exit__(self, *_: object) -> None:
         with contextlib.suppress(Exception):  # the scheduler may be lost
-            self._client.unregister_worker_plugin(self._door.name)
+            self._client.unregister_worker_plugin(self._resource)
         self._client.close()
         if self._cluster is not None:
             self._cluster.close()
@@ -118,7 +118,7 @@ class DaskPool(Generic[Job, Done]):
 
     def start(self, job: Job) -> None:
         """Submit a job to the scheduler."""
-        future = self._client.submit(_do, self._work, job, pure=False, resources={self._door.name: 1})
+        future = self._client.submit(_do, self._work, job, pure=False, resources={self._resource: 1})
         self._started[future.key] = job
         self._done.add(future)
 

@@ -194,12 +194,23 @@ def _profile_once(
     return found, fit_output_error(best.model, records, [start], nuisance=held[lowest].nuisance, phi=best.phi)
 
 
-def _end(deviance: Callable[[float], float], estimate: float, step: float, bound: float, null: float) -> float:
-    """Return the end of the interval on one side, rounded outwards; the null if it is inside, or infinity."""
+def _end(
+    deviance: Callable[[float], float],
+    estimate: float,
+    step: float,
+    bound: float,
+    null: float,
+    inside: float | None = None,
+) -> float:
+    """Return the end of the interval on one side, rounded outwards; the null if it is inside, or infinity.
+
+    ``inside`` is a value that is known to lie in the interval, the estimate by default.
+    """
     side = math.copysign(1.0, step)
     if estimate == bound:
         return bound if bound == null else side * math.inf
-    inside, outside = estimate, bound if bound == null and deviance(bound) > THRESHOLD else None
+    inside = estimate if inside is None else inside
+    outside = bound if bound == null and deviance(bound) > THRESHOLD else None
     if bound == null and outside is None:
         return bound
     while outside is None:
@@ -215,7 +226,8 @@ def _end(deviance: Callable[[float], float], estimate: float, step: float, bound
     for factor in FARTHER if bound != null else ():
         tried = outside + side * factor * reach
         if side * (tried - bound) < 0.0 and deviance(tried) <= THRESHOLD:
-            return _end(deviance, estimate, 2.0 * (tried - estimate), bound, null)
+            # the search goes on from there, or it would meet the same end again
+            return _end(deviance, estimate, 2.0 * (tried - estimate), bound, null, inside=tried)
     return outside
 
 

@@ -71,7 +71,7 @@ class FilmAtRest(Film):
             ]
         )
 
-    def _picture(self, index: int, row: Row) -> Picture:
+    def picture(self, index: int, row: Row) -> Picture:
         move = self.moves[index]
         time, stored = row
         assert self.first is not None

@@ -89,7 +89,8 @@ def judge(read: Reader, path: Path, most_bytes: int | None = None) -> Outcome:
 def _judge_line(refusal: AnglecamError, path: Path) -> Outcome:
     line = str(refusal)
     named = printable(path.name.removesuffix(".angles.csv"))  # a series may be named by its recording
-    if len(line.splitlines()) != 1 or named not in line or "internal error" in line:
+    faults = line.splitlines() if isinstance(refusal, RigError) else [line]  # a file of declarations has several
+    if len(faults) != len(line.splitlines()) or not all(named in one for one in faults) or "internal error" in line:
         return Outcome(FINDING, f"{type(refusal).__name__} says {line!r}")
     cause = line.split(named, 1)[1].strip(": ")
     return Outcome(REFUSED, line) if len(cause) > 5 else Outcome(FINDING, f"no cause in {line!r}")

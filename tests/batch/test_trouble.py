@@ -36,8 +36,8 @@ def test_permission_denied_affects_only_the_clip_or_folder_concerned(tmp_path):
     assert call.returncode == 1
     assert call.stderr.splitlines() == [
         f"{lab}/locked: cannot be searched (Permission denied)",
-        f"{lab}/b.avi: Permission denied",
         f"{lab}/sub/d.avi: the results cannot be written (Permission denied)",
+        f"{lab}/b.avi: Permission denied",
     ]
     assert (out / "a.angles.csv").exists()
     (lab / "locked").chmod(0o700)

@@ -11,7 +11,7 @@ from anglecam.loop.close import close_records
 from benchmarks.check_films import SCATTER, TRUE, plan, session_with
 
 SEEDS = 2
-TRIED = ("dead_time", "quadratic_drag", "backlash")
+TRIED = ("dead_time", "coulomb_friction", "backlash")
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,7 @@ def test_twice_the_smallest_size_is_detected_in_most_and_a_third_of_it_in_few(si
 def test_sizes_grow_with_the_uncertainty(sizes):
     coarse = {one.effect.id: one.size for one in smallest_sizes(plan(), TRUE, 4.0 * SCATTER, 4.0 * SCATTER)}
     assert coarse["dead_time"] == pytest.approx(4.0 * sizes["dead_time"].size, rel=0.3)
-    assert coarse["quadratic_drag"] > 2.0 * sizes["quadratic_drag"].size
+    assert coarse["coulomb_friction"] > 2.0 * sizes["coulomb_friction"].size
 
 
 def test_a_command_that_shows_more_keeps_within_the_limits(sizes):

@@ -339,7 +339,7 @@ def test_measure_takes_tracks_and_draws_on_the_clip_beside(tmp_path, clip, run):
         f"{alone}: its frames have no times: put the clip alone.… in the same folder, or declare marks:"
         " {rate_hz: …} in rig.yaml\n"
     )
-    assert sorted(p.name for p in out.iterdir()) == ["swing.angles.csv", "swing.overlay.mp4", "swing.png"]
+    assert sorted(p.name for p in out.iterdir()) == ["swing.angles.csv", "swing.html", "swing.overlay.mp4", "swing.png"]
     assert "nose (SLEAP)" in said
     status, _, told = run("budget", path, "--out", out)
     assert (status, told) == (1, f"{path}: a budget needs the pictures; give the clip\n")
