@@ -115,7 +115,7 @@ class Summary:
             self._index_problem = f"the index cannot be written ({problem.strerror or problem})"
 
     def problems(self) -> list[AnglecamError]:
-        """Return the problems: of the batch itself, then clips, sessions and the index, each in the order of addresses."""
+        """Return the problems: of the batch, of clips, sessions and the index, each in the order of addresses."""
         found = as_problems(self._troubles)
         for address in sorted(self._clips_here - self._untried):
             record = self._clips[address]

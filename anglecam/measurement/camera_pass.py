@@ -72,6 +72,7 @@ class FilmAtRest(Film):
         )
 
     def picture(self, index: int, row: Row) -> Picture:
+        """Return a row as it would be seen from the camera's first place."""
         move = self.moves[index]
         time, stored = row
         assert self.first is not None

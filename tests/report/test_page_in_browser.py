@@ -207,8 +207,7 @@ def test_a_report_of_ten_thousand_frames_is_small(verdict, tmp_path):
     )  # fmt: skip
     film = film_of(lambda k: rng.integers(0, 255, (480, 640, 3), np.uint8))  # nothing compresses worse
     path = tmp_path / "report.html"
-    write_report(
-        path, "long", long, verdict_as_dict(verdict) | {"effects": []}, None, [filmed(record)], [], [], films={record.name: film}
-    )  # fmt: skip
+    result = verdict_as_dict(verdict) | {"effects": []}
+    write_report(path, "long", long, result, None, [filmed(record)], [], [], films={record.name: film})
     assert len(re.findall('<li class="picture', path.read_text())) == 60
     assert path.stat().st_size < 15e6
