@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 
-from anglecam.batch.parent import end_with_parent
+from anglecam.end_with_parent import end_with_parent
 
 
 def main() -> None:

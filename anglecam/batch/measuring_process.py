@@ -21,7 +21,7 @@ _THREADED_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMBA")
 """Libraries that are limited to one thread, by the prefixes of their environment variables."""
 _STARTER = ThreadPoolExecutor(1, thread_name_prefix="starter")
 """The thread that starts all measuring processes. Linux ends a process with the thread that started it, and this
-thread lasts as long as the program; see `anglecam.batch.parent`.
+thread lasts as long as the program; see `anglecam.end_with_parent`.
 """
 
 

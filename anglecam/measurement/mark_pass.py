@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,10 +20,11 @@ from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig, RigMark
-from anglecam.measurement.body_ahead import BodyAhead, learn_body_ahead
+from anglecam.measurement.body_ahead import BodyAhead, TurnsAhead, learn_body_ahead
 from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.detections import Detections, frame_of_mark, frames_to_keep
-from anglecam.measurement.frame_reading import read_frames
+from anglecam.measurement.frame_reading import Sought, read_frames
+from anglecam.measurement.parallel_reading import read_in_parts, readers_for
 from anglecam.measurement.pivot import HEIGHT_SHARE, find_pivot
 from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.image.noise import pixel_noise
@@ -107,12 +109,15 @@ def detect_mark(
     lens = lens_from_rig(rig, film.size, path)
     sample, samples = _sampled(film, rig, steady, lens)
     noise = pixel_noise([f.image for f in sample.frames if f.image is not None])
-    found = _sought(film, rig, sample, samples, lens) if mark is None else mark
-    if camera is not None and camera.unknown is not None:
-        raise InputError(camera.unknown)
-    body = _body_ahead(film, found, samples, rig, lens) if steady is None else None
-    reading = read_frames(film, found, sample.count, steady, body, progress)
-    time, filmed, shakes = reading.time, reading.regions, reading.moves
+    with readers_for(film) if steady is None else nullcontext() as readers:
+        found = _sought(film, rig, sample, samples, lens) if mark is None else mark
+        if camera is not None and camera.unknown is not None:
+            raise InputError(camera.unknown)
+        body = _body_ahead(film, found, samples, rig, lens) if steady is None else None
+        sought = Sought(found, body, steady)
+        done = None if progress is None else lambda frames: progress(frames, sample.count)
+        reading = read_frames(film, sought, done) if readers is None else read_in_parts(readers, film, sought, done)
+    time, filmed, shakes = reading.time, reading.regions, None if steady is None else tuple(reading.moves)
     candidates = filmed if shakes is None else [_unshaken(r, move) for r, move in zip(filmed, shakes, strict=True)]
     lens, track, marker, pivot, disagreement = _follow(candidates, time, found, samples.stabilised, rig, lens)
     hidden = np.zeros(len(time), bool) if shakes is None else np.array([not move.known for move in shakes])
@@ -154,7 +159,7 @@ def detect_mark(
         size=film.size,
         truncated=film.why_truncated(sample),
         notes=tuple(notes),
-        turns=reading.turns,
+        turns=None if body is None else TurnsAhead(body, reading.begun, reading.turns),
         found=found,
     )
 

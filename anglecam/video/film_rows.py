@@ -155,6 +155,10 @@ class FilmRows:
         else:
             yield from self._read_all()
 
+    def note_intact(self, times: list[float], interlaced: int) -> None:
+        """Note what a reading by others found, in which every picture could be decoded; some rows were kept before."""
+        self._times, self._undecodable, self._interlaced, self._count = times, 0, interlaced, len(times)
+
     def _read_once(self) -> None:
         if not self.is_read:
             for _ in self._read_all():

@@ -1,7 +1,6 @@
 """Any frame of a film, exactly, for somebody who looks at one after another.
 
-A seek may end on a wrong frame. So each picture is identified by its own stamp and not by where a seek ended. A film in
-which one picture is not where its index says is decoded from its start instead, as for measuring.
+A film in which one picture is not where its index says is decoded from its start, as for measuring.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from collections.abc import Iterator
 from threading import Lock
 
 import av
-from av.video.frame import PictureType
 
 from anglecam.data.typing import Floats
 from anglecam.errors import InputError
@@ -20,6 +18,7 @@ from anglecam.video.container import open_container
 from anglecam.video.film import Film
 from anglecam.video.film_rows import picture_bytes
 from anglecam.video.frame_index import FrameIndex, index_frames
+from anglecam.video.from_key import IrregularFilmError, decode_from_key
 from anglecam.video.picture import Picture
 
 _MOST_BYTES = 192 * 2**20
@@ -28,10 +27,6 @@ _NEAR = 8
 """Frames that are decoded on the way to a later one rather than sought."""
 
 _Numbered = tuple[int, av.VideoFrame | None]
-
-
-class _IrregularError(Exception):
-    """A picture is not where the index says."""
 
 
 class FrameReader:
@@ -100,7 +95,7 @@ class FrameReader:
         try:
             if self._decode_to(number):
                 return
-        except (_IrregularError, av.error.FFmpegError):
+        except IrregularFilmError:
             pass
         self._index, self._next = None, -1
         if not self._decode_to(number):
@@ -141,37 +136,8 @@ class FrameReader:
 
     def _from_key(self, index: FrameIndex, number: int) -> Iterator[_Numbered]:
         """Yield the frames from the key frame before one on; raise where one is missing or not what it should be."""
-        key = index.key_before(number)
-        if key is None:
-            raise _IrregularError
         if self._container is None:
             self._container = open_container(self._film.path)
             decoder = self._container.streams.video[0].codec_context
             decoder.thread_type, decoder.thread_count = "FRAME", native_threads()
-        stream, is_avi = self._container.streams.video[0], self._container.format.name == "avi"
-        self._container.seek(key, stream=stream, backward=True)
-        expected: int | None = None
-        started = False
-        for packet in self._container.demux(stream):
-            if is_avi:
-                packet.pts = packet.dts
-            for picture in packet.decode():
-                if (
-                    picture.pts is None or picture.pts < key
-                ):  # shown before the key frame, and perhaps without its reference
-                    continue
-                if not started and not _starts(picture, key):
-                    raise _IrregularError
-                started = True
-                at = index.number_of(picture.pts)
-                if at is None:  # hidden by an edit list
-                    continue
-                if picture.is_corrupt or (expected is not None and at != expected):
-                    raise _IrregularError
-                expected = at + 1
-                yield at, picture
-
-
-def _starts(picture: av.VideoFrame, key: int) -> bool:
-    """Return whether a picture is the key frame with a stamp, and was decoded without any other."""
-    return picture.pts == key and picture.key_frame and picture.pict_type == PictureType.I
+        yield from decode_from_key(self._container, index, number)

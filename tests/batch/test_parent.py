@@ -14,7 +14,7 @@ from support.tiny import is_alive
 
 HOLDS_THE_LOCK = """
 import ctypes, os, sys, threading
-from anglecam.batch.parent import end_with_parent
+from anglecam.end_with_parent import end_with_parent
 end_with_parent(int(sys.argv[1]))
 threading.Thread(target=lambda: (sys.stdin.read(), os._exit(1)), daemon=True).start()
 print(os.getpid(), flush=True)
@@ -45,7 +45,7 @@ def test_a_process_that_holds_the_interpreter_lock_ends_when_its_parent_is_kille
 
 def test_a_process_whose_parent_ended_before_it_could_ask_ends_at_once():
     program = (
-        "import sys; from anglecam.batch.parent import end_with_parent; end_with_parent(int(sys.argv[1])); print(1)"
+        "import sys; from anglecam.end_with_parent import end_with_parent; end_with_parent(int(sys.argv[1])); print(1)"
     )
     found = subprocess.run([sys.executable, "-c", program, "1"], capture_output=True, text=True, check=False)
     assert (found.returncode, found.stdout) == (1, "")

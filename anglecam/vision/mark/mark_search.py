@@ -17,7 +17,8 @@ from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.mark.segment import LARGEST_SHARE, MARGIN_PX, SMALLEST_SHARE, Region, find_regions
 
 Part = tuple[slice, slice]
-_WHOLE_EVERY = 16
+WHOLE_EVERY = 16
+"""In frames whose number is a multiple of this, nothing of the frames before is used."""
 _SAME_AREA = 1.4
 """Largest ratio of the areas of a mark in two frames: light and motion blur change it slowly."""
 _FREE_PX = 8.0
@@ -62,7 +63,9 @@ class MarkSearch:
         list of Region
             The mark alone where it was found where it was expected; else all of the picture, largest first.
         """
-        mark, expected = None, index % _WHOLE_EVERY != 0 and self._last is not None
+        if index % WHOLE_EVERY == 0:
+            self.lose()
+        mark, expected = None, self._last is not None
         if expected:
             mark = self._near(self._last, size, colours_in)  # type: ignore[arg-type]
         jumped = expected and mark is None
@@ -78,7 +81,7 @@ class MarkSearch:
         return regions
 
     def lose(self) -> None:
-        """Forget the last places: a frame could not be decoded."""
+        """Forget the last places."""
         self._last = self._step = None
 
     def _near(self, last: Region, size: tuple[int, int], colours_in: Callable[[Part], Image]) -> Region | None:
