@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import os
 import signal
-from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from threading import Event
 
 import cv2
 from loky import ProcessPoolExecutor
@@ -99,35 +100,39 @@ def read_in_parts(
         Of all frames, equal to that of one process.
     """
     parts = readers.parts
-    waiting, found = deque(range(len(parts))), {}
+    waiting, found, ended = SimpleQueue[int](), {}, Event()
+    for part in range(len(parts)):
+        waiting.put(part)
+    done = progress or (lambda frames: None)
 
-    def take_part(read: Callable[[int], Reading]) -> None:
-        with suppress(IndexError):
-            while True:
-                part = waiting.popleft()
+    def take_parts(read: Callable[[int], Reading]) -> None:
+        try:
+            while not ended.is_set():
+                part = waiting.get_nowait()
                 found[part] = read(part)
+        except Empty:
+            return
+        except BaseException:
+            ended.set()
+            raise
 
     def by_other(part: int) -> Reading:
         return readers.pool.submit(read_part, parts, sought, part).result()
 
     def by_this(part: int) -> Reading:
         reading = read_part(parts, sought, part)
-        if progress is not None:
-            progress(min(sum(len(one.time) for one in found.values()) + len(reading.time), parts.count))
+        done(sum(len(one.time) for one in found.values()) + len(reading.time))
         return reading
 
     try:
         with ThreadPoolExecutor(readers.count) as threads:
-            others = [threads.submit(take_part, by_other) for _ in range(readers.count)]
-            try:
-                take_part(by_this)
-            except BaseException:
-                waiting.clear()
-                raise
+            others = [threads.submit(take_parts, by_other) for _ in range(readers.count)]
+            take_parts(by_this)
             for other in others:
                 other.result()
     except (IrregularFilmError, BrokenProcessPool):
         return read_frames(film, sought, progress)
+    done(parts.count)
     reading = joined([found[part] for part in range(len(parts))])
     film.rows.note_intact(reading.time.tolist(), int(reading.interlaced.sum()))
     return reading

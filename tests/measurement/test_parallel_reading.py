@@ -1,8 +1,7 @@
-"""A film that several processes read gives the same series as one that a single process reads."""
+"""What several processes find in a film is what a single process finds."""
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import signal
 
@@ -11,15 +10,28 @@ import pytest
 
 from anglecam.io.rig import Rig, RigPivot
 from anglecam.measurement import mark_pass, parallel_reading
-from anglecam.measurement.clip import measure_clip
+from anglecam.measurement.frame_reading import read_frames
+from anglecam.measurement.parallel_reading import read_in_parts, readers_for
 from anglecam.video import film_parts, film_rows
 from anglecam.video.from_key import IrregularFilmError
 from anglecam.video.open_film import open_film
 from support.drawn import Look, draw_frames, write_clip
 
-N = 192
+N = 160
 TIME = np.arange(N) / 30
 SWING = 14.0 * np.sin(2 * np.pi * 0.7 * TIME) * np.cos(0.4 * TIME)
+
+
+@pytest.fixture(scope="module")
+def patched():
+    """Let the film be too long to be kept, and two processes share its parts."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(film_rows, "MOST_BYTES", 100 * 640 * 480)
+        patch.setattr(film_parts, "LENGTH", 32)
+        patch.setattr(parallel_reading, "FEWEST", 4)
+        patch.setattr(parallel_reading, "PARTS_EACH", 2)
+        patch.setattr(parallel_reading, "native_threads", lambda: 2)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -29,64 +41,78 @@ def clip(tmp_path_factory):
     return path
 
 
-@pytest.fixture
-def readings(monkeypatch):
-    """Let the film be too long to be kept, two processes share its parts, and note how it was read."""
-    monkeypatch.setattr(film_rows, "MOST_BYTES", 150 * 640 * 480)
-    monkeypatch.setattr(film_parts, "LENGTH", 32)
-    monkeypatch.setattr(parallel_reading, "FEWEST", 4)
-    monkeypatch.setattr(parallel_reading, "PARTS_EACH", 2)
-    monkeypatch.setattr(parallel_reading, "native_threads", lambda: 2)
-    how = []
-    in_parts, alone = parallel_reading.read_in_parts, parallel_reading.read_frames
-    monkeypatch.setattr(mark_pass, "read_in_parts", lambda *args: how.append("in parts") or in_parts(*args))
-    for module in (mark_pass, parallel_reading):
-        monkeypatch.setattr(module, "read_frames", lambda *args: how.append("alone") or alone(*args))
-    return how
-
-
-def _series(clip, progress=None):
+@pytest.fixture(scope="module")
+def found(patched, clip):
+    """Return what a sample of the frames shows, and what two processes find in all of them."""
+    sought = []
     x, y = Look().pivot
-    return measure_clip(open_film(clip), Rig(pivot=RigPivot(near=(x + 5, y - 4))), progress=progress).series
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(mark_pass, "read_in_parts", lambda *args: sought.append(args[2]) or read_in_parts(*args))
+        film = open_film(clip)
+        detections = mark_pass.detect_mark(film, Rig(pivot=RigPivot(near=(x + 5, y - 4))))
+    assert len(sought) == 1
+    assert film.rows.is_read
+    assert film.undecodable == 0
+    return sought[0], detections
+
+
+@pytest.fixture(scope="module")
+def alone(clip, found):
+    film = open_film(clip)
+    film.sample(32)
+    return read_frames(film, found[0])
 
 
 @pytest.fixture
-def alone(clip, readings, monkeypatch):
-    with monkeypatch.context() as one_thread:
-        one_thread.setattr(parallel_reading, "native_threads", lambda: 1)
-        series = _series(clip)
-    assert readings == ["alone"]
-    readings.clear()
-    return series
+def calls(monkeypatch):
+    """Note when one process reads the film."""
+    made = []
+    monkeypatch.setattr(parallel_reading, "read_frames", lambda *args: made.append("alone") or read_frames(*args))
+    return made
+
+
+def _together(clip, sought, progress=None):
+    film = open_film(clip)
+    with readers_for(film) as readers:
+        assert readers is not None
+        return read_in_parts(readers, film, sought, progress)
 
 
 def _equals(one, other):
-    for field in dataclasses.fields(one):
-        a, b = getattr(one, field.name), getattr(other, field.name)
-        if isinstance(a, np.ndarray):
-            np.testing.assert_array_equal(a, b, err_msg=field.name)
+    for name in ("time", "decoded", "repeated", "interlaced", "begun"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+    for ours, theirs in zip(one.turns, other.turns, strict=True):
+        assert (ours.turn, ours.noise) == (theirs.turn, theirs.noise)
+    for ours, theirs in zip(one.regions, other.regions, strict=True):
+        np.testing.assert_array_equal([r.centre_px for r in ours], [r.centre_px for r in theirs])
 
 
-def test_two_processes_measure_what_one_does(clip, alone, readings):
+def test_two_processes_find_what_one_does(found, alone):
+    _, detections = found
+    np.testing.assert_array_equal(detections.time, alone.time)
+    np.testing.assert_array_equal([one.turn for one in detections.turns.found], [one.turn for one in alone.turns])
+    assert np.isfinite(detections.turns.begun).all()
+    assert detections.status.count("ok") == N
+
+
+def test_progress_ends_with_all_frames(clip, found, alone, calls):
     done = []
-    together = _series(clip, lambda frames, of: done.append((frames, of)))
-    assert readings == ["in parts"]
-    assert together.ok.sum() == N
-    _equals(together, alone)
-    assert done[-1] == (N, N)
+    _equals(_together(clip, found[0], done.append), alone)
+    assert done[-1] == N
     assert done == sorted(done)
+    assert not calls
 
 
-def test_where_a_part_is_irregular_one_process_reads_the_film(clip, alone, readings, monkeypatch):
+def test_where_a_part_is_irregular_one_process_reads_the_film(clip, found, alone, calls, monkeypatch):
     def irregular(*_):
         raise IrregularFilmError
 
     monkeypatch.setattr(parallel_reading, "read_part", irregular)
-    _equals(_series(clip), alone)
-    assert readings == ["in parts", "alone"]
+    _equals(_together(clip, found[0]), alone)
+    assert calls == ["alone"]
 
 
-def test_where_a_process_dies_one_process_reads_the_film(clip, alone, readings, monkeypatch):
+def test_where_a_process_dies_one_process_reads_the_film(clip, found, alone, calls, monkeypatch):
     this, read = os.getpid(), parallel_reading.read_part
 
     def die_elsewhere(*args):
@@ -95,21 +121,28 @@ def test_where_a_process_dies_one_process_reads_the_film(clip, alone, readings, 
         return read(*args)
 
     monkeypatch.setattr(parallel_reading, "read_part", die_elsewhere)
-    _equals(_series(clip), alone)
-    assert readings == ["in parts", "alone"]
+    _equals(_together(clip, found[0]), alone)
+    assert calls == ["alone"]
 
 
-def test_a_measurement_that_is_stopped_leaves_no_process(clip, readings, monkeypatch):
-    pools = []
-    start = parallel_reading.ProcessPoolExecutor
-    monkeypatch.setattr(
-        parallel_reading, "ProcessPoolExecutor", lambda *args, **keys: pools.append(start(*args, **keys)) or pools[-1]
-    )
-
-    def stop(frames, of):
+def test_a_reading_that_is_stopped_leaves_no_process(clip, found):
+    def stop(frames):
         raise KeyboardInterrupt
 
+    film = open_film(clip)
+    pools = []
+
+    def read():
+        with readers_for(film) as readers:
+            pools.append(readers.pool)
+            read_in_parts(readers, film, found[0], stop)
+
     with pytest.raises(KeyboardInterrupt):
-        _series(clip, stop)
-    assert pools
+        read()
     assert not pools[0]._processes
+
+
+def test_one_thread_reads_alone(clip, patched, monkeypatch):
+    monkeypatch.setattr(parallel_reading, "native_threads", lambda: 1)
+    with readers_for(open_film(clip)) as readers:
+        assert readers is None
