@@ -71,8 +71,10 @@ class FilmRows:
         Which frames are measured: only these are yielded.
     independent : bool
         Whether each picture is decoded without the others, so that some can be left out.
-    declared_bytes : int
-        Memory of all pictures, as many as the container states; 0 where that is not to be relied on.
+    declared : int
+        Number of rows that the container states; 0 where that is not to be relied on.
+    bytes_each : int
+        Memory of a decoded picture.
     decode_keys : callable, optional
         Decodes the rows, those alone with a picture that need no other.
     """
@@ -83,12 +85,14 @@ class FilmRows:
         decode: Callable[[Wants | None], Iterator[Row]],
         wanted: RigFrames | None = None,
         independent: bool = False,
-        declared_bytes: int = 0,
+        declared: int = 0,
+        bytes_each: int = 0,
         decode_keys: Callable[[], Iterator[Row]] | None = None,
     ) -> None:
         self.wanted = RigFrames() if wanted is None else wanted
         self.first = self.wanted.first or 0
-        self._path, self._decode, self._independent, self._declared_bytes = path, decode, independent, declared_bytes
+        self._path, self._decode, self._independent = path, decode, independent
+        self._declared, self._bytes_each = declared, bytes_each
         self._decode_keys = decode_keys
         self._times: list[float] | None = None
         self._undecodable = self._interlaced = self._count = 0
@@ -128,7 +132,7 @@ class FilmRows:
         """The rows that are kept."""
         if self._kept is None:
             # where they are more than are kept for sure, the others are not decoded
-            if self._declared_bytes > MOST_BYTES:
+            if self._declared * self._bytes_each > MOST_BYTES:
                 self._keep_some()
             if self._kept is None:
                 self._read_once()
@@ -181,8 +185,12 @@ class FilmRows:
     def _keep_some(self) -> None:
         """Keep evenly spaced rows without decoding all of them, where the codec allows it."""
         if self._independent:
-            kept = KeptRows()
-            self._kept, (self._count, _) = kept, _keep(kept, self._decoded(kept.wants))
+            kept = KeptRows(stride=self._expected_stride())
+            count, _ = _keep(kept, self._decoded(kept.wants))
+            if kept.stride > 1 and len(kept.rows) < self._room() / 4:  # there are fewer than the container states
+                kept = KeptRows()
+                count, _ = _keep(kept, self._decoded(kept.wants))
+            self._kept, self._count = kept, count
         elif self._decode_keys is not None:
             kept = KeptRows(stride=2)
             try:
@@ -191,6 +199,18 @@ class FilmRows:
                 return
             if gap <= _LARGEST_GAP * count / (MOST_SPREAD / 2):
                 self._kept, self._count = kept, count
+
+    def _expected_stride(self) -> int:
+        """Return the spacing of the rows that will be kept if there are as many as declared."""
+        last = self._declared if self.wanted.last is None else min(self._declared, self.wanted.last + 1)
+        stride = 1
+        while (last - self.first) / stride > self._room():
+            stride *= 2
+        return stride
+
+    def _room(self) -> int:
+        """Return how many rows of a long film are kept at most."""
+        return min(MOST_SPREAD, max(MOST_BYTES // max(self._bytes_each, 1), _FEWEST))
 
     def _decoded(self, wants: Wants | None) -> Iterator[Row]:
         some = None if wants is None or not self._independent else lambda number: wants(number - self.first)

@@ -57,9 +57,9 @@ def open_film(path: Path, frames: RigFrames | None = None) -> Film:
         picture = _first_picture(decode_container(path, container))
         independent = stream.codec_context.name in INTRA_CODECS
         cut_short = is_cut_short(path)
-        declared_bytes = 0 if cut_short else declared * picture_bytes(picture)
+        count = 0 if cut_short else declared
         keys = partial(decode_keys, path) if may_skip(container) else None
-        rows = FilmRows(path, partial(decode, path), wanted, independent, declared_bytes, keys)
+        rows = FilmRows(path, partial(decode, path), wanted, independent, count, picture_bytes(picture), keys)
         return _film(path, stream, picture, size, form, rows, declared, cut_short)
 
 
