@@ -2,8 +2,8 @@
 
     θ̈ = c·u − a·θ̇ − b·θ + C·sin(n·θ + ψ)
 
-n is the number of periods in one turn of the body. With fewer than two periods over the range of the motion nothing
-repeats, and the torque is a curve that a spring can have as well.
+n is the number of periods in one turn of the body. With fewer than two periods over the range in which the body usually
+moves nothing repeats there, and the torque is a curve that a spring can have as well.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from anglecam.effects.effect import Effect, Parameter, Values
 from anglecam.effects.seen import Seen, sines_and_cosines
 
 FEWEST, MOST = 2.0, 16.0
-"""Periods over the range of the motion between which the residual is searched."""
+"""Periods over the usual range of the motion between which the residual is searched."""
 PER_PERIOD = 5
 """Numbers that are tried for each period more over the range."""
 
@@ -33,8 +33,9 @@ def _numbers(seen: Seen) -> Floats:
 
 
 def _one_period(seen: Seen) -> float:
-    """Return the number of periods in one turn of which one fills the range of the motion."""
-    return math.tau / max(seen.high - seen.low, 1e-3)
+    """Return the number of periods in one turn of which one fills the usual range of the motion."""
+    low, high = seen.usual
+    return math.tau / max(high - low, 1e-3)
 
 
 def _searched(seen: Seen) -> list[Floats]:
@@ -50,8 +51,8 @@ def _starts(seen: Seen) -> list[Values]:
 
 
 def _possible(parameters: Values, abc: Values, motion: Values) -> bool:
-    """Return whether the torque repeats itself within the motion; one period is any curved torque."""
-    return parameters[1] * (motion[1] - motion[0]) >= FEWEST * math.tau
+    """Return whether the torque repeats itself within the usual motion; one period is any curved torque."""
+    return parameters[1] * (motion[3] - motion[2]) >= FEWEST * math.tau
 
 
 EFFECT = Effect(

@@ -199,8 +199,8 @@ class Effect:
     opposite: str = ""
     """What happens where the effect's size is below its null; empty if ``summary`` holds for both signs."""
     possible: Callable[[Values, Values, Values], bool] = field(default=lambda values, abc, motion: True, repr=False)
-    """(parameters, (a, b, c), (lowest, highest angle, rad)) → whether they describe this effect at all; a fit elsewhere
-    is some other cause."""
+    """(parameters, (a, b, c), (lowest and highest angle, limits of the usual angles, rad)) → whether they describe this
+    effect at all; a fit elsewhere is some other cause."""
 
     def with_fixed(self, values: Mapping[str, float]) -> Effect:
         """Return the effect with more parameters fixed: ``values`` by name, SI; itself if none of them is named."""

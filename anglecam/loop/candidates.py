@@ -12,6 +12,7 @@ from scipy import special
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.effects import Effect
+from anglecam.effects.seen import usual_range
 from anglecam.identification.fit import Fit
 from anglecam.identification.output_error import first_state, fit_best_start, fit_output_error, output_error
 from anglecam.loop.cross_validation import Prediction, predict_held_out
@@ -337,7 +338,7 @@ def is_possible(fit: Fit, records: Sequence[Record]) -> bool:
     abc = np.zeros(3)
     abc[: plant.base_count] = fit.parameters[: plant.base_count]
     predicted = np.concatenate([r.angle - left for r, left in zip(records, fit.residuals, strict=True)])
-    motion = float(predicted.min()), float(predicted.max())
+    motion = float(predicted.min()), float(predicted.max()), *usual_range(predicted)
     return effect.possible(tuple(effect.complete(fit.parameters[first:]).tolist()), tuple(abc.tolist()), motion)
 
 

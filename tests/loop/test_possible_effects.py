@@ -35,3 +35,20 @@ def test_what_yields_more_than_the_bodys_own_springs_is_no_stop(stiffness, possi
     assert is_possible(at, records) is possible
     delayed = replace(at, model=Plant((effect("dead_time"),)), parameters=np.array([26.0, 524.0, 508.0, 0.1]))
     assert is_possible(delayed, records)
+
+
+@pytest.mark.parametrize(("periods", "possible"), [(1.9, False), (2.1, True)])
+def test_cogging_repeats_itself_within_the_usual_motion_and_not_only_within_its_extremes(periods, possible):
+    record = session(TruePlant(), 0)[0]
+    fit = fit_output_error(Plant(), [record], [np.array([26.0, 524.0, 508.0])])
+    usual, n = np.radians(10.0), len(record.time)
+    angle = np.linspace(-usual / 0.9, usual / 0.9, n)  # nine tenths of it are within ±10°
+    angle[[0, -1]] = -4.0 * usual, 4.0 * usual
+    number = periods * 2.0 * np.pi / (2.0 * usual)
+    at = replace(
+        fit,
+        model=Plant((effect("cogging"),)),
+        parameters=np.array([26.0, 524.0, 508.0, 1.0, number, 0.0]),
+        residuals=(np.zeros(n),),
+    )
+    assert is_possible(at, [replace(record, angle=angle)]) is possible
