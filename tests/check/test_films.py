@@ -11,6 +11,7 @@ import pytest
 
 from anglecam.check.sigma_terms import SPREAD
 from anglecam.cli import app as cli
+from anglecam.errors import InputError
 from anglecam.workflow.check import MOST, check_clip
 from anglecam.workflow.clip import measure_source, open_source
 from support import things
@@ -125,6 +126,15 @@ def test_a_clip_in_which_nothing_turns_is_one_line_that_says_what_would_mend_it(
     assert len(err.strip().splitlines()) == 1
     assert "still.avi" in err
     assert "rig.yaml" in err or "--from" in err
+
+
+def test_no_advice_on_filming_is_given_for_a_file_that_cannot_be_read(films, monkeypatch):
+    def lost(source, progress):
+        raise InputError("large.avi: Input/output error") from OSError(5, "Input/output error")
+
+    monkeypatch.setattr("anglecam.workflow.check.measure_source", lost)
+    with pytest.raises(InputError, match=r"^large\.avi: Input/output error$"):
+        check_clip(films["large"])
 
 
 def test_a_file_that_is_no_film_is_one_line(tmp_path, status):
