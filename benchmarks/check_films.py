@@ -5,8 +5,8 @@
 *films*: drawn pendulums and plates (`benchmarks.hostile.draw`) with one trait changed at a time. The prediction from
 the first 4 s is compared with sigma and error of the whole film of 6 s. *factors*: pairs of films that differ by one of
 the changes that are advised; the predicted factor on sigma is compared with the ratio of the sigmas. *sizes*: simulated
-sessions with an effect of 2 and of 0.3 times the predicted smallest size; how many the loop detects. NAME limits *films*
-to those with these names.
+sessions with an effect of 2 and of 0.3 times the predicted smallest size; how many the loop detects. NAME limits the
+films to those with these names.
 """
 
 from __future__ import annotations
