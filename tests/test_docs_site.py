@@ -67,7 +67,7 @@ def test_every_link_and_picture_leads_to_a_file(site):
 
 def test_the_notebook_was_executed(site):
     page = (site / "tutorials" / "notebook.html").read_text()
-    assert "60 of 60" in page
+    assert "40 of 40" in page
     assert list((site / "tutorials").glob("notebook-*.png"))
 
 
