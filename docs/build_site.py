@@ -54,6 +54,8 @@ def build(out: Path) -> Path:
     shutil.rmtree(pages, ignore_errors=True)
     for source in sorted(DOCS.rglob("*.md")):
         _copy(source, pages / source.relative_to(DOCS), pages)
+    for picture in (*DOCS.glob("*.jpg"), *DOCS.glob("*.webp")):
+        shutil.copyfile(picture, pages / picture.name)
     for name, target in PROJECT.items():
         if target != "index.md":
             _copy(ROOT / name, pages / target, pages)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import av
 import numpy as np
-import typer
 from typer.testing import CliRunner
 
-from anglecam.cli.app import app as anglecam
+from anglecam.cli.app import app
 from anglecam.workflow.self_test import write_film
-from synth.cli import app as synth
 
 ROOT = Path(__file__).resolve().parents[2]
 SPECS = ("demo", "hard-scene", "paper-neck", "quadratic-drag")
@@ -27,15 +27,17 @@ def draw(folder: Path) -> None:
         work = Path(name)
         _stick(work, folder)
         for verb, picture in (("response", "step"), ("kinematics", "linkage")):
-            _run(anglecam, "neck", verb, "--out", work)
+            _run("neck", verb, "--out", work)
             (work / f"{picture}.png").replace(folder / f"{picture}.png")
-    _run(synth, "gallery", *(ROOT / f"configs/{spec}.yaml" for spec in SPECS), "--out", folder)
+    specs = (ROOT / f"configs/{spec}.yaml" for spec in SPECS)
+    synth = Path(sys.executable).with_name("synth")  # a process of its own: its workers import what it imports
+    subprocess.run([synth, "gallery", *specs, "--out", folder], check=True, capture_output=True)
 
 
 def _stick(work: Path, folder: Path) -> None:
     time = np.arange(40) / 30.0
     write_film(work / "stick.mkv", np.radians(12.0) * np.exp(-time) * np.cos(2.0 * np.pi * 1.5 * time))
-    _run(anglecam, "measure", work / "stick.mkv", "--out", work, "--overlay")
+    _run("measure", work / "stick.mkv", "--out", work, "--overlay")
     (work / "stick.png").replace(folder / "stick.png")
     with av.open(str(work / "stick.overlay.mp4")) as film:
         frames = film.decode(video=0)
@@ -43,8 +45,8 @@ def _stick(work: Path, folder: Path) -> None:
         picture.to_image(width=3 * picture.width, height=3 * picture.height).save(folder / "stick-overlay.png")
 
 
-def _run(program: typer.Typer, *arguments: object) -> None:
-    """Run a command in this process: starting another one costs seconds of imports."""
-    done = CliRunner().invoke(program, [str(one) for one in arguments], catch_exceptions=False)
+def _run(*arguments: object) -> None:
+    """Run a command of anglecam in this process, which has imported it already."""
+    done = CliRunner().invoke(app, [str(one) for one in arguments], catch_exceptions=False)
     if done.exit_code:
         raise SystemExit(done.output)
