@@ -9,13 +9,14 @@ import sys
 import numpy as np
 import pytest
 
-from anglecam.check.sigma_terms import SPREAD
 from anglecam.cli import app as cli
 from anglecam.errors import InputError
 from anglecam.workflow.check import MOST, check_clip
 from anglecam.workflow.clip import measure_source, open_source
 from support import things
 
+LIKE = 1.5
+"""Factor on sigma: these films go on as they begin, and hold their prediction better than others."""
 TIME = np.arange(165) / things.RATE_HZ
 SWING_DEG = 25.0 * np.exp(-0.1 * TIME) * np.cos(2.0 * np.pi * 0.8 * TIME)
 THINGS = {
@@ -39,11 +40,11 @@ def predictions(films):
 
 
 @pytest.mark.parametrize("name", THINGS)
-def test_sigma_of_the_whole_film_is_predicted_within_the_stated_spread(films, predictions, name):
+def test_sigma_of_the_whole_film_is_predicted(films, predictions, name):
     series = measure_source(open_source(films[name])).series
     ok, found = series.ok, predictions[name]
     achieved = float(np.sqrt(np.mean(series.sigma[ok] ** 2)))
-    assert 1.0 / SPREAD < found.whole.sigma / achieved < SPREAD
+    assert 1.0 / LIKE < found.whole.sigma / achieved < LIKE
     error = (series.angle - np.radians(SWING_DEG))[ok]
     assert np.std(error) < 2.0 * found.whole.sigma
     assert found.frames_read == 121
