@@ -15,7 +15,7 @@ from anglecam.cli.app import app
 from anglecam.workflow.self_test import write_film
 
 ROOT = Path(__file__).resolve().parents[2]
-SPECS = ("demo", "hard-scene", "paper-neck", "quadratic-drag")
+SPECS = ("demo", "hard-scene")
 """Specs whose first frames are shown."""
 SHOWN_FRAME = 20
 
