@@ -77,7 +77,7 @@ def _copy(source: Path, target: Path, pages: Path) -> None:
     """Copy a page; its links to files of the repository become links to pages of the site."""
 
     def linked(match: re.Match[str]) -> str:
-        text, address, anchor = match.groups()
+        text, address, anchor = match.groups("")
         if address.startswith("http"):
             return match.group(0)
         return f"[{text}]({_relative(_on_site((source.parent / address).resolve()), target, pages)}{anchor})"
