@@ -1,11 +1,12 @@
 """Compares what `anglecam check` predicts of films and sessions with what is achieved.
 
-    .venv/bin/python -m benchmarks.check_films [films] [factors] [sizes]
+    .venv/bin/python -m benchmarks.check_films [films] [factors] [sizes] [NAME ...]
 
 *films*: drawn pendulums and plates (`benchmarks.hostile.draw`) with one trait changed at a time. The prediction from
 the first 4 s is compared with sigma and error of the whole film of 6 s. *factors*: pairs of films that differ by one of
 the changes that are advised; the predicted factor on sigma is compared with the ratio of the sigmas. *sizes*: simulated
-sessions with an effect of 2 and of 0.3 times the predicted smallest size; how many the loop detects.
+sessions with an effect of 2 and of 0.3 times the predicted smallest size; how many the loop detects. NAME limits the
+films to those with these names.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import math
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from importlib.metadata import version
@@ -175,12 +176,12 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def films() -> None:
-    """Print predicted and achieved sigma of every film."""
+def films(names: Sequence[str] = ()) -> None:
+    """Print predicted and achieved sigma of every film, or of those named."""
     print("| film | sigma predicted, ° | achieved, ° | ratio | error, ° RMS | predicted ÷ error | exposure, ms | s |")
     print("| --- " * 8 + "|")
     ratios = []
-    for trait in FILMS:
+    for trait in (t for t in FILMS if not names or t.name in names):
         try:
             one = run(trait)
         except AnglecamError as problem:
@@ -294,8 +295,10 @@ def sizes(seeds: int = 5) -> None:
 def main() -> None:
     """Print the tables that are asked for."""
     print(f"anglecam {version('anglecam')}, {date.today():%d %B %Y}\n")
-    for name, table in (("films", films), ("factors", factors), ("sizes", sizes)):
-        if not sys.argv[1:] or name in sys.argv[1:]:
+    asked = sys.argv[1:]
+    tables = {"films": lambda: films([a for a in asked if a not in tables]), "factors": factors, "sizes": sizes}
+    for name, table in tables.items():
+        if not asked or name in asked:
             print(f"{name}\n")
             table()
             print()

@@ -54,6 +54,8 @@ def build(out: Path) -> Path:
     shutil.rmtree(pages, ignore_errors=True)
     for source in sorted(DOCS.rglob("*.md")):
         _copy(source, pages / source.relative_to(DOCS), pages)
+    for picture in (*DOCS.glob("*.jpg"), *DOCS.glob("*.webp")):
+        shutil.copyfile(picture, pages / picture.name)
     for name, target in PROJECT.items():
         if target != "index.md":
             _copy(ROOT / name, pages / target, pages)
@@ -75,7 +77,7 @@ def _copy(source: Path, target: Path, pages: Path) -> None:
     """Copy a page; its links to files of the repository become links to pages of the site."""
 
     def linked(match: re.Match[str]) -> str:
-        text, address, anchor = match.groups()
+        text, address, anchor = match.groups("")
         if address.startswith("http"):
             return match.group(0)
         return f"[{text}]({_relative(_on_site((source.parent / address).resolve()), target, pages)}{anchor})"

@@ -43,7 +43,7 @@ def test_every_page_is_there_with_its_title(site):
 
 
 def test_no_page_fetches_anything_from_elsewhere(site):
-    fetched = re.compile(r"""<(?:script|img|iframe|link)\\b[^>]*?\\b(?:src|href)=["']?(https?:)?//[^"'> ]+""")
+    fetched = re.compile(r"""<(?:script|img|iframe|link)\b[^>]*?\b(?:src|href)=["']?(?:https?:)?//[^"'> ]+""")
     outside = [
         path.name
         for path in site.rglob("*.html")
@@ -67,8 +67,8 @@ def test_every_link_and_picture_leads_to_a_file(site):
 
 def test_the_notebook_was_executed(site):
     page = (site / "tutorials" / "notebook.html").read_text()
-    assert "60 of 60" in page
-    assert (site / "tutorials").glob("notebook-*.png")
+    assert "40 of 40" in page
+    assert list((site / "tutorials").glob("notebook-*.png"))
 
 
 def test_functions_and_types_are_documented(site):

@@ -18,6 +18,10 @@ LAG_WITHOUT_LAMP = (
     "No lamp in the picture shows the first change of the command: if the clock of the command is late against that of "
     "the angle, the lag is larger by about as much."
 )
+NOT_NAMED = (
+    "The verdict does not name its effect, which may be absent: up to 5 % of the intervals exclude an absent effect by "
+    "chance."
+)
 ONE_AT_A_TIME = "Dead time and a lag of the same length act almost alike: this is the interval with no {other}."
 
 
@@ -62,7 +66,8 @@ def statement(one: Certified, clock_shared: bool = False) -> str:
 
 def aliases(one: Certified, certificate: Certificate) -> list[str]:
     """Return what could be mistaken for a quantity in these recordings, a sentence each."""
-    notes, lamp = [], certificate.clock.lamp
+    notes = [NOT_NAMED] if one.state == "measured" and not one.accepted else []
+    lamp = certificate.clock.lamp
     named = {e.id for e in effects_of(certificate.verdict.after)}
     if one.rivals:
         listed = ", ".join(_plain(rival) for rival in one.rivals)

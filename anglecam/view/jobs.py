@@ -91,7 +91,8 @@ class Jobs:
     @property
     def running(self) -> JobState | None:
         """The job that runs."""
-        return next((state for state in self._states.values() if state.status == "running"), None)
+        with self._lock:  # a job that starts meanwhile adds to the states
+            return next((state for state in self._states.values() if state.status == "running"), None)
 
     def cancel(self, job: int) -> JobState:
         """End a job; files that it has finished stay, and unfinished ones are removed."""

@@ -83,6 +83,8 @@ def check_clip(
         try:
             measured = measure_source(open_recording(path, part, filmed_with), progress=progress)
         except InputError as problem:
+            if isinstance(problem.__cause__, OSError):  # the file is at fault, and not what it shows
+                raise
             raise InputError(f"{problem}{_what_would_mend(str(problem))}") from problem
         assert isinstance(measured, Measurement)  # a film is no file of tracks
         if measured.few or measured.other_thing:

@@ -216,6 +216,15 @@ def _stick(_: Path) -> list[Shape]:
     return [_at("cube", (0.0, 6.5, 0.0), (0.55, 7.5, 0.4), _diffuse((0.33, 0.33, 0.34)))]
 
 
+def _ruler(_: Path) -> list[Shape]:
+    """Return a wooden ruler on a screw, with a red dot at its lower end."""
+    return [
+        _at("cube", (0.0, -7.5, 0.0), (0.75, 9.2, 0.2), _diffuse((0.62, 0.47, 0.28))),
+        _at("disk", (0.0, -15.0, 0.21), (0.62, 0.62, 1), _diffuse((0.62, 0.03, 0.04))),
+        _at("disk", (0.0, 0.0, 0.21), (0.45, 0.45, 1), _diffuse((0.04, 0.04, 0.05))),
+    ]
+
+
 def _on_ring(radius: float, around: float, scale: Sequence[float], rgb: Sequence[float]) -> Shape:
     """Return a block at an angle ``around`` (rad, clockwise from the top), turned to face the hub."""
     place = (radius * np.sin(around), radius * np.cos(around), 0.0)
@@ -249,6 +258,11 @@ SCENES: dict[str, Scene] = {
             "wheel", 100, lambda t: 150.0 * t + 20.0 * np.sin(2 * np.pi * 0.7 * t), (334.2, 251.8), (0.0, 8.0, 0.0),
             _wheel, _only(_wall(-12.0, (0.42, 0.45, 0.48), 0.2, 42)), _ABOVE, (236, 154, 432, 350), 25,
             Camera(distance=110.0),
+        ),
+        Scene(
+            "ruler", 60, swing(24.0, 0.95, 2.2), (239.6, 62.3), (0.0, -15.0, 0.21), _ruler,
+            _hung(_wall(-12.0, (0.40, 0.45, 0.50), 0.18, 43)), _ABOVE, (310, 200, 340, 250), 36,
+            Camera((480, 360), 110.0, 15.5),
         ),
         _ball_scene("ball_white", lambda: _diffuse((0.8, 0.8, 0.78)), 1.5, (301.2, -31.4), 32),
         _ball_scene("ball_grey", lambda: _diffuse((0.22, 0.22, 0.22)), 1.8, (342.9, 88.6), 33),

@@ -18,7 +18,7 @@ def render(notebook: Path, folder: Path) -> None:
     """Execute a notebook and write it as a page with its pictures; an error in a cell is an error here."""
     content = nbformat.read(notebook, as_version=4)
     kernel = AsyncKernelManager(kernel_name="python3", transport="ipc")
-    NotebookClient(content, timeout=SECONDS, km=kernel).execute()
+    NotebookClient(content, timeout=SECONDS, km=kernel).execute(cleanup_kc=True)
     parts: list[str] = []
     for number, cell in enumerate(content.cells):
         if cell.cell_type == "markdown":

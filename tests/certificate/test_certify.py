@@ -12,7 +12,7 @@ import pytest
 
 from anglecam.certificate.certificate_json import certificate_as_dict
 from anglecam.certificate.certify import Clock, certify
-from anglecam.certificate.statement import statement
+from anglecam.certificate.statement import NOT_NAMED, aliases, statement
 from anglecam.io.files import json_text
 from anglecam.loop.close import close_records
 from support.motion import Plant, Recording
@@ -79,6 +79,14 @@ def test_sliding_and_breakaway_friction_are_measured():
         assert low < math.degrees(true) < high
         assert entry(certificate, quantity).state == "measured"
     assert interval(certificate, "coulomb_friction")[1] < 1.15 * math.degrees(2.0)
+
+
+def test_a_size_whose_effect_the_verdict_does_not_name_may_be_chance():
+    certificate = certified(LATE)
+    late = entry(certificate, "dead_time")
+    assert NOT_NAMED not in aliases(late, certificate)
+    assert NOT_NAMED in aliases(replace(late, accepted=False), certificate)
+    assert NOT_NAMED not in aliases(entry(certificate, "backlash"), certificate)  # bounded
 
 
 def test_with_a_lamp_the_dead_time_is_the_servos_and_includes_the_lamps_uncertainty():

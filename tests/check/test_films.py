@@ -9,12 +9,14 @@ import sys
 import numpy as np
 import pytest
 
-from anglecam.check.sigma_terms import SPREAD
 from anglecam.cli import app as cli
+from anglecam.errors import InputError
 from anglecam.workflow.check import MOST, check_clip
 from anglecam.workflow.clip import measure_source, open_source
 from support import things
 
+LIKE = 1.5
+"""Factor on sigma: these films go on as they begin, and hold their prediction better than others."""
 TIME = np.arange(165) / things.RATE_HZ
 SWING_DEG = 25.0 * np.exp(-0.1 * TIME) * np.cos(2.0 * np.pi * 0.8 * TIME)
 THINGS = {
@@ -38,11 +40,11 @@ def predictions(films):
 
 
 @pytest.mark.parametrize("name", THINGS)
-def test_sigma_of_the_whole_film_is_predicted_within_the_stated_spread(films, predictions, name):
+def test_sigma_of_the_whole_film_is_predicted(films, predictions, name):
     series = measure_source(open_source(films[name])).series
     ok, found = series.ok, predictions[name]
     achieved = float(np.sqrt(np.mean(series.sigma[ok] ** 2)))
-    assert 1.0 / SPREAD < found.whole.sigma / achieved < SPREAD
+    assert 1.0 / LIKE < found.whole.sigma / achieved < LIKE
     error = (series.angle - np.radians(SWING_DEG))[ok]
     assert np.std(error) < 2.0 * found.whole.sigma
     assert found.frames_read == 121
@@ -125,6 +127,15 @@ def test_a_clip_in_which_nothing_turns_is_one_line_that_says_what_would_mend_it(
     assert len(err.strip().splitlines()) == 1
     assert "still.avi" in err
     assert "rig.yaml" in err or "--from" in err
+
+
+def test_no_advice_on_filming_is_given_for_a_file_that_cannot_be_read(films, monkeypatch):
+    def lost(source, progress):
+        raise InputError("large.avi: Input/output error") from OSError(5, "Input/output error")
+
+    monkeypatch.setattr("anglecam.workflow.check.measure_source", lost)
+    with pytest.raises(InputError, match=r"^large\.avi: Input/output error$"):
+        check_clip(films["large"])
 
 
 def test_a_file_that_is_no_film_is_one_line(tmp_path, status):

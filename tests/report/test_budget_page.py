@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from functools import partial
 from html import unescape
 
 import numpy as np
 import pytest
 from rich.console import Console
 
+from anglecam.budget.gum import propagate
 from anglecam.io.command_csv import read_command
 from anglecam.io.rig import read_rig
 from anglecam.measurement.clip import measure_clip
@@ -18,15 +20,20 @@ from anglecam.report.figure8 import touching_point
 from anglecam.video.open_film import open_film
 from support.drawn import Look, Recording, draw_session
 
+TRIALS = 100_000
+"""Of the Monte Carlo, which `tests/budget` tests in full: up to four million would take most of the time here."""
+
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("nod <b>")
-    clips = [Recording("stairs", "stairs", duration_s=2.5, amplitude_deg=12.0)]
+    clips = [Recording("stairs", "stairs", duration_s=1.5, amplitude_deg=12.0)]
     truth = draw_session(folder, look=Look(), recordings=clips, seed=4, rig={"pixel_error_px": [6, 10, 3]})["stairs"]
     rig, command = read_rig(folder / "rig.yaml"), read_command(folder / "stairs.command.csv")
     measured = measure_clip(open_film(truth.clip), rig, command)
-    budget = write_budget(open_film(truth.clip), measured, rig, folder / "out")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("anglecam.budget.clip.propagate", partial(propagate, most=TRIALS))
+        budget = write_budget(open_film(truth.clip), measured, rig, folder / "out")
     return budget, measured, folder / "out"
 
 
