@@ -26,7 +26,7 @@ LOOK = Look()
 SECONDS, RATE_HZ = 10.0, 30
 FIRST = 75
 """Frames that are written at once: enough to learn from."""
-PATIENCE_S = 120.0
+PATIENCE_S = 240.0
 """For learning, on a machine that does other things besides."""
 
 
@@ -68,7 +68,7 @@ class _Writer:
                 if not packet.size:
                     continue
                 if number > FIRST and time.monotonic() - began < PATIENCE_S:
-                    self.learnt.wait(0.2)
+                    self.learnt.wait(1.0)
                     time.sleep(0.02)
                 packet.stream = copy
                 target.mux(packet)
