@@ -154,9 +154,8 @@ class DaskPool(Generic[Job, Done]):
             try:
                 done: Done = future.result()
             except distributed.scheduler.KilledWorker:
-                self.start(
-                    job
-                )  # several workers were lost with it; a job cannot end its worker, so the cause lies elsewhere
+                # several workers were lost with it; a job cannot end its worker, so the cause lies elsewhere
+                self.start(job)
                 continue
             except (CancelledError, FutureCancelledError, CommClosedError) as fault:
                 raise InputError(
