@@ -1,13 +1,38 @@
-"""The program of a measuring process: ``python -m anglecam.batch.child PARENT``, with the process id of its parent.
+"""The program of a measuring process: ``python child.py PARENT``, with the process id of its parent.
 
-It loads the libraries that measure, which takes a second, only when it is certain to end with its parent.
+It ends when its parent ends, however the parent ends: by itself, by a crash, or by SIGKILL. On Linux the kernel ends
+it: `prctl(2)`, ``PR_SET_PDEATHSIG``. The signal arrives even while a library holds Python's interpreter lock, as
+compilation and decoding do for seconds. Elsewhere the process ends when it reads the end of its standard input, whose
+other end only the parent holds (see `anglecam.batch.serve`); it can then outlive its parent by the time that such a
+library takes.
+
+The file is run by its path and loads nothing of the package before its request to the kernel: on a busy machine, these
+imports take seconds, during which the process would outlive its parent.
 """
 
 from __future__ import annotations
 
+import ctypes
+import os
+import signal
 import sys
 
-from anglecam.batch.parent import end_with_parent
+_PR_SET_PDEATHSIG = 1
+"""Number of the request in ``linux/prctl.h``."""
+
+
+def end_with_parent(parent: int) -> None:
+    """Have the kernel end this process with the thread that started it, where the kernel can.
+
+    Parameters
+    ----------
+    parent : int
+        Process id of the parent. If it has ended already, this process ends at once.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL))
+    if os.getppid() != parent:  # it ended before the request
+        os._exit(1)
 
 
 def main() -> None:

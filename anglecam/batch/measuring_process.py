@@ -17,11 +17,13 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from anglecam.batch import child
+
 _THREADED_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMBA")
 """Libraries that are limited to one thread, by the prefixes of their environment variables."""
 _STARTER = ThreadPoolExecutor(1, thread_name_prefix="starter")
 """The thread that starts all measuring processes. Linux ends a process with the thread that started it, and this
-thread lasts as long as the program; see `anglecam.batch.parent`.
+thread lasts as long as the program; see `anglecam.batch.child`.
 """
 
 
@@ -122,7 +124,7 @@ class MeasuringProcess:
 
 def _start() -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [sys.executable, "-P", "-m", "anglecam.batch.child", str(os.getpid())],
+        [sys.executable, "-P", child.__file__, str(os.getpid())],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,  # decoders write messages there that the index reports once

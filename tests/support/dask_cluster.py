@@ -15,7 +15,7 @@ from pathlib import Path
 from distributed import Client
 
 _PROGRAM = "from dask.__main__ import main; main()"
-_ENDS_WITH_TEST = f"from anglecam.batch.parent import end_with_parent; end_with_parent({os.getpid()}); "
+_ENDS_WITH_TEST = f"from anglecam.batch.child import end_with_parent; end_with_parent({os.getpid()}); "
 
 
 @dataclass(frozen=True)
