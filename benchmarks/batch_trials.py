@@ -1,6 +1,6 @@
 """What becomes of good results when something goes wrong in a first batch or in a second one.
 
-    PYTHONPATH=tests .venv/bin/python benchmarks/batch_trials.py
+    PYTHONPATH=tests .venv/bin/python benchmarks/batch_trials.py [trouble ...]
 
 Each row is one run of the command on the clips and with the trouble of `tests/support/batch_trials.py`. Files are
 compared byte by byte with those of a batch without trouble, of the clip as it was or as it is after its bytes have
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import sys
 import tempfile
 from datetime import date
 from pathlib import Path
@@ -53,14 +54,15 @@ def shortened(line: str, lab: Lab, out: Path) -> str:
     return re.sub(r"tcp://[\d.]+:\d+", "tcp://HOST:PORT", re.sub(r"process \d+ on [^)]+", "process N on HOST", line))
 
 
-def main() -> None:
-    """Run every trial and print the table."""
+def main(names: list[str]) -> None:
+    """Run the trials of these names, or all, and print the table."""
     with tempfile.TemporaryDirectory() as folder:
         top = Path(folder)
         lab = make_lab(top)
         print(f"{date.today():%d %B %Y}; {len(good(lab.out))} good files of 3 clips\n")
         print(f"| {' | '.join(COLUMNS)} |\n|{' --- |' * len(COLUMNS)}")
-        for trial in TRIALS:
+        trials = {trial.cause.__name__: trial for trial in TRIALS}
+        for trial in [trials[name] for name in names or trials]:
             for second in (False, True):
                 out = top / f"{trial.cause.__name__}-{second}" / "out"
                 out.parent.mkdir()
@@ -68,4 +70,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])
