@@ -50,7 +50,7 @@ def row(trial: Trial, lab: Lab, out: Path, *, second: bool) -> list[str]:
 
 def shortened(line: str, lab: Lab, out: Path) -> str:
     """Return a line with the folders' names in place of temporary paths, and without addresses that vary."""
-    line = line.replace(str(lab.folder), "LAB").replace(str(out), "OUT")
+    line = re.sub(r"_do-[0-9a-f-]+ ", "", line.replace(str(lab.folder), "LAB").replace(str(out), "OUT"))
     return re.sub(r"tcp://[\d.]+:\d+", "tcp://HOST:PORT", re.sub(r"process \d+ on [^)]+", "process N on HOST", line))
 
 
