@@ -67,8 +67,9 @@ def results(out: Path) -> dict[str, bytes]:
         if path.is_file() and inside.parts[0] != ".anglecam":
             found[str(inside)] = path.read_bytes()
     found["index.csv"] = b"\n".join(_without_wall_time(found["index.csv"]))
-    table = parquet.read_table(io.BytesIO(found["index.parquet"]))
-    found["index.parquet"] = repr(table.drop_columns("wall_time_s").to_pydict()).encode()
+    if "index.parquet" in found:  # too large for a disk that is nearly full
+        table = parquet.read_table(io.BytesIO(found["index.parquet"]))
+        found["index.parquet"] = repr(table.drop_columns("wall_time_s").to_pydict()).encode()
     return found
 
 
