@@ -4,6 +4,10 @@ On Linux the kernel ends the process: `prctl(2)`, ``PR_SET_PDEATHSIG``. The sign
 Python's interpreter lock, as compilation and decoding do for seconds. Elsewhere the process ends when it reads the end
 of its standard input, whose other end only the parent holds (see `anglecam.batch.serve`); it can then outlive
 its parent by the time that such a library takes.
+
+As a program, ``python end_with_parent.py PARENT MODULE`` makes this request and then runs a module. It is run by its
+path and loads nothing of the package before: on a busy machine, these imports take seconds, during which the process
+would outlive its parent.
 """
 
 from __future__ import annotations
@@ -29,3 +33,10 @@ def end_with_parent(parent: int) -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, int(signal.SIGKILL))
     if os.getppid() != parent:  # it ended before the request
         os._exit(1)
+
+
+if __name__ == "__main__":
+    end_with_parent(int(sys.argv[1]))
+    from runpy import run_module
+
+    run_module(sys.argv[2], run_name="__main__")

@@ -13,17 +13,20 @@ repeatedly.
   clip with one job divided by that of the plain loop, minus one. Both include starting Python and writing the index.
 - Memory: resident size of the batch's process, without its measuring processes, when a tenth, half and all of the clips
   are done.
-- Kills: a batch with two jobs is killed with SIGKILL at random instants, uniformly distributed over the time that a
-  batch takes without kills. Every second time, one of its measuring processes is killed first. The batch is repeated
-  with `--retry-failed` until it ends by itself. All its files, except for wall times, are then compared byte by byte
-  with those of the batch that was not killed. This is repeated until the number of kills is reached.
-- Sessions: the same kills of a batch with ``--close`` of two sessions, each of four series and a tiny clip. After each
-  kill, the time until the last process of the batch is gone is measured.
+- Kills: a batch with two jobs is killed with SIGKILL at random instants, uniformly distributed over the CPU time that a
+  batch takes without kills, so that other work on the machine does not move them towards the start. Every second time,
+  one of its measuring processes is killed first. The batch is repeated with `--retry-failed` until it ends by itself.
+  All its files, except for wall times, are then compared byte by byte with those of the batch that was not killed. This
+  is repeated until the number of kills is reached.
+- Processes: after each kill, the time until the last process that the batch had started is gone. One that is left
+  after five seconds is counted.
+- Sessions: the same kills of a batch with ``--close`` of two sessions, each of two series and a tiny clip.
 """
 
 from __future__ import annotations
 
 import csv
+import math
 import os
 import random
 import shutil
@@ -42,6 +45,8 @@ from support.tiny import batch_command, children, is_alive, results, unfinished
 from support.tiny_session import tiny_session
 
 CLIPS, FEW, KILLS = 1_000, 60, 20
+PATIENCE_S = 5.0
+"""Time after a kill in which every process of the batch must be gone."""
 SIZE, FRAMES, DIFFERENT = (320, 240), 30, 10
 SINGLE = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
 
@@ -116,29 +121,54 @@ def overhead(out: Path, took: float, jobs: int) -> float:
 
 
 def killed_and_resumed(lab: Path, unbroken: Path, out: Path, kills: int, span: float, *options: str) -> str:
-    """Kill a batch repeatedly, let it end by itself, and return how its files compare."""
+    """Kill a batch repeatedly, let it end by itself, and return how its files compare; ``span`` is CPU time, in s."""
     rng, expected = random.Random(7), results(unbroken)
     ends, gone_after = 0, []
     differing: set[str] = set()
     while len(gone_after) < kills or out.exists():
-        patience = rng.uniform(0.0, span) if len(gone_after) < kills else None
+        limit = rng.uniform(0.0, span) if len(gone_after) < kills else math.inf
         command = batch_command(lab, "--out", out, "--jobs", 2, "--quiet", "--retry-failed", *options)
         running = subprocess.Popen(command, stderr=subprocess.DEVNULL)
-        try:
-            status = running.wait(patience)
-        except subprocess.TimeoutExpired:
+        spent = run_until(running, limit)
+        if running.returncode is None:
             gone_after.append(kill(running, worker_first=bool(len(gone_after) % 2), rng=rng))
+            done = len(list(out.rglob("*.angles.csv"))), len(list(out.rglob("loop.json")))
+            print(
+                f"kill {len(gone_after)} after {spent:.1f} s of CPU time, {done[0]} clips and {done[1]} loops in place",
+                flush=True,
+            )
             continue
-        found = results(out)
+        found, status = results(out), running.returncode
         differing |= {name for name in found.keys() | expected.keys() if found.get(name) != expected.get(name)}
         differing |= set(unfinished(out)) | ({f"status {status}"} if status != (1 if options else 0) else set())
         ends += 1
+        print(f"ended by itself with status {status}; {len(differing)} files differ", flush=True)
         shutil.rmtree(out)
     same = "equal byte by byte each time" if not differing else f"differing: {', '.join(sorted(differing)[:5])}"
+    left = sum(math.isinf(time) for time in gone_after)
     return (
-        f"{len(gone_after)} kills, every process gone after {max(gone_after, default=0.0):.2f} s at most; "
+        f"{len(gone_after)} kills, a process left after {PATIENCE_S:g} s: {left} times; "
+        f"all gone after {max(gone_after, default=0.0):.2f} s at most; "
         f"the batch then ended by itself {ends} times; {len(expected)} files, {same}"
     )
+
+
+def run_until(running: subprocess.Popen[bytes], limit: float) -> float:
+    """Wait until a batch ends or its processes have spent this CPU time; return the time that was seen last, in s."""
+    spent = 0.0
+    while running.poll() is None and spent < limit:
+        spent = max(spent, sum(map(cpu_seconds, (running.pid, *descendants(running.pid)))))
+        time.sleep(0.02)
+    return spent
+
+
+def cpu_seconds(pid: int) -> float:
+    """Return the CPU time of a process, in s; 0 if it is gone."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def kill(running: subprocess.Popen[bytes], *, worker_first: bool, rng: random.Random) -> float:
@@ -147,30 +177,42 @@ def kill(running: subprocess.Popen[bytes], *, worker_first: bool, rng: random.Ra
     Returns
     -------
     float
-        Time in s until the last of its processes is gone.
+        Time in s until the last of the processes below it is gone; infinite if one is left after `PATIENCE_S`.
     """
     workers = children(running.pid)
     if worker_first and workers:
         os.kill(rng.choice(workers), signal.SIGKILL)
         time.sleep(rng.uniform(0.0, 0.2))
-    workers = children(running.pid)
+    below = descendants(running.pid)
     running.kill()
     began = time.perf_counter()
     running.wait()
-    while any(map(is_alive, workers)):
+    while any(map(is_alive, below)):
+        if time.perf_counter() - began > PATIENCE_S:
+            return math.inf
         time.sleep(0.001)
     return time.perf_counter() - began
+
+
+def descendants(pid: int) -> list[int]:
+    """Return the ids of all processes below a process."""
+    try:
+        below = children(pid)
+    except OSError:  # it has just ended
+        return []
+    return below + [process for child in below for process in descendants(child)]
 
 
 def killed_sessions(top: Path, kills: int) -> None:
     """Print how a batch that closes loops survives being killed."""
     lab, unbroken = top / "lab", top / "unbroken"
     for seed, name in enumerate(("mon", "tue")):
-        tiny_session(lab / name, seed)
-    began = time.perf_counter()
-    subprocess.run(batch_command(lab, "--out", unbroken, "--jobs", 2, "--quiet", "--close"), check=False)
-    span = time.perf_counter() - began
-    print(f"two sessions with --close: {span:.0f} s")
+        tiny_session(lab / name, seed, ("steps", "random"))
+    for out in (top / "warm", unbroken):  # the first run compiles the kernels
+        command = batch_command(lab, "--out", out, "--jobs", 2, "--quiet", "--close")
+        span = run_until(subprocess.Popen(command, stderr=subprocess.DEVNULL), math.inf)
+    same = "equal" if results(top / "warm") == results(unbroken) else "different"
+    print(f"two sessions with --close: {span:.0f} s of CPU time; two undisturbed runs: {same} files", flush=True)
     print(killed_and_resumed(lab, unbroken, top / "killed", kills, span, "--close"))
 
 
@@ -195,7 +237,8 @@ def main() -> None:
         print(f"overhead by the clips' wall times: {overhead(top / 'one', one, 1):.1%} with one job, ", end="")
         print(f"{overhead(top / 'two', two, 2):.1%} with two; over the plain loop {one / clips / plain - 1.0:.1%}")
         print(f"memory when a tenth, half, all are done: {', '.join(f'{size:.0f}' for size in sizes)} MB")
-        span, _ = batch(few, top / "unbroken", 2)
+        command = batch_command(few, "--out", top / "unbroken", "--jobs", 2, "--quiet")
+        span = run_until(subprocess.Popen(command), math.inf)
         print(killed_and_resumed(few, top / "unbroken", top / "killed", kills, span))
 
 

@@ -58,5 +58,5 @@ def door(settings: Settings) -> distributed.WorkerPlugin:
 
 def refused(client: distributed.Client, settings: Settings) -> list[str]:
     """Return a line for each worker that is refused."""
-    reasons = client.run(reason_to_refuse(settings))
+    reasons = client.run(reason_to_refuse(settings), on_error="return")  # a worker may end before it answers
     return sorted(f"worker {address} gets no jobs: {why}" for address, why in reasons.items() if why is not None)

@@ -11,6 +11,7 @@ import contextlib
 import logging
 import re
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from typing import Any, Generic, TypeVar
@@ -33,7 +34,8 @@ Job = TypeVar("Job")
 Done = TypeVar("Done")
 
 _WAIT_S = 60.0
-"""Time limit for reaching the scheduler, and for its first worker to be there, in s."""
+"""Time limit for reaching the scheduler, for its first worker, and then for the first that is admitted, in s."""
+_ASK_AGAIN_S = 0.5
 
 _idle: list[MeasuringProcess] = []
 _lock = threading.Lock()
@@ -78,25 +80,41 @@ class DaskPool(Generic[Job, Done]):
             self._client.wait_for_workers(1, timeout=_WAIT_S)
         except (OSError, ValueError, TimeoutError) as problem:
             raise RigError(f"--dask {self._address}: no scheduler with a worker there ({_line(problem)})") from problem
-        self._open_door()
+        try:
+            self._open_door()
+        except BaseException:
+            self.__exit__()
+            raise
         self._started: dict[Any, Job] = {}
         self._done = distributed.as_completed(loop=self._client.loop)
         return self
 
     def _open_door(self) -> None:
-        """Admit workers, now and whenever one joins; report each that is refused.
+        """Admit workers, now and whenever one joins; wait for the first, and report each that is refused.
 
         Raises
         ------
         RigError
-            If all are refused.
+            If none is admitted in time.
         """
         self._client.register_plugin(door(self._settings), name=self._resource)
-        for line in refused(self._client, self._settings):
-            errors.print(f"--dask {self._address}: {line}")
+        reported = self._report_refused(frozenset())
         if not self._admitted():
-            self.__exit__()
-            raise RigError(f"--dask {self._address}: no worker there can do the jobs of this batch")
+            errors.print(f"--dask {self._address}: waiting up to {_WAIT_S:g} s for another worker")
+        until = time.monotonic() + _WAIT_S
+        while not self._admitted():
+            if time.monotonic() > until:
+                raise RigError(f"--dask {self._address}: no worker there can do the jobs of this batch")
+            time.sleep(_ASK_AGAIN_S)
+            reported = self._report_refused(reported)
+
+    def _report_refused(self, reported: frozenset[str]) -> frozenset[str]:
+        """Report the workers that are refused, each once; return all lines reported so far."""
+        lines = refused(self._client, self._settings)
+        for line in lines:
+            if line not in reported:
+                errors.print(f"--dask {self._address}: {line}")
+        return reported | frozenset(lines)
 
     def _admitted(self) -> int:
         """Return the number of threads of the workers that get jobs."""
@@ -136,9 +154,8 @@ class DaskPool(Generic[Job, Done]):
             try:
                 done: Done = future.result()
             except distributed.scheduler.KilledWorker:
-                self.start(
-                    job
-                )  # several workers were lost with it; a job cannot end its worker, so the cause lies elsewhere
+                # several workers were lost with it; a job cannot end its worker, so the cause lies elsewhere
+                self.start(job)
                 continue
             except (CancelledError, FutureCancelledError, CommClosedError) as fault:
                 raise InputError(

@@ -17,6 +17,8 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from anglecam import end_with_parent
+
 _THREADED_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMBA")
 """Libraries that are limited to one thread, by the prefixes of their environment variables."""
 _STARTER = ThreadPoolExecutor(1, thread_name_prefix="starter")
@@ -122,7 +124,7 @@ class MeasuringProcess:
 
 def _start() -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [sys.executable, "-P", "-m", "anglecam.batch.child", str(os.getpid())],
+        [sys.executable, "-P", end_with_parent.__file__, str(os.getpid()), "anglecam.batch.serve"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,  # decoders write messages there that the index reports once

@@ -15,27 +15,26 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
-from anglecam.batch.address import is_of_one_process, join, parent, stem
+from anglecam.batch.address import is_of_one_process, parent
 from anglecam.batch.clip_job import ClipJob, run_clip_job
 from anglecam.batch.database import RecordDatabase
 from anglecam.batch.local_pool import LocalPool
 from anglecam.batch.lock import locked, start_run
 from anglecam.batch.measuring_process import MeasuringProcess
 from anglecam.batch.output_folder import OutputFolder
-from anglecam.batch.output_paths import assign_clip_paths, assign_session_folders
+from anglecam.batch.plan import Plan, out_of_reach, plan_jobs
 from anglecam.batch.progress import Log, ProgressDisplay, open_log, show_progress
 from anglecam.batch.prune import Pruned, is_stale, prune
 from anglecam.batch.publish import Finished, publish, recover
 from anglecam.batch.records import ClipRecord, SessionRecord
 from anglecam.batch.row import Row
-from anglecam.batch.session_job import SessionJob, find_sessions, run_session_job
+from anglecam.batch.session_job import SessionJob, run_session_job
 from anglecam.batch.sources import Search, Source, find_sources
 from anglecam.batch.summary import Summary
 from anglecam.batch.trouble import Trouble
 from anglecam.batch.worker import Settings
-from anglecam.errors import AnglecamError, InputError, RigError
+from anglecam.errors import AnglecamError, RigError
 from anglecam.io.rig import read_rig
-from anglecam.io.session import CORRECTED
 from anglecam.terminal import make_folder
 
 Job = ClipJob | SessionJob
@@ -138,7 +137,7 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
             retry_failed=options.retry_failed,
             time_limit=options.time_limit,
         )
-        plan = _plan(sources, search, earlier, database.read_all(SessionRecord), options)
+        plan = plan_jobs(sources, search, earlier, database.read_all(SessionRecord), close=options.close)
         with contextlib.suppress(OSError):  # such as a full disk
             database.save(*plan.removed)
         summary = Summary(folder, run, plan.earlier, plan.earlier_sessions, plan.sessions)
@@ -153,74 +152,7 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
             finally:
                 summary.write_index()
         folder.clear_unfinished()
-    return Result(summary.rows(), (*problems, *_out_of_reach(search, earlier), *summary.problems()), tuple(pruned))
-
-
-@dataclass(frozen=True)
-class Plan:
-    """The jobs of a batch, and what earlier batches have left."""
-
-    clips: tuple[ClipJob, ...]
-    sessions: tuple[SessionJob, ...]
-    earlier: tuple[ClipRecord, ...]
-    """Records by earlier batches that the index shows, of the clips of this batch and of clips elsewhere."""
-    earlier_sessions: tuple[SessionRecord, ...]
-    removed: tuple[ClipRecord, ...]
-    """Records of clips that were in a folder of this batch and are no longer there."""
-
-
-def _plan(
-    sources: Sequence[Source],
-    search: Search,
-    records: Sequence[ClipRecord],
-    session_records: Sequence[SessionRecord],
-    options: Options,
-) -> Plan:
-    here = {source.address for source in sources}
-    before = {record.address: record for record in records}
-    elsewhere = [r for r in records if r.address not in here]
-    elsewhere = [replace(r, removed=r.removed or search.has_reached(r.address)) for r in elsewhere]
-    # a clip that is no longer there has a row as long as its results are in place
-    shown = [r for r in elsewhere if not r.removed or r.in_place is not None]
-    sessions = _plan_sessions(sources, session_records, options)
-    in_session = {clip for job in sessions for clip in job.clips}
-    holders = {r.in_place.output_path: r.address for r in records if r.in_place is not None}
-    for job in sessions:  # the loop writes series there from which it has removed the camera's effects
-        for clip in job.clips:
-            corrected = "/".join(filter(None, (job.output_path, CORRECTED, stem(clip))))
-            holders.setdefault(corrected, join(join(job.address, CORRECTED), stem(clip)))
-    paths = assign_clip_paths(sources, holders)
-    clips = tuple(ClipJob(s.address, paths[s.address], s.address in in_session, before.get(s.address)) for s in sources)
-    earlier = (*(r for r in records if r.address in here), *shown)
-    removed = tuple(r for r in elsewhere if r != before[r.address])
-    return Plan(clips, sessions, earlier, tuple(session_records), removed)
-
-
-def _plan_sessions(
-    sources: Sequence[Source], records: Sequence[SessionRecord], options: Options
-) -> tuple[SessionJob, ...]:
-    before = {record.address: record for record in records}
-    earlier = {record.address: record.in_place for record in records if record.in_place is not None}
-    found = find_sessions(sources)
-    holders = {record.output_path: address for address, record in earlier.items()}
-    folders = assign_session_folders([(folder, root) for folder, root, _ in found], holders)
-    # a verdict is not replaced by a model without one
-    closed = {address for address, record in earlier.items() if record.verdict is not None}
-    return tuple(
-        SessionJob(folder, folders[folder], clips, options.close or folder in closed, before=before.get(folder))
-        for folder, _, clips in found
-    )
-
-
-def _out_of_reach(search: Search, records: Sequence[ClipRecord]) -> list[AnglecamError]:
-    """Return a problem for every empty folder from which clips were measured."""
-    found: list[AnglecamError] = []
-    for folder in search.empty:
-        lost = sum(r.address.startswith(join(folder, "")) and r.in_place is not None for r in records)
-        if lost:
-            what = f"is empty, although clips were measured from it ({lost}); is it mounted?"
-            found.append(InputError(f"{folder}: {what} Their results stay as they were"))
-    return found
+    return Result(summary.rows(), (*problems, *out_of_reach(search, earlier), *summary.problems()), tuple(pruned))
 
 
 def _prune(

@@ -180,3 +180,7 @@ def _listen(requests: queue.SimpleQueue[dict[str, Any]]) -> None:
     for line in sys.stdin:
         requests.put(json.loads(line))
     os._exit(1)
+
+
+if __name__ == "__main__":
+    serve()

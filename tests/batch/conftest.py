@@ -1,6 +1,6 @@
 """Measuring processes that several batches share, for tests in which processes do not matter.
 
-Starting a measuring process takes as long as measuring several tiny clips, and `anglecam.batch.child` keeps nothing
+Starting a measuring process takes as long as measuring several tiny clips, and `anglecam.batch.serve` keeps nothing
 between requests. Only batches in the test's process share; batches that are processes, and Dask's workers, start
 measuring processes as a user's do. Tests of how the processes of a batch in the test's process start, die and are
 replaced do not ask for `shared_processes`.

@@ -89,13 +89,31 @@ def test_a_missing_scheduler_is_reported_in_one_line(tmp_path, monkeypatch):
         run_batch([str(lab)], tmp_path / "out", Options(jobs=1, quiet=True, dask="tcp://127.0.0.1:9"))
 
 
-def test_a_scheduler_with_workers_of_other_versions_only_is_refused_and_names_them(tmp_path, capfd):
+def test_a_scheduler_with_workers_of_other_versions_only_is_refused_and_names_them(tmp_path, capfd, monkeypatch):
+    monkeypatch.setattr("anglecam.batch.dask_pool._WAIT_S", 1.0)
     lab = tiny_lab(tmp_path / "lab", ["a.avi"])
     with dask_cluster(tmp_path, ["9.9.9"]) as cluster:
         refused = rf"^--dask {cluster.address}: no worker there can do the jobs of this batch$"
         with pytest.raises(RigError, match=refused):
             run_batch([str(lab)], tmp_path / "out", Options(jobs=1, quiet=True, dask=cluster.address))
     lines = capfd.readouterr().err.splitlines()
-    assert len(lines) == 1
+    assert len(lines) == 2
     assert "gets no jobs: anglecam 9.9.9, but the batch was started by" in lines[0]
+    assert lines[1] == f"--dask {cluster.address}: waiting up to 1 s for another worker"
     assert not list((tmp_path / "out").glob("*.csv"))
+
+
+def test_a_batch_waits_for_a_worker_of_its_version_that_joins_after_one_of_another(tmp_path, monkeypatch):
+    lab, lines = tiny_lab(tmp_path / "lab", ["a.avi"]), []
+    with dask_cluster(tmp_path, ["9.9.9"]) as cluster:
+
+        def note(line):
+            lines.append(line)
+            if "waiting up to" in line:
+                cluster.start_worker(None)
+
+        monkeypatch.setattr("anglecam.batch.dask_pool.errors.print", note)
+        result = run_batch([str(lab)], tmp_path / "out", Options(jobs=1, quiet=True, dask=cluster.address))
+    assert not result.problems
+    assert [row.status for row in result.rows] == ["ok"]
+    assert sum("gets no jobs" in line for line in lines) == 1

@@ -40,9 +40,11 @@ def from_folder(lab, tmp_path_factory):
 def same_but_for_addresses(found, folder, address, expected):
     """Compare results; the paths in the index are rewritten first."""
     assert found.keys() == expected.keys()
-    index = found["index.csv"].replace(address.encode(), str(folder).encode())
+    tables = {
+        name: found[name].replace(address.encode(), str(folder).encode()) for name in ("index.csv", "index.parquet")
+    }
     page = {"index.html": expected["index.html"]}  # states the addresses in several forms
-    assert found | {"index.csv": index} | page == expected
+    assert found | tables | page == expected
 
 
 def test_clips_in_memory_give_the_same_results_as_clips_in_a_folder(lab, from_folder, tmp_path):

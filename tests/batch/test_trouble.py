@@ -113,7 +113,7 @@ def test_a_process_that_hangs_is_ended_by_its_time_limit(tmp_path):
     others = children(os.getpid())  # measuring processes that other tests share
 
     def is_new(child):
-        return child not in others and "anglecam.batch.child" in command_line(child)
+        return child not in others and "anglecam.batch.serve" in command_line(child)
 
     def stop():
         # not before it runs its program: stopping a fork of this process before its exec would stop this process, too

@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +24,9 @@ class Cluster:
 
     address: str
     scheduler: subprocess.Popen[bytes]
-    workers: tuple[subprocess.Popen[bytes], ...]
+    workers: list[subprocess.Popen[bytes]]
+    start_worker: Callable[[str | None], None]
+    """Starts another worker, of a version of anglecam; see `dask_cluster`."""
 
 
 @contextmanager
@@ -39,14 +41,18 @@ def dask_cluster(folder: Path, versions: Sequence[str | None] = (None, None)) ->
     scheduler = start(
         _PROGRAM, "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", file
     )
-    workers = tuple(
-        start(
+    workers: list[subprocess.Popen[bytes]] = []
+
+    def start_worker(version: str | None) -> None:
+        worker = start(
             _PROGRAM if version is None else f"import anglecam; anglecam.__version__ = {version!r}; {_PROGRAM}",
             *("worker", "--scheduler-file", file, "--nthreads", "1", "--no-dashboard"),
             *(() if version is None else ("--no-nanny",)),  # a nanny's worker is a new program
         )
-        for version in versions
-    )
+        workers.append(worker)
+
+    for version in versions:
+        start_worker(version)
     try:
         until = time.monotonic() + 120.0
         while not file.exists() or not file.read_text():
@@ -55,7 +61,7 @@ def dask_cluster(folder: Path, versions: Sequence[str | None] = (None, None)) ->
         address = json.loads(file.read_text())["address"]
         with Client(address, timeout=60) as client:
             client.wait_for_workers(len(workers), timeout=120)
-        yield Cluster(address, scheduler, workers)
+        yield Cluster(address, scheduler, workers, start_worker)
     finally:
         for process in (*workers, scheduler):
             process.terminate()
