@@ -92,7 +92,7 @@ def close_records(
     # the matrices are small and several fits run at a time, so threads of linear algebra would only wait for each other
     with threadpool_limits(1, "blas"):
         fitted, predicted = split_records(records, held_out)
-        task, base = _begin(fitted, predicted, starts, np.random.default_rng(seed), progress, policy)
+        task, base = begin(fitted, predicted, starts, np.random.default_rng(seed), progress, policy)
         progress("residual")
         first = assess(task, base)
         candidates: list[Candidate] = []
@@ -148,7 +148,7 @@ def with_free_form(verdict: Verdict, *, seed: int = 0) -> Verdict:
     return replace(verdict, free_form=found)
 
 
-def _begin(
+def begin(
     whole_fitted: Sequence[Record],
     whole_predicted: Sequence[Record],
     starts: Sequence[np.ndarray],

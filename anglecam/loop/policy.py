@@ -316,12 +316,13 @@ class VerdictPolicy:
         "withdrawing an effect because of a disturbance outside the mechanism",
     )
     partly_explained_share: float = _threshold(
-        0.15,
+        0.25,
         "share of the held-out error beyond the noise",
         "where structure remains, an effect stands if no more of the error is left with it than this share of the "
         "error without it",
         "naming an effect that only resembles a cause outside the ledger",
-        "set on six causes outside the ledger with five times the noise, seeds 0 and 1: the best resemblance left 0.24",
+        "5 % quantile: the best single effect left 0.23, 0.46 and more in 26 sessions with sixteen causes outside the "
+        "ledger; EMPS and the Silverbox, in view, leave 0.22 and 0.15 to 0.19",
     )
     energy_gain_sigmas: float = _threshold(
         3.0,
