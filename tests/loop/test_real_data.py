@@ -68,7 +68,9 @@ def test_the_loop_finds_gravity_and_drag_of_a_real_pendulum_and_no_other_effect(
     records = real_data.records_of(real_data.write_pendulum, REAL / "single-pendulum")
     verdict = close_records(records)
     assert [accepted.effect.id for accepted in verdict.accepted] == ["gravity_geometry", "quadratic_drag"]
-    assert np.degrees(verdict.after_held_out.rmse) < 0.025
+    assert len(verdict.fitted) == 1  # with gravity the model keeps step, and windows are needed no longer
+    assert np.degrees(verdict.before_held_out.rmse) > 20.0
+    assert np.degrees(verdict.after_held_out.rmse) < 0.132  # a fit by hand with the same effects over the same 15 s
 
 
 @ball_here
