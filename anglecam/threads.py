@@ -13,6 +13,8 @@ import cv2
 
 T = TypeVar("T")
 R = TypeVar("R")
+ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMBA")}
+"""Environment of a process whose libraries are to use one thread each."""
 _OPEN = 8
 """Pieces of work that wait at most: what they work on stays in memory."""
 

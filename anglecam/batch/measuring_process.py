@@ -18,9 +18,8 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from anglecam import end_with_parent
+from anglecam.threads import ONE_THREAD
 
-_THREADED_LIBRARIES = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMBA")
-"""Libraries that are limited to one thread, by the prefixes of their environment variables."""
 _STARTER = ThreadPoolExecutor(1, thread_name_prefix="starter")
 """The thread that starts all measuring processes. Linux ends a process with the thread that started it, and this
 thread lasts as long as the program; see `anglecam.end_with_parent`.
@@ -128,5 +127,5 @@ def _start() -> subprocess.Popen[bytes]:
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,  # decoders write messages there that the index reports once
-        env=os.environ | {f"{library}_NUM_THREADS": "1" for library in _THREADED_LIBRARIES},
+        env=os.environ | ONE_THREAD,
     )

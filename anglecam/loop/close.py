@@ -156,7 +156,22 @@ def begin(
     progress: Callable[[str], None],
     policy: Policy,
 ) -> tuple[Task, Fit]:
-    """Fit the base model to stretches of long recordings, in windows if a free run over them diverges."""
+    """Fit the base model to stretches of long recordings, in windows if a free run over them diverges.
+
+    Parameters
+    ----------
+    whole_fitted, whole_predicted : sequence of Record
+        The recordings that are fitted, and those that are only predicted.
+    starts, rng, progress, policy
+        As in `close_records`; ``rng`` is that of the bootstraps.
+
+    Returns
+    -------
+    task : Task
+        What the search works on.
+    base : Fit
+        Of the base model.
+    """
     fitted, predicted = (stretches(part, policy.stepwise.most_samples) for part in (whole_fitted, whole_predicted))
     progress("base model")
     found = start_parameters(fitted)

@@ -24,7 +24,7 @@ from loky.process_executor import BrokenProcessPool
 
 from anglecam.end_with_parent import end_with_parent
 from anglecam.measurement.frame_reading import Reading, Sought, joined, read_frames, read_some
-from anglecam.threads import native_threads
+from anglecam.threads import ONE_THREAD, native_threads
 from anglecam.video.film import Film
 from anglecam.video.film_parts import FilmParts, parts_of
 from anglecam.video.from_key import IrregularFilmError
@@ -35,7 +35,6 @@ FEWEST = 8
 """Parts of a film from which on processes are started, which takes each of them two seconds."""
 PARTS_EACH = 4
 """Least number of parts for each process."""
-_ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMBA")}
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ def readers_for(film: Film) -> Iterator[Readers | None]:
         return
     count = min(native_threads() - 1, len(parts) // PARTS_EACH)
     with_parent = (os.getpid(),)
-    pool = ProcessPoolExecutor(count, initializer=_begin, initargs=with_parent, env=_ONE_THREAD)
+    pool = ProcessPoolExecutor(count, initializer=_begin, initargs=with_parent, env=ONE_THREAD)
     try:
         for _ in range(count):
             pool.submit(_load)

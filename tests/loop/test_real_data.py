@@ -7,6 +7,8 @@ import sys
 import numpy as np
 import pytest
 
+from anglecam.identification.multiple_shooting import windows
+from anglecam.identification.output_error import predict_output_error
 from anglecam.loop.close import close_records
 from support.real import REAL, ROOT
 
@@ -71,6 +73,8 @@ def test_the_loop_finds_gravity_and_drag_of_a_real_pendulum_and_no_other_effect(
     assert len(verdict.fitted) == 1  # with gravity the model keeps step, and windows are needed no longer
     assert np.degrees(verdict.before_held_out.rmse) > 20.0
     assert np.degrees(verdict.after_held_out.rmse) < 0.132  # a fit by hand with the same effects over the same 15 s
+    in_windows = predict_output_error(verdict.after, windows(verdict.fitted, verdict.before.parameters))
+    assert np.degrees(in_windows.rmse) < 0.025
 
 
 @ball_here
