@@ -185,7 +185,7 @@ def add_effects(task: Task, first: Assessment, now: Assessment, candidates: Sequ
             best = more[0]
         added = _add(task, best)
         if not sizes_determined(added.fit, task.fitted, task.policy):
-            candidates = [one for one in candidates if one.effect.id != best.effect.id]
+            candidates = candidates[1:]
             continue
         if _names(added) in visited:  # otherwise an effect could be replaced and added again without end
             break
