@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from typing import Any
 
+import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from anglecam.data.typing import Image
+from anglecam.vision.image.median import median_of_bytes
 
 
-def pixel_noise(images: Sequence[NDArray[Any]]) -> float:
+def pixel_noise(images: Sequence[Image]) -> float:
     """Estimate the pixels' standard deviation from the difference between consecutive frames.
 
     The median absolute difference is used, so the still part of the picture determines the result.
@@ -18,7 +20,7 @@ def pixel_noise(images: Sequence[NDArray[Any]]) -> float:
     Parameters
     ----------
     images : sequence of ndarray
-        (h, w, planes) frames; most of each picture shows scenery that does not move.
+        (h, w, planes) or (h, w) frames of bytes; most of each picture shows scenery that does not move.
 
     Returns
     -------
@@ -27,6 +29,7 @@ def pixel_noise(images: Sequence[NDArray[Any]]) -> float:
     """
     if len(images) < 2:
         return 1.0
-    pairs = [a[::4, ::4].astype(float) - b[::4, ::4] for a, b in itertools.pairwise(images)]
+    every_fourth = (np.ascontiguousarray(image[::4, ::4]) for image in images)
+    apart = np.stack([cv2.absdiff(a, b) for a, b in itertools.pairwise(every_fourth)])
     quantised = 1.0 / np.sqrt(12.0)
-    return float(max(quantised, 1.4826 * float(np.median(np.abs(pairs))) / np.sqrt(2.0)))
+    return float(max(quantised, 1.4826 * median_of_bytes(apart) / np.sqrt(2.0)))

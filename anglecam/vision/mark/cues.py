@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 
 from anglecam.data.typing import Floats, Image
+from anglecam.vision.image.median import median_of_bytes
 from anglecam.vision.mark.colour import hue_contrast, lab_of
 
 _COLOURED = 20.0
@@ -141,7 +142,7 @@ def moving_cues(images: Sequence[Image]) -> list[Cue]:
     """
     scale = min(1.0, _LONG_SIDE_PX / max(images[0].shape[:2]))
     small = np.stack([cv2.resize(i, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) for i in images])
-    level = np.array([[_median(i[..., k]) for k in range(3)] for i in small], np.float32) + np.float32(1.0)
+    level = np.array([[median_of_bytes(i[..., k]) for k in range(3)] for i in small], np.float32) + np.float32(1.0)
     gain = level.mean(axis=0) / level  # flicker of the light changes every pixel
     changing = _change(small, gain) > _CHANGES
     if changing.sum() < _FEWEST_PIXELS:
@@ -152,13 +153,6 @@ def moving_cues(images: Sequence[Image]) -> list[Cue]:
         _of_colour("moving", centre)
         for centre in _colours_of(colours.reshape(-1, 3)[rng.permutation(colours.shape[0] * colours.shape[1])[:_DRAWN]])
     ]
-
-
-def _median(values: Image) -> float:
-    """Return the median of bytes."""
-    upto = np.cumsum(np.bincount(values.ravel(), minlength=256))
-    middle = (values.size - 1) // 2, values.size // 2
-    return float(np.searchsorted(upto, middle, side="right").mean())
 
 
 @njit(cache=True, nogil=True)
