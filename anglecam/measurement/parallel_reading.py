@@ -31,8 +31,8 @@ from anglecam.video.from_key import IrregularFilmError
 from anglecam.video.open_film import open_film
 from anglecam.vision.mark.mark_search import WHOLE_EVERY
 
-FEWEST = 8
-"""Parts of a film from which on processes are started, which takes each of them two seconds."""
+FEWEST = 2048
+"""Frames of a film from which on processes are started, which takes each of them one to two seconds."""
 PARTS_EACH = 4
 """Least number of parts for each process."""
 
@@ -63,10 +63,10 @@ def readers_for(film: Film) -> Iterator[Readers | None]:
         thread is allowed. The processes end with the block.
     """
     parts = parts_of(film, WHOLE_EVERY) if native_threads() > 1 else None
-    if parts is None or len(parts) < FEWEST:
+    count = 0 if parts is None or parts.count < FEWEST else min(native_threads() - 1, len(parts) // PARTS_EACH)
+    if parts is None or count == 0:
         yield None
         return
-    count = min(native_threads() - 1, len(parts) // PARTS_EACH)
     with_parent = (os.getpid(),)
     pool = ProcessPoolExecutor(count, initializer=_begin, initargs=with_parent, env=ONE_THREAD)
     try:
@@ -146,7 +146,7 @@ def read_part(parts: FilmParts, sought: Sought, part: int) -> Reading:
         As `FilmParts.pictures`.
     """
     film = open_film(parts.path, parts.wanted)
-    pictures = parts.pictures(part)
+    pictures = parts.pictures(film, part)
     before = next(pictures) if part > 0 else None
     return read_some(film, sought, before, pictures)
 

@@ -13,12 +13,11 @@ from anglecam.video.container import LONGEST_S, open_container
 from anglecam.video.film import Film
 from anglecam.video.frame_index import FrameIndex, index_frames
 from anglecam.video.from_key import IrregularFilmError, decode_from_key
-from anglecam.video.open_film import open_film
 from anglecam.video.picture import Picture
 
-LENGTH = 256
-"""Least number of frames of a part: a second of work, so that processes end together, and opening the film costs a
-hundredth of it."""
+LENGTH = 96
+"""Least number of frames of a part: a few tenths of a second of work, so that processes end together, and opening the
+film costs a fiftieth of it."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +39,13 @@ class FilmParts:
         """Number of frames in all parts."""
         return self.starts[-1]
 
-    def pictures(self, part: int) -> Iterator[Picture]:
+    def pictures(self, film: Film, part: int) -> Iterator[Picture]:
         """Yield the frame before a part, if there is one, and the frames of the part.
 
         Parameters
         ----------
+        film : Film
+            The film, opened.
         part : int
             From 0.
 
@@ -60,7 +61,6 @@ class FilmParts:
         InputError
             Where the film cannot be opened.
         """
-        film = open_film(self.path, self.wanted)
         first, end = film.first_frame + max(self.starts[part] - 1, 0), film.first_frame + self.starts[part + 1]
         times, at = self.index.times, first
         with open_container(self.path) as container:

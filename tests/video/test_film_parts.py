@@ -46,7 +46,7 @@ def _of_parts(path: Path, wanted: RigFrames | None = None) -> list[tuple[int, fl
     assert len(parts) > 3
     found = []
     for part in range(len(parts)):
-        pictures = list(parts.pictures(part))
+        pictures = list(parts.pictures(film, part))
         start = parts.starts[part]
         assert start % EVERY == 0
         if part > 0:
@@ -91,7 +91,7 @@ def test_a_damaged_frame_ends_the_reading_of_its_part(tmp_path: Path) -> None:
     assert parts is not None
     (damaged,) = (part for part in range(len(parts)) if parts.starts[part] < 20 <= parts.starts[part + 1] - 1)
     with pytest.raises(IrregularFilmError):
-        list(parts.pictures(damaged))
+        list(parts.pictures(open_film(path), damaged))
 
 
 def test_a_film_that_is_kept_in_memory_has_no_parts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -101,7 +101,8 @@ def test_a_film_that_is_kept_in_memory_has_no_parts(tmp_path: Path, monkeypatch:
 
 def test_a_film_that_is_refreshed_in_strips_has_irregular_parts(tmp_path: Path) -> None:
     kind = {"codec": "libx264", "options": {"g": "12", "x264-params": "intra-refresh=1", "bf": "0"}}
-    parts = parts_of(open_film(encode(tmp_path / "film.mp4", _pictures(), **kind)), EVERY)
+    film = open_film(encode(tmp_path / "film.mp4", _pictures(), **kind))
+    parts = parts_of(film, EVERY)
     assert parts is not None
     with pytest.raises(IrregularFilmError):
-        list(parts.pictures(len(parts) - 1))
+        list(parts.pictures(film, len(parts) - 1))
