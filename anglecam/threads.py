@@ -15,6 +15,8 @@ T = TypeVar("T")
 R = TypeVar("R")
 ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMBA")}
 """Environment of a process whose libraries are to use one thread each."""
+_BEGUN = 2
+"""Pictures that a decoder begins beyond one for each core: it goes on while the thread that feeds it is busy."""
 _OPEN = 8
 """Pieces of work that wait at most: what they work on stays in memory."""
 
@@ -23,6 +25,11 @@ def native_threads() -> int:
     """Return the number of threads to use: ``OMP_NUM_THREADS`` if it is set, as in other programs, else all cores."""
     stated = os.environ.get("OMP_NUM_THREADS", "")
     return int(stated) if stated.isdecimal() and int(stated) > 0 else cores()
+
+
+def picture_threads() -> int:
+    """Return the number of threads of a decoder each of which decodes another picture."""
+    return 1 if native_threads() == 1 else native_threads() + _BEGUN
 
 
 def cores() -> int:

@@ -15,7 +15,7 @@ import av
 from av.video.frame import PictureType
 
 from anglecam.errors import InputError
-from anglecam.threads import native_threads
+from anglecam.threads import native_threads, picture_threads
 from anglecam.video.container import LONGEST_S, MOST_FRAMES, open_container
 from anglecam.video.stamps import CountedStamps, PresentationStamps
 from anglecam.video.truncation import is_cut_short
@@ -146,7 +146,7 @@ def decode_container(
     decoder.thread_type = threads
     # with several threads for the slices of a picture, FFmpeg does not flag one that is damaged
     alone = threads == "SLICE" and decoder.name in PREDICTING_CODECS
-    decoder.thread_count = 1 if alone else native_threads()
+    decoder.thread_count = 1 if alone else picture_threads() if threads == "FRAME" else native_threads()
     base = float(stream.time_base or 0.0)
     is_avi = container.format.name == "avi"
     stamps = CountedStamps(decoder) if is_avi else PresentationStamps()
