@@ -15,13 +15,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from anglecam.certificate.profile import Profile, fit_at, profile
 from anglecam.certificate.quantity import QUANTITIES, Quantity, with_breakaway
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.output_error import fit_best_start, fit_output_error, output_error
 from anglecam.loop.candidates import fit_with
 from anglecam.loop.next_experiment.design import Experiment, separating_experiment
+from anglecam.loop.profile import Profile, fit_at, profile
 from anglecam.loop.refit import effects_of, plant_of
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.loop.stepwise import applicable

@@ -123,6 +123,18 @@ class Parameter:
             return math.inf, math.nan
         return self.to_file / value, sigma * abs(self.to_file) / value**2
 
+    def interval_in_file_unit(self, lower: float, upper: float) -> tuple[float, float]:
+        """Convert the ends of an interval from SI to the unit in files; the first is the smaller one.
+
+        Examples
+        --------
+        >>> one = Parameter("limit_deg", 0.0, 1.0, 0.0, (1.0,), to_file=2.0, inverse=True)
+        >>> one.interval_in_file_unit(0.0, 0.5)
+        (4.0, inf)
+        """
+        ends = (self.in_file_unit(lower)[0], self.in_file_unit(upper)[0])
+        return min(ends), max(ends)
+
 
 @dataclass(frozen=True)
 class Effect:

@@ -101,6 +101,13 @@ class Joined:
         before = np.concatenate([values[:1], values[:-1]])
         return (values - correlation * before) * (1.0 / np.sqrt(1.0 - correlation**2))
 
+    def colour(self, white: Floats) -> Floats:
+        """Return the (N, k) values that `whiten` turns into these."""
+        coloured, scale = white.copy(), np.sqrt(1.0 - self.correlation**2)
+        for i in np.flatnonzero(self.correlation):
+            coloured[i] = self.correlation[i] * coloured[i - 1] + scale[i] * white[i]
+        return coloured
+
     def slopes(self, model: Model, parameters: Floats, own: Floats, here: Predicted, *, fixed: bool = False) -> Slopes:
         """Return the derivatives of the whitened predictions by difference quotients.
 

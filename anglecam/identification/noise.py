@@ -171,17 +171,29 @@ def autoregression(parts: Sequence[Floats], source: str) -> Noise:
     Noise
         With φ corrected for the bias that subtracting the means causes, and clipped to [0, 0.98].
     """
-    total = count = lagged = pairs = 0.0
-    for part in parts:
-        e = part - part.mean()
-        total += e @ e
-        count += len(e) - 1
-        lagged += e[1:] @ e[:-1]
-        pairs += len(e) - 1
+    around = [part - part.mean() for part in parts]
+    total, pairs = sum(float(e @ e) for e in around), sum(len(e) - 1 for e in around)
     if total <= 0.0:
         return Noise(0.0, 0.0, 1.0 / math.sqrt(max(pairs, 1.0)), source)
-    length = pairs / len(parts) + 1.0
-    raw = lagged / total * length / (length - 1.0)
-    phi = (raw * length + 1.0) / (length - 3.0) if length > 6 else raw
-    phi = min(max(phi, 0.0), 0.98)
-    return Noise(math.sqrt(total / count), phi, math.sqrt((1.0 - phi**2) / pairs), source)
+    phi = float(ar1_coefficient(around))
+    return Noise(math.sqrt(total / pairs), phi, math.sqrt((1.0 - phi**2) / pairs), source)
+
+
+def ar1_coefficient(parts: Sequence[Floats]) -> Floats:
+    """Estimate the coefficient of one AR(1) process in stretches of data.
+
+    Parameters
+    ----------
+    parts : sequence of (n,) or (n, k) ndarray
+        Stretches with mean zero, along the first axis; k data sets at a time.
+
+    Returns
+    -------
+    () or (k,) ndarray
+        φ, corrected for the bias that subtracting the means causes, and clipped to [0, 0.98].
+    """
+    total = sum(np.sum(e**2, axis=0) for e in parts)
+    lagged = sum(np.sum(e[1:] * e[:-1], axis=0) for e in parts)
+    length = sum(len(e) - 1 for e in parts) / len(parts) + 1.0
+    raw = lagged / np.maximum(total, 1e-300) * length / (length - 1.0)
+    return np.clip((raw * length + 1.0) / (length - 3.0) if length > 6 else raw, 0.0, 0.98)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from scipy import special
@@ -44,6 +45,8 @@ class Candidate:
     """Prediction of every frame by a model that was not fitted to it."""
     predictive_gain: float
     """Log-likelihood gain on ``cross_validated``, nat; −∞ where it is ``None``."""
+    competing: float = 1.0
+    """Number of independent directions of which the effect's best one was found in the residual."""
 
     @property
     def effect(self) -> Effect:
@@ -51,9 +54,17 @@ class Candidate:
         return effects_of(self.fit)[-1]
 
     @property
+    def penalty(self) -> float:
+        """Gain that noise alone is expected to give, nat: one for each parameter, and the search among directions.
+
+        Akaike, IEEE Trans. Autom. Control 19, 1974; the best of m independent directions gains ln m more.
+        """
+        return len(self.effect.parameters) + math.log(self.competing)
+
+    @property
     def evidence(self) -> float:
-        """Log-likelihood gain on fitted and on predicted frames, less one for each parameter, nat."""
-        return self.log_likelihood_gain + self.predictive_gain - len(self.effect.parameters)
+        """Log-likelihood gain on the fitted recordings less `penalty`, nat. Candidates are chosen by it."""
+        return self.log_likelihood_gain - self.penalty
 
 
 def promising(all_forecasts: Sequence[Forecast], policy: Policy = DEFAULT) -> list[Forecast]:
@@ -74,6 +85,7 @@ def fit_candidates(
     tried: Sequence[Forecast],
     camera: float = 0.0,
     policy: Policy = DEFAULT,
+    competing: Mapping[str, float] = MappingProxyType({}),
 ) -> list[Candidate]:
     """Fit each effect in addition to those of the plant, and predict what it was not fitted to.
 
@@ -91,6 +103,8 @@ def fit_candidates(
         Stated standard uncertainty of a film's angle, rad; 0 for angle series from elsewhere.
     policy : Policy
         Thresholds.
+    competing : mapping
+        Effect id → number of independent directions among which its best one was found; 1 for others.
 
     Returns
     -------
@@ -103,18 +117,18 @@ def fit_candidates(
     tried, fits = [one for one, _ in possible], [fit for _, fit in possible]
     gains = [log_likelihood_gain(base.cost, fit.cost, len(base.white)) for fit in fits]
     best_gains = sorted(gains, reverse=True)[: policy.screen.fewest_fitted - 1]
-    smallest = policy.candidates.smallest_gain_share
+    smallest, among = policy.candidates.smallest_gain_share, [competing.get(one.effect.id, 1.0) for one in tried]
 
     def predict(i: int) -> Candidate:
         if gains[i] < smallest * max(gains) and gains[i] not in best_gains:
-            return Candidate(tried[i], fits[i], gains[i], None, None, -math.inf)
+            return Candidate(tried[i], fits[i], gains[i], None, None, -math.inf, among[i])
         declared, all_frames = predict_held_out(fits[i], fitted, held_out, policy)
         count = sum(len(r.time) for r in all_frames.records)
         predictive = log_likelihood_gain(cross_validated.cost, all_frames.cost, count)
-        return Candidate(tried[i], fits[i], gains[i], declared, all_frames, predictive)
+        return Candidate(tried[i], fits[i], gains[i], declared, all_frames, predictive, among[i])
 
     candidates = map_in_threads(predict, range(len(tried)))
-    return sorted(candidates, key=lambda c: (-c.evidence, -c.log_likelihood_gain))
+    return sorted(candidates, key=lambda c: (c.cross_validated is None, -c.evidence))
 
 
 def fit_with(

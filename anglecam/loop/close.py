@@ -26,6 +26,7 @@ from anglecam.loop.candidates import Candidate, find_rivals, fit_to_more, log_li
 from anglecam.loop.cross_validation import compare, predict_held_out, robust_sigma, split_records
 from anglecam.loop.free_form.result import find_free_form
 from anglecam.loop.policy import DEFAULT, Policy
+from anglecam.loop.profile import interval_of
 from anglecam.loop.refit import effects_left, effects_of, plant_of, refit_with_last, refit_with_phi, refit_without
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.loop.standing import error_beyond_noise, model_that_stands
@@ -43,6 +44,7 @@ from anglecam.loop.stretches import stretches
 from anglecam.loop.verdict import Accepted, Verdict
 from anglecam.loop.whole import with_whole_recordings
 from anglecam.models.plant import FASTEST, Plant
+from anglecam.threads import map_in_threads
 
 VERDICTS = {
     (False, False): "nothing_missing",
@@ -51,6 +53,8 @@ VERDICTS = {
     (False, True): "unexplained",
 }
 """Verdict by (whether effects are named, whether structure remains that they do not explain)."""
+BLOCKS = 20
+"""Blocks of cross-validation that fit into the longest recording at least: four for each of five folds."""
 
 
 def close_records(
@@ -104,11 +108,11 @@ def close_records(
         progress("verdict")
         verdict = _conclude(task, final_task, first, last, candidates)
         if max(map(_samples, (fitted, predicted))) <= policy.stepwise.most_samples:
-            return verdict
+            return _with_intervals(verdict)
         progress("whole recordings")
         if final_task.uncut is not None:
             fitted, predicted = (windows(part, base.parameters) for part in (fitted, predicted))
-        return with_whole_recordings(verdict, fitted, predicted, task.rng)
+        return _with_intervals(with_whole_recordings(verdict, fitted, predicted, task.rng))
 
 
 def with_free_form(verdict: Verdict, *, seed: int = 0) -> Verdict:
@@ -180,6 +184,8 @@ def begin(
     )
     declared_starts = [s[: plant.base_count] for s in starts]
     base = fit_output_error(plant, fitted, [*found, *declared_starts])
+    period = _natural_period(base.parameters, max(float(np.ptp(r.time)) for r in whole_fitted))
+    policy = replace(policy, cross_validation=replace(policy.cross_validation, period_s=period))
     uncut = None
     if drifts(base.parameters, fitted) or loses_step(base, fitted):
         uncut = fitted, predicted
@@ -187,6 +193,12 @@ def begin(
         base = fit_output_error(plant, fitted, [base.parameters, *declared_starts])
     ledger = tuple(applicable([*fitted, *predicted], plant.fastest / FASTEST))
     return Task(fitted, predicted, ledger, noise_floor(whole_fitted), rng, progress, policy, uncut), base
+
+
+def _natural_period(parameters: np.ndarray, longest: float) -> float:
+    """Return 2π over the magnitude of the slower pole, s, at most `BLOCKS` of them in the longest recording."""
+    slower = float(np.min(np.abs(np.roots([1.0, parameters[0], parameters[1]]))))
+    return min(2.0 * math.pi / max(slower, 1e-300), longest / BLOCKS)
 
 
 def _samples(records: Sequence[Record]) -> int:
@@ -241,14 +253,24 @@ def _conclude(
     )
 
 
+def _with_intervals(verdict: Verdict) -> Verdict:
+    """State the 95 % interval of the size of each effect."""
+
+    def interval(accepted: Accepted) -> tuple[float, float]:
+        return interval_of(verdict.after, accepted.effect.parameters[0].name, verdict.fitted, verdict.noise)
+
+    intervals = map_in_threads(interval, verdict.accepted)
+    pairs = zip(verdict.accepted, intervals, strict=True)
+    return replace(verdict, accepted=tuple(replace(one, interval_95=ends) for one, ends in pairs))
+
+
 def _structure_remains(task: Task, first: Assessment, last: Assessment, before: Fit) -> bool:
     """Return whether the final model leaves structure that no candidate explains."""
     policy = task.policy
     named, least = bool(effects_of(last.fit)), smallest_structure(task, first)
     if _is_wrong(task, last, least):
         return True
-    level = policy.verdict.false_unexplained_rate if named else policy.residual_test.false_alarm_rate
-    if last.residual_test.p_value >= level or last.fit.rmse**2 <= task.camera**2 + least**2:
+    if last.residual_test.passed or last.fit.rmse**2 <= task.camera**2 + least**2:
         return False
     driven = any(r.command is not None for r in task.fitted)
     noise = task.noise_within(last.fit)

@@ -13,6 +13,7 @@ all of it.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -47,6 +48,10 @@ class Prediction:
     """Measured minus predicted angle of each recording, (n,) each, rad."""
     cost: float
     """Sum of squared whitened residuals, rad²."""
+    folds: tuple[NDArray[np.int_], ...] = ()
+    """Fold in which each frame was left out, (n,) for each recording; empty if none was cross-validated."""
+    training: tuple[tuple[float, int], ...] = ()
+    """Cost of the fit that predicted each fold, rad², and the number of frames that it was fitted to."""
 
     @property
     def rmse(self) -> float:
@@ -129,33 +134,72 @@ def predict_held_out(
     predicted = predict_output_error(fit, held_out)
     declared = Prediction(tuple(held_out), predicted.residuals, predicted.cost)
     all_frames = Prediction(
-        declared.records + folds.records, declared.residuals + folds.residuals, declared.cost + folds.cost
+        declared.records + folds.records,
+        declared.residuals + folds.residuals,
+        declared.cost + folds.cost,
+        tuple(np.full(len(r.time), NEVER_LEFT_OUT) for r in held_out) + folds.folds,
+        folds.training,
     )
     return declared, all_frames
 
 
+def chosen_without(predictions: Sequence[Prediction], penalties: Sequence[float]) -> Prediction:
+    """Return the prediction of each fold by the model that explains the other folds best.
+
+    The choice between the models, like their parameters, is then made without the frames that are predicted. Varma and
+    Simon, BMC Bioinformatics 7, 2006, 91.
+
+    Parameters
+    ----------
+    predictions : sequence of Prediction
+        All frames of the same recordings by several models, from `predict_held_out`; the first model is the choice on
+        all fitted recordings, and predicts those that are held out.
+    penalties : sequence of float
+        Subtracted from the log-likelihood of each model, nat.
+
+    Returns
+    -------
+    Prediction
+        Of the same frames; its ``cost`` is NaN.
+    """
+    first = predictions[0]
+    residuals = [part.copy() for part in first.residuals]
+    for fold in range(len(first.training)):
+        likelihoods = [
+            -0.5 * one.training[fold][1] * math.log(max(one.training[fold][0], 1e-300)) - penalty
+            for one, penalty in zip(predictions, penalties, strict=True)
+        ]
+        best = predictions[int(np.argmax(likelihoods))]
+        for part, folds, other in zip(residuals, first.folds, best.residuals, strict=True):
+            part[folds == fold] = other[folds == fold]
+    return Prediction(first.records, tuple(residuals), math.nan)
+
+
 def _cross_validate(fit: Fit, records: Sequence[Record], policy: Policy) -> Prediction:
     """Predict every recording except its first frames, each fold by a fit to the other folds."""
-    errors = [np.zeros(len(r.time)) for r in records]
+    errors, training = [np.zeros(len(r.time)) for r in records], []
     fold_of, joined = [fold_numbers(r, policy) for r in records], join(records, fit.phi)
     for fold in range(policy.cross_validation.folds):
         train = [record.only(folds != fold) for record, folds in zip(records, fold_of, strict=True)]
         trained = fit_output_error(fit.model, train, [fit.parameters], nuisance=fit.nuisance, phi=fit.phi)
+        training.append((trained.cost, len(trained.white)))
         predicted = joined.predict(trained.model, trained.parameters, joined.stack(trained.nuisance)).angle
         for left, folds, error in zip(joined.runs.split(joined.angle - predicted), fold_of, errors, strict=True):
             error[folds == fold] = left[folds == fold]
-    tested = tuple(record.only(folds != NEVER_LEFT_OUT) for record, folds in zip(records, fold_of, strict=True))
-    residuals = tuple(error[folds != NEVER_LEFT_OUT] for error, folds in zip(errors, fold_of, strict=True))
+    kept = [folds != NEVER_LEFT_OUT for folds in fold_of]
+    tested = tuple(record.only(keep) for record, keep in zip(records, kept, strict=True))
+    residuals = tuple(error[keep] for error, keep in zip(errors, kept, strict=True))
+    left_out = tuple(folds[keep] for folds, keep in zip(fold_of, kept, strict=True))
     with np.errstate(over="ignore"):  # a prediction may diverge if the training frames do not determine a parameter
         white = [whiten(record, fit.phi, error) for record, error in zip(tested, residuals, strict=True)]
-        return Prediction(tested, residuals, float(sum(e @ e for e in white)))
+        return Prediction(tested, residuals, float(sum(e @ e for e in white)), left_out, tuple(training))
 
 
 def fold_numbers(record: Record, policy: Policy) -> NDArray[np.int_]:
     """Return the fold in which each frame is left out, (n,); `NEVER_LEFT_OUT` for the first frames."""
     count = policy.cross_validation.folds
     first = record.time[min(FIRST_FRAMES, len(record.time) - 1)]
-    length = min(policy.cross_validation.left_out_s, (record.time[-1] - first) / count)
+    length = max(min(policy.cross_validation.left_out_s, (record.time[-1] - first) / count), record.interval)
     blocks = np.floor((record.time - first) / length).astype(int)
     return np.where(blocks < 0, NEVER_LEFT_OUT, blocks % count)
 

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -30,11 +30,14 @@ from scipy import special
 
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
+from anglecam.effects import Effect
 from anglecam.identification.fit import Fit, whiten
-from anglecam.identification.joined import join
+from anglecam.identification.joined import Joined, join
+from anglecam.identification.noise import ar1_coefficient
 from anglecam.identification.quantisation import Grid, quantisation
 from anglecam.identification.slopes import Slopes
 from anglecam.loop.policy import DEFAULT, Policy
+from anglecam.loop.refit import effects_of
 from anglecam.loop.screen import Direction
 from anglecam.loop.seen import largest_shares, seen_of
 from anglecam.loop.torque_basis import torque_responses
@@ -80,13 +83,37 @@ class ResidualTest:
     detectable: dict[str, float]
     """Effect id → smallest magnitude of its first parameter, SI, that the test would have detected; the policy's
     ``missed_detection_rate`` is the probability of overlooking it."""
-    false_alarm_rate: float = DEFAULT.residual_test.false_alarm_rate
-    """The policy's; p-values below it indicate structure."""
+    scales: dict[str, tuple[float, float]]
+    """Name of a test → shape and scale by which its p-value was corrected for quantised angles."""
+    noise_p_values: Floats = field(repr=False)
+    """(DRAWS,) smallest p-value of an effect in each draw, ascending."""
+    level: float
+    """The round's part of the policy's false-alarm rate; p-values below it indicate structure."""
 
     @property
     def passed(self) -> bool:
         """Whether the residual shows no structure."""
-        return self.p_value >= self.false_alarm_rate
+        return self.p_value >= self.level
+
+    def chance(self, effect: Effect, log_likelihood_gain: float) -> float:
+        """Return how often noise alone gives at least one effect a gain as improbable as that of a fitted effect.
+
+        Parameters
+        ----------
+        effect : Effect
+            The fitted effect; its number of parameters counts.
+        log_likelihood_gain : float
+            By fitting it, nat.
+
+        Returns
+        -------
+        float
+            p-value, a multiple of 1/(DRAWS + 1).
+        """
+        p = special.chdtrc(len(effect.parameters), 2.0 * max(log_likelihood_gain, 0.0))
+        p = _corrected(p, self.competing.get(effect.id, 1.0))
+        p = _as_uniform(p, self.scales.get(f"effect {effect.id}", (1.0, 1.0)))
+        return float((1 + np.searchsorted(self.noise_p_values, p, side="right")) / (1 + len(self.noise_p_values)))
 
 
 def run_residual_test(
@@ -96,6 +123,8 @@ def run_residual_test(
     rng: np.random.Generator,
     smallest_rms: float,
     policy: Policy = DEFAULT,
+    *,
+    phi_estimated: bool = True,
 ) -> ResidualTest:
     """Test the residual of a fitted plant for structure.
 
@@ -113,6 +142,8 @@ def run_residual_test(
         RMS, rad, below which the loop ignores structure however significant; no smaller effect counts as detectable.
     policy : Policy
         Thresholds.
+    phi_estimated : bool
+        Whether the AR(1) coefficient of the noise was estimated from the residual.
 
     Returns
     -------
@@ -120,7 +151,7 @@ def run_residual_test(
         With a p-value from `DRAWS` bootstrap draws.
     """
     n, free = len(fit.white), len(fit.white) - fit.slopes.rank
-    both, quantised = _data_and_draws(fit, records, rng)
+    both, quantised = _data_and_draws(fit, records, rng, phi_estimated)
     energy = np.concatenate([np.sum(block**2, axis=0) for block in _blocks(both)])
     energy[energy == 0.0] = 1.0
 
@@ -141,34 +172,54 @@ def run_residual_test(
     # under the null hypothesis the data are one more draw, so their smallest p-value is ranked among those of all draws
     smallest = np.min(list(p_each.values()), axis=0)
     p_value = np.mean(smallest <= smallest[0])
-    rates = policy.residual_test
-    critical = float(np.quantile(smallest[1:], rates.false_alarm_rate))
+    level, missed = policy.level(len(effects_of(fit))), policy.residual_test.missed_detection_rate
+    critical = float(np.quantile(smallest[1:], level))
+    of_effects = [p[1:] for name, p in p_each.items() if name.startswith("effect ")]
     tests = tuple(StructureTest(name, float(p[0])) for name, p in p_each.items())
     detectable: dict[str, float] = {}
     for name, count in competing.items():
         needed_p = _before_uniform(critical, scales[f"effect {name}"])
-        sigmas = -(special.ndtri(_corrected(needed_p, 1.0 / count)) + special.ndtri(rates.missed_detection_rate))
+        sigmas = -(special.ndtri(_corrected(needed_p, 1.0 / count)) + special.ndtri(missed))
         needed = max(float(sigmas * np.sqrt(fit.cost / free)), smallest_rms * math.sqrt(n))
         detectable |= _detectable([one for one in effect_directions if one.effect.id == name], needed)
     largest = np.max(gains, axis=0)
     further_gain = max(0.0, float(largest[0] - largest[1:].mean()))
-    return ResidualTest(float(p_value), tests, further_gain, competing, detectable, rates.false_alarm_rate)
+    noise_p_values = np.sort(np.min(of_effects, axis=0)) if of_effects else np.ones(DRAWS)
+    return ResidualTest(float(p_value), tests, further_gain, competing, detectable, scales, noise_p_values, level)
 
 
-def _data_and_draws(fit: Fit, records: Sequence[Record], rng: np.random.Generator) -> tuple[Floats, bool]:
+def _data_and_draws(
+    fit: Fit, records: Sequence[Record], rng: np.random.Generator, phi_estimated: bool
+) -> tuple[Floats, bool]:
     """Return (N, 1 + DRAWS) residuals that the fit cannot follow, the data's first, and whether they are quantised.
 
     The others are those that noise alone would leave.
     """
-    n = len(fit.white)
+    n, joined = len(fit.white), join(records, fit.phi)
     both = np.empty((n, 1 + DRAWS), np.float64 if n * (1 + DRAWS) <= MOST_DOUBLE else np.float32)
     both[:, 0] = fit.slopes.without_followed(fit.white)
     drawn, quantised = _noise_draws(fit, records, rng)
     column = 1
     for block in drawn:
-        both[:, column : column + block.shape[1]] = fit.slopes.without_followed(block)
+        left = fit.slopes.without_followed(block)
+        if phi_estimated and not quantised:
+            left = fit.slopes.without_followed(_whitened_again(left, joined, fit.phi))
+        both[:, column : column + block.shape[1]] = left
         column += block.shape[1]
     return both, quantised
+
+
+def _whitened_again(white: Floats, joined: Joined, phi: float) -> Floats:
+    """Estimate the AR(1) coefficient of each column of (N, k) whitened residuals, and whiten the column with it.
+
+    A whitened value is that of the frame less φ times that of the frame before, to within a factor.
+    """
+    coloured = joined.colour(white)
+    # like the data's, these residuals have the means that the fit leaves
+    change = ar1_coefficient([part - part.mean(axis=0) for part in joined.runs.split(coloured)]) - phi
+    before = np.concatenate([np.zeros((1, white.shape[1])), coloured[:-1]])
+    before[joined.runs.edges[:-1]] = 0.0
+    return white - change / math.sqrt(1.0 - phi**2) * before
 
 
 def _blocks(both: Floats) -> Iterator[Floats]:

@@ -2,8 +2,10 @@
 
     residual → residual test → candidates → cross-validation → accept → residual → …
 
-An effect is added only if the residual test shows structure *and* the prediction error falls by more than chance
-allows: the lower end of its bootstrap interval must be above zero.
+Each round makes one test, at its part of the false-alarm rate (`Policy.level`): the residual must show structure, and
+noise alone must seldom give any effect a gain as improbable as that of the best candidate. Besides, the candidate must
+predict better than chance allows: the lower end of the bootstrap interval of the gain must be above zero. What is
+predicted was used neither to fit the candidate nor to choose it.
 """
 
 from __future__ import annotations
@@ -13,7 +15,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import special
 
 from anglecam.data.record import Record
 from anglecam.effects import LEDGER, Effect
@@ -28,7 +29,7 @@ from anglecam.loop.candidates import (
     promising,
     rms_difference,
 )
-from anglecam.loop.cross_validation import Prediction, compare, predict_held_out
+from anglecam.loop.cross_validation import Prediction, chosen_without, compare, predict_held_out
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_left, effects_of, refit_with_phi, refit_without
 from anglecam.loop.residual_test import ResidualTest, run_residual_test
@@ -97,11 +98,14 @@ def assess(task: Task, fit: Fit) -> Assessment:
     """Estimate the noise's AR(1) coefficient, fit the plant again with it, predict and test the residual."""
     policy = task.policy
     prediction_changes = changes(fit, task.fitted, effects_left(task.ledger, fit))
-    fit = refit_with_phi(fit, task.fitted, _noise_phi(task, fit, prediction_changes))
+    phi, estimated = _noise_phi(task, fit, prediction_changes)
+    fit = refit_with_phi(fit, task.fitted, phi)
     effect_directions = directions(fit, task.fitted, prediction_changes, policy)
     held_out, cross_validated = predict_held_out(fit, task.fitted, task.predicted, policy)
     smallest_rms = max(policy.stepwise.numerical_error_rad, policy.stepwise.film_error_sigmas * task.camera)
-    tested = run_residual_test(fit, task.fitted, effect_directions, task.rng, smallest_rms, policy)
+    tested = run_residual_test(
+        fit, task.fitted, effect_directions, task.rng, smallest_rms, policy, phi_estimated=estimated
+    )
     chosen = promising(forecasts(fit, effect_directions), policy)
     return Assessment(fit, held_out, cross_validated, tested, tuple(chosen))
 
@@ -141,7 +145,14 @@ def rank_candidates(task: Task, now: Assessment) -> list[Candidate]:
     uncertainty, and their evidence is nearly as strong. The one with the fewest parameters then comes first.
     """
     found = fit_candidates(
-        now.fit, now.cross_validated, task.fitted, task.predicted, now.forecasts, task.camera, task.policy
+        now.fit,
+        now.cross_validated,
+        task.fitted,
+        task.predicted,
+        now.forecasts,
+        task.camera,
+        task.policy,
+        now.residual_test.competing,
     )
     if not found or task.camera == 0.0:
         return found
@@ -175,12 +186,12 @@ def add_effects(task: Task, first: Assessment, now: Assessment, candidates: Sequ
     while candidates:
         best = candidates[0]
         least = negligible if effects_of(now.fit) else smallest_first_effect(task, first, best.fit)
-        if not _significant(task, now, best, least):
+        if not _significant(task, now, candidates, least):
             # one effect may mask another: neither improves the prediction alone, but both together do
             if len(effects_of(now.fit)) + 2 > most:
                 break
             _, more = _next(task, _add(task, best), negligible)
-            if not more or not _significant(task, now, more[0], negligible):
+            if not more or not _significant(task, now, more, negligible):
                 break
             best = more[0]
         added = _add(task, best)
@@ -204,21 +215,16 @@ def _names(one: Assessment) -> set[str]:
     return {effect.id for effect in effects_of(one.fit)}
 
 
-def _significant(task: Task, now: Assessment, best: Candidate, least: float) -> bool:
-    """Return whether a candidate fits better than noise would, and predicts better by at least ``least``, rad RMS."""
-    false_effect_rate = task.policy.stepwise.false_effect_rate
-    if best.effect.searched:  # among many frequencies one fits noise well
-        false_effect_rate /= now.residual_test.competing.get(best.effect.id, 1.0)
-    if 2.0 * best.log_likelihood_gain <= special.chdtri(len(best.effect.parameters), false_effect_rate):
-        return False  # noise would fit as well; and of two bootstrap intervals one is easily above zero
-    # a left-out block may contain everything that determines a limit; held-out recordings then still show it
-    pairs = ((now.held_out, best.held_out), (now.cross_validated, best.cross_validated))
-    return any(
-        after is not None
-        and before.rmse**2 - after.rmse**2 > least**2
-        and compare(before, after, task.rng, task.policy).lower_bound > 0.0
-        for before, after in pairs[0 if task.predicted else 1 :]
-    )
+def _significant(task: Task, now: Assessment, candidates: Sequence[Candidate], least: float) -> bool:
+    """Return whether the first candidate fits better than noise would, and predicts better by ``least``, rad RMS."""
+    best, before = candidates[0], now.cross_validated
+    if now.residual_test.chance(best.effect, best.log_likelihood_gain) >= now.residual_test.level:
+        return False
+    validated = [(one.cross_validated, one.penalty) for one in candidates if one.cross_validated is not None]
+    if best.cross_validated is None:
+        return False
+    after = chosen_without(*zip(*validated, strict=True))
+    return before.rmse**2 - after.rmse**2 > least**2 and compare(before, after, task.rng, task.policy).lower_bound > 0.0
 
 
 def _add(task: Task, best: Candidate) -> Assessment:
@@ -239,11 +245,7 @@ def _add(task: Task, best: Candidate) -> Assessment:
 def _next(task: Task, now: Assessment, negligible: float, *, again: bool = True) -> tuple[Assessment, list[Candidate]]:
     """Return the candidates to add next, and the model; once, the model is fitted again if a candidate improves it."""
     limits = task.policy.stepwise
-    if (
-        now.residual_test.p_value >= limits.false_further_search_rate
-        or now.fit.rmse <= negligible
-        or len(effects_of(now.fit)) == limits.most_effects
-    ):
+    if now.residual_test.passed or now.fit.rmse <= negligible or len(effects_of(now.fit)) == limits.most_effects:
         return now, []
     candidates = rank_candidates(task, now)
     better = fit_from_candidates(now.fit, candidates, task.fitted)
@@ -252,8 +254,10 @@ def _next(task: Task, now: Assessment, negligible: float, *, again: bool = True)
     return now, candidates
 
 
-def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> float:
-    """Return the AR(1) coefficient of the noise: that of the best model's residual, limited by the noise floor's.
+def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> tuple[float, bool]:
+    """Return the AR(1) coefficient of the noise, and whether it is that of the best model's residual.
+
+    It is limited by that of the noise floor.
 
     Structure that a model lacks makes its residual look correlated, and the residual of the best candidate looks least
     so. A rest, or the distance from the pivot, is independent of any model; its AR(1) coefficient limits how much of
@@ -268,8 +272,9 @@ def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> fl
     best = min(fits, key=lambda one: one.cost)
     phi = autoregression(best.residuals, RESIDUAL).phi
     if task.floor is not None and math.isfinite(task.floor.phi_error):
-        return min(phi, max(0.0, task.floor.phi + limits.noise_floor_phi_errors * task.floor.phi_error))
-    return phi
+        most = max(0.0, task.floor.phi + limits.noise_floor_phi_errors * task.floor.phi_error)
+        return min(phi, most), phi <= most
+    return phi, True
 
 
 def applicable(records: Sequence[Record], rate: float = 1.0) -> list[Effect]:

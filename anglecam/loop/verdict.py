@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -32,6 +33,8 @@ class Accepted:
     rivals: dict[str, Fit]
     """Effects that the recordings cannot distinguish from it: id → the model with that effect in its place, on the
     fitted recordings."""
+    interval_95: tuple[float, float] = (-math.inf, math.inf)
+    """95 % interval of the effect's size, its first parameter, SI; infinite where the recordings set no limit."""
 
     @property
     def alias_set(self) -> tuple[str, ...]:

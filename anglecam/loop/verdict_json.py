@@ -82,6 +82,10 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
                 "parameters": {
                     p.name: model[p.name] | {"null": p.in_file_unit(p.null)[0]} for p in accepted.effect.parameters
                 },
+                "size": {
+                    "parameter": accepted.effect.parameters[0].name,
+                    "interval_95": list(accepted.effect.parameters[0].interval_in_file_unit(*accepted.interval_95)),
+                },
                 "fixed": _fixed(accepted.effect),
                 "relaxes": accepted.effect.relaxes,
                 "alias_set": list(accepted.alias_set),

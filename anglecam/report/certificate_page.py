@@ -15,8 +15,8 @@ from rich.table import Table
 from anglecam import __version__
 from anglecam.certificate.certificate_json import certificate_as_dict, command_gain
 from anglecam.certificate.certify import Certificate, Certified
-from anglecam.certificate.profile import THRESHOLD
 from anglecam.io.files import write_atomically
+from anglecam.loop.profile import THRESHOLD
 from anglecam.report.figures import AFTER, BEFORE, FAINT, MEASURED, STYLE, _svg
 
 COLOURS = {True: "#1f6f8b", False: "#b5651d"}

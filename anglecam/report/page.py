@@ -186,7 +186,7 @@ def validation_in_words(verdict: Verdict) -> str:
     settings = verdict.policy.cross_validation
     return (
         f"No recording is declared as held out, so the error is that of block cross-validation: blocks of"
-        f" {settings.left_out_s:g} s, one in every {settings.folds * settings.left_out_s:g} s, were predicted by a"
+        f" {settings.left_out_s:.2g} s, one in every {settings.folds * settings.left_out_s:.2g} s, were predicted by a"
         f" model that was fitted to the other frames, {settings.folds} times in turn."
     )
 

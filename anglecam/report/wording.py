@@ -91,11 +91,13 @@ def noise_in_words(verdict: Verdict) -> str:
 def remaining_structure(verdict: Verdict) -> str:
     """Return why the structure that the final model leaves is not investigated further; empty if it leaves none."""
     test, limits = verdict.last_test, verdict.policy.stepwise
-    if verdict.verdict in ("unexplained", "partly_explained") or test.passed:
+    if (
+        verdict.verdict in ("unexplained", "partly_explained")
+        or test.p_value >= verdict.policy.residual_test.false_alarm_rate
+    ):
         return ""
-    rate = limits.false_further_search_rate
-    if test.p_value >= rate:
-        return f"not certain: p = {test.p_value:.3f}; only below {rate:g} is a further effect searched"
+    if test.passed:
+        return f"not certain: p = {test.p_value:.3f}; only below {test.level:.2g} is a further effect searched"
     if verdict.noise.filmed and verdict.after.rmse <= limits.film_error_sigmas * verdict.noise.sigma:
         return "no larger than the angle's uncertainty; not investigated further"
     if not verdict.noise.known:

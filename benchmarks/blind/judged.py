@@ -24,9 +24,6 @@ from synth.spec import Spec
 
 Line = dict[str, Any]
 
-CONFIDENT = 1.959964
-"""Half-width of a 95 % interval in standard deviations."""
-
 
 def true_values(spec: Spec, effects: Mapping[str, Keys]) -> dict[str, float]:
     """Return the true first parameter of each effect of the ledger, in the unit of the loop's files."""
@@ -74,10 +71,12 @@ def judge(verdict: Verdict, true: Collection[str], values: Mapping[str, float], 
             "true": values[name],
             "value": first.in_file_unit(value)[0],
             "off_sigmas": (value - truth) / sigma if sigma > 0.0 else None,
+            "inside": accepted.interval_95[0] <= truth <= accepted.interval_95[1],
         }
     return {
         "true": sorted(true),
         "verdict": verdict.verdict,
+        "p_value": verdict.first_test.p_value,
         "found": found,
         "strongest": verdict.candidates[0].effect.id if verdict.candidates else None,
         "alias_set": sorted(alias),
@@ -147,7 +146,7 @@ def _figures(title: str, groups: Mapping[str, Sequence[Line]]) -> Table:
 def _figures_of(lines: Sequence[Line]) -> list[str]:
     named = [line for line in lines if line["found"]]
     something = [line for line in lines if line["true"]]
-    off = [e["off_sigmas"] for line in lines for e in line["estimates"].values() if e["off_sigmas"] is not None]
+    inside = [estimate["inside"] for line in lines for estimate in line["estimates"].values()]
     return [
         str(len(lines)),
         _share([bool(line["found"]) and line["found"][0] in line["true"] for line in something]),
@@ -158,7 +157,7 @@ def _figures_of(lines: Sequence[Line]) -> list[str]:
         _share([line["verdict"] == "nothing_missing" for line in lines]),
         _share([line["verdict"] == "unexplained" for line in lines]),
         f"{statistics.median(line['held_out_over_sigma'] for line in lines):.2f}",
-        _share([abs(value) < CONFIDENT for value in off]),
+        _share(inside),
         f"{statistics.median(line['seconds'] for line in lines):.0f}",
     ]
 

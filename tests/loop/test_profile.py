@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anglecam.certificate.profile import THRESHOLD, _end, profile
+from anglecam.loop.profile import THRESHOLD, _end, profile
 from anglecam.certificate.quantity import with_breakaway
 from anglecam.effects import effect
 from anglecam.identification.noise import Noise

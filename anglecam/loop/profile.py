@@ -47,6 +47,8 @@ SMALLEST_SIGMA = 1e-9
 """rad; data without noise are taken to have this, because models and files are no more accurate."""
 MOST_DEVIANCE = 1e6
 """Larger deviances count as this, also those of a model that diverges."""
+NEARLY_QUADRATIC = 0.1
+"""The interval is value ± 1.96 u if the square root of the deviance errs by no more than this share at its ends."""
 BETTER = 0.1
 """Gain in log-likelihood by which a fit on the way is a better estimate, from which the search begins again."""
 MOST_RESTARTS = 3
@@ -113,6 +115,47 @@ def profile(best: Fit, name: str, records: Sequence[Record], noise: Noise, extra
     return found
 
 
+def interval_of(fit: Fit, name: str, records: Sequence[Record], noise: Noise) -> tuple[float, float]:
+    """Return the 95 % interval of a parameter of a fitted plant: value ± 1.96 u, or the profile's where that fails.
+
+    The standard uncertainty u is that of a quadratic log-likelihood. Whether the likelihood is quadratic is tested by
+    its value at both ends.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of a `Plant` to ``records``.
+    name : str
+        The parameter.
+    records : sequence of Record
+        The fitted recordings.
+    noise : Noise
+        Of the angle.
+
+    Returns
+    -------
+    lower, upper : float
+        SI; infinite where no value up to the parameter's bound is excluded.
+    """
+    estimate = float(fit.parameters[fit.model.names.index(name)])
+    parameter = next(p for e in plant_of(fit).effects for p in e.parameters if p.name == name)
+    sigma, inflation = _uncertainty(fit, name, records, noise, 0.0)
+    half = math.sqrt(THRESHOLD) * sigma
+    ends = (estimate - half, estimate + half)
+    if math.isfinite(half) and parameter.lower <= ends[0] and ends[1] <= parameter.upper:
+        variance = _variance(fit) * inflation * THRESHOLD
+        share = [(fit_at(fit, name, end, records).cost - fit.cost) / variance for end in ends]
+        if all(abs(math.sqrt(max(one, 0.0)) - 1.0) <= NEARLY_QUADRATIC for one in share):
+            return ends
+    found = profile(fit, name, records, noise)
+    return found.lower, found.upper
+
+
+def _variance(fit: Fit) -> float:
+    """Return the variance of the whitened residuals, rad²."""
+    return float(max(fit.cost / max(1, len(fit.white) - fit.slopes.rank), SMALLEST_SIGMA**2))
+
+
 def fit_at(fit: Fit, name: str, value: float, records: Sequence[Record], near: Fit | None = None) -> Fit:
     """Fit a plant again with one parameter held at a value.
 
@@ -150,7 +193,7 @@ def _profile_once(
     sigma, inflation = _uncertainty(best, name, records, noise, extra_sigma)
     held: dict[float, Fit] = {}
 
-    variance = max(best.cost / max(1, len(best.white) - best.slopes.rank), SMALLEST_SIGMA**2)
+    variance = _variance(best)
 
     def lost(fit: Fit) -> float:
         return (fit.cost - best.cost) / variance
