@@ -127,7 +127,9 @@ def _certified(verdict: Verdict, quantity: Quantity, effect: Effect | None, cloc
         return nothing
     extra = clock.sigma if quantity.effect_id == "dead_time" else 0.0
     fits = [fit, *(_rival_fits(verdict, accepted, fit) if accepted else ())]
-    profiles = [profile(one, quantity.parameter, verdict.fitted, verdict.noise, extra) for one in fits]
+    profiles = [
+        profile(one, quantity.parameter, verdict.fitted, verdict.noise, extra, quantity.vanishing) for one in fits
+    ]
     interval = min(p.lower for p in profiles), max(p.upper for p in profiles)
     return Certified(quantity, profiles[0], interval, accepted is not None, accepted.alias_set[1:] if accepted else ())
 

@@ -41,6 +41,8 @@ class Quantity:
     """Whether the parameter is the reciprocal of the quantity, so that 0 means that there is no limit."""
     is_torque: bool = False
     """Whether it is a torque divided by the moment of inertia, which c converts to degrees of command."""
+    vanishing: int = 1
+    """Number of parameters that vanish where this one does, itself included."""
 
     def in_file(self, value: float) -> float:
         """Convert a parameter's value from SI to the unit in files; an absent limit is infinite."""
@@ -86,6 +88,7 @@ QUANTITIES = (
         DEGREE,
         "torque at which the resting body breaks away, divided by the moment of inertia",
         is_torque=True,
+        vanishing=2,  # sliding friction cannot exceed it
     ),
     Quantity(
         "dead_time",

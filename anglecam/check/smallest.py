@@ -154,7 +154,7 @@ def smallest_sizes(
     each = directions(fit, records, changes(fit, records, effects))
     limits = DEFAULT.stepwise
     least = max(limits.numerical_error_rad, limits.film_error_sigmas * camera)
-    found = run_residual_test(fit, records, each, rng, least).detectable
+    found = run_residual_test(fit, records, each, rng, least, phi_estimated=False).detectable
     return tuple(
         Smallest(e, e.parameters[0].in_file_unit(found[e.id])[0]) for e in LEDGER if found.get(e.id, 0.0) > 0.0
     )

@@ -5,8 +5,7 @@ from __future__ import annotations
 from anglecam.cli.json_output import report_file
 from anglecam.cli.options import HoldOut, Out, SessionFolder
 from anglecam.cli.progress import end, progress_bars
-from anglecam.cli.sessions import measure_recordings
-from anglecam.io.session import read_session
+from anglecam.cli.sessions import close_and_report
 from anglecam.terminal import screen
 
 
@@ -15,22 +14,15 @@ def certify(
     out: Out,
     hold_out: HoldOut = None,
 ) -> None:
-    """Certify a servo: backlash, friction, dead time, lag, speed and torque limit with 95 % intervals, as one page."""
+    """Certify a servo: all that `close` writes, and a page with 95 % intervals of its backlash, friction and limits."""
     from anglecam.report.certificate_page import certificate_table
     from anglecam.workflow.certified import FILE, PAGE, write_certificate
-    from anglecam.workflow.session import loop_input, require_recordings
 
-    opened = read_session(session)
-    require_recordings(opened, hold_out or ())
-    measured = measure_recordings(opened, out)
+    measured, verdict = close_and_report(session, out, hold_out or ())
     with progress_bars() as bars:
         bar = bars.add_task("", total=None)
         certificate = write_certificate(
-            measured,
-            loop_input(measured),
-            out,
-            hold_out=hold_out or (),
-            progress=lambda stage: bars.update(bar, description=stage),
+            measured, verdict, out, progress=lambda stage: bars.update(bar, description=stage)
         )
         bars.update(bar, description="done", completed=1, total=1)
     report_file("certificate", out / FILE)

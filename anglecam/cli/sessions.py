@@ -5,6 +5,7 @@ The modules that a command needs are imported inside it: loading all of them tak
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,6 +20,7 @@ from anglecam.io.session import Session, read_session
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
+    from anglecam.loop.verdict import Verdict
     from anglecam.workflow.session import MeasuredSession
 
 
@@ -61,12 +63,18 @@ def close(
     hold_out: HoldOut = None,
 ) -> None:
     """Find what the model lacks: loop.json, report.html and, where it helps, the command to play next."""
+    measured, _ = close_and_report(session, out, hold_out or ())
+    end(measured.problems)
+
+
+def close_and_report(session: Path, out: Path, hold_out: Sequence[str]) -> tuple[MeasuredSession, Verdict]:
+    """Measure a session, close the loop, write the files of `close` and print its tables."""
     from anglecam.report.session_tables import loop_table, model_table
     from anglecam.workflow.session import loop_input, require_recordings
     from anglecam.workflow.session_results import REPORT, write_closed
 
     opened = read_session(session)
-    require_recordings(opened, hold_out or ())
+    require_recordings(opened, hold_out)
     measured = measure_recordings(opened, out)
     shown = loop_input(measured)
     if shown.differs:
@@ -80,7 +88,7 @@ def close(
             measured,
             shown,
             out,
-            hold_out=hold_out or (),
+            hold_out=hold_out,
             progress=lambda stage: bars.update(bar, description=stage),
             run=this_run(),
         )
@@ -93,7 +101,7 @@ def close(
         errors.print(printable(f"{session}: {line}"), soft_wrap=True)
     if (out / REPORT).exists():
         screen.print(f"report: {out / REPORT}", soft_wrap=True)
-    end(measured.problems)
+    return measured, closed.verdict
 
 
 def measure_recordings(opened: Session, out: Path) -> MeasuredSession:

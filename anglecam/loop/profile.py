@@ -21,6 +21,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import special
 
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
@@ -86,7 +87,14 @@ class Profile:
         return math.isfinite(self.upper) and math.isfinite(self.lower)
 
 
-def profile(best: Fit, name: str, records: Sequence[Record], noise: Noise, extra_sigma: float = 0.0) -> Profile:
+def profile(
+    best: Fit,
+    name: str,
+    records: Sequence[Record],
+    noise: Noise,
+    extra_sigma: float = 0.0,
+    vanishing: int = 1,
+) -> Profile:
     """Compute the 95 % interval of a parameter of a fitted plant.
 
     Parameters
@@ -101,6 +109,9 @@ def profile(best: Fit, name: str, records: Sequence[Record], noise: Noise, extra
         Of the angle.
     extra_sigma : float
         A further standard uncertainty of the parameter, SI, that the recordings do not show, such as a lamp's.
+    vanishing : int
+        Number of parameters that vanish where this one does, itself included. Absence is then excluded only at the
+        95 % point of χ² with as many degrees of freedom.
 
     Returns
     -------
@@ -108,7 +119,7 @@ def profile(best: Fit, name: str, records: Sequence[Record], noise: Noise, extra
         Its ends are infinite where no value up to the parameter's bound is excluded.
     """
     for _ in range(MOST_RESTARTS):
-        found, better = _profile_once(best, name, records, noise, extra_sigma)
+        found, better = _profile_once(best, name, records, noise, extra_sigma, vanishing)
         if better is None:
             break
         best = better
@@ -184,7 +195,7 @@ def fit_at(fit: Fit, name: str, value: float, records: Sequence[Record], near: F
 
 
 def _profile_once(
-    best: Fit, name: str, records: Sequence[Record], noise: Noise, extra_sigma: float
+    best: Fit, name: str, records: Sequence[Record], noise: Noise, extra_sigma: float, vanishing: int
 ) -> tuple[Profile, Fit | None]:
     """Return the profile about an estimate, and a better estimate where one was found on the way."""
     place = best.model.names.index(name)
@@ -192,6 +203,7 @@ def _profile_once(
     estimate = float(best.parameters[place])
     sigma, inflation = _uncertainty(best, name, records, noise, extra_sigma)
     held: dict[float, Fit] = {}
+    absence = float(special.chdtri(vanishing, 0.05))
 
     variance = _variance(best)
 
@@ -215,8 +227,8 @@ def _profile_once(
             return loss(value) / inflation
 
         return (
-            _end(deviance, estimate, -step, parameter.lower, parameter.null),
-            _end(deviance, estimate, step, parameter.upper, parameter.null),
+            _end(deviance, estimate, -step, parameter.lower, parameter.null, absence),
+            _end(deviance, estimate, step, parameter.upper, parameter.null, absence),
         )
 
     step = sigma if math.isfinite(sigma) and sigma > 0.0 else SMALLEST_STEP * (parameter.upper - parameter.lower)
@@ -243,17 +255,19 @@ def _end(
     step: float,
     bound: float,
     null: float,
+    absence: float = THRESHOLD,
     inside: float | None = None,
 ) -> float:
     """Return the end of the interval on one side, rounded outwards; the null if it is inside, or infinity.
 
-    ``inside`` is a value that is known to lie in the interval, the estimate by default.
+    The null is inside up to the deviance ``absence``. ``inside`` is a value that is known to lie in the interval, the
+    estimate by default.
     """
     side = math.copysign(1.0, step)
     if estimate == bound:
         return bound if bound == null else side * math.inf
     inside = estimate if inside is None else inside
-    outside = bound if bound == null and deviance(bound) > THRESHOLD else None
+    outside = bound if bound == null and deviance(bound) > absence else None
     if bound == null and outside is None:
         return bound
     while outside is None:
@@ -270,7 +284,7 @@ def _end(
         tried = outside + side * factor * reach
         if side * (tried - bound) < 0.0 and deviance(tried) <= THRESHOLD:
             # the search goes on from there, or it would meet the same end again
-            return _end(deviance, estimate, 2.0 * (tried - estimate), bound, null, inside=tried)
+            return _end(deviance, estimate, 2.0 * (tried - estimate), bound, null, absence, inside=tried)
     return outside
 
 

@@ -124,7 +124,7 @@ def run_residual_test(
     smallest_rms: float,
     policy: Policy = DEFAULT,
     *,
-    phi_estimated: bool = True,
+    phi_estimated: bool,
 ) -> ResidualTest:
     """Test the residual of a fitted plant for structure.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from anglecam.certificate.certificate_json import COMMAND_ENDING, certificate_as_dict
@@ -13,29 +13,29 @@ from anglecam.io.command_csv import COMMAND_ENDING as COMMAND_FILE
 from anglecam.io.files import write_json
 from anglecam.io.session import Session, recording_name
 from anglecam.loop.next_experiment.design import write_command
+from anglecam.loop.verdict import Verdict
 from anglecam.report.certificate_page import write_certificate_page
-from anglecam.workflow.session import LoopInput, MeasuredSession, close_session
+from anglecam.workflow.session import MeasuredSession
 
 PAGE = "certificate.html"
 FILE = "certificate.json"
 
 
 def write_certificate(
-    measured: MeasuredSession,
-    shown: LoopInput,
-    out: Path,
-    *,
-    hold_out: Sequence[str] = (),
-    progress: Callable[[str], None] = lambda stage: None,
+    measured: MeasuredSession, verdict: Verdict, out: Path, *, progress: Callable[[str], None] = lambda stage: None
 ) -> Certificate:
-    """Close the loop, certify the servo, and write ``certificate.json``, ``certificate.html`` and commands to play.
+    """Certify the servo of a session; write ``certificate.json``, ``certificate.html`` and commands to play.
 
     Parameters
     ----------
-    measured, shown, hold_out, progress
-        As of `anglecam.workflow.session.close_session`, which also states what it raises.
+    measured : MeasuredSession
+        From `anglecam.workflow.session.measure_session`.
+    verdict : Verdict
+        Of its recordings, from `anglecam.workflow.session.close_session`.
     out : Path
         Folder for the files.
+    progress : callable
+        Called with the name of each stage.
 
     Returns
     -------
@@ -43,7 +43,6 @@ def write_certificate(
         What the files hold.
     """
     session = measured.session
-    verdict = close_session(measured, hold_out=hold_out, shown=shown, progress=progress)
     certificate = certify(verdict, clock_of(measured), progress)
     progress("certificate")
     for one in certificate.quantities:

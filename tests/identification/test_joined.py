@@ -100,3 +100,9 @@ def test_where_only_one_side_is_finite_the_derivative_is_taken_there():
     )
     assert np.isfinite(limited).all()
     assert limited[:, 0] == pytest.approx(whole[:, 0], abs=1e-4 * np.abs(whole[:, 0]).max())
+
+
+def test_colouring_undoes_whitening():
+    white = np.random.default_rng(0).standard_normal((len(JOINED.angle), 2))
+    assert JOINED.whiten(JOINED.colour(white)) == pytest.approx(white, abs=1e-12)
+    assert np.array_equal(join(RECORDS, 0.0).colour(white), white)

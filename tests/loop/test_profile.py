@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from anglecam.loop.profile import THRESHOLD, _end, profile
 from anglecam.certificate.quantity import with_breakaway
 from anglecam.effects import effect
 from anglecam.identification.noise import Noise
 from anglecam.identification.output_error import fit_output_error
+from anglecam.loop.profile import THRESHOLD, _end, interval_of, profile
 from anglecam.models.plant import Plant
 from support.motion import Plant as TruePlant
 from support.motion import Recording
@@ -36,6 +36,31 @@ def test_a_smooth_parameter_has_the_linear_interval(late):
     assert found.lower < 0.03 < found.upper
     assert found.excludes_null
     assert found.is_limited
+
+
+def test_where_the_likelihood_is_quadratic_the_interval_is_that_of_the_standard_uncertainty(late):
+    fit, records = late
+    assert interval_of(fit, "tau_s", records, NOISE) == pytest.approx(
+        (fit.parameters[3] - 1.96 * fit.sigma[3], fit.parameters[3] + 1.96 * fit.sigma[3]), abs=1e-3 * fit.sigma[3]
+    )
+
+
+def test_where_it_is_not_the_interval_is_that_of_the_profile(late):
+    """A speed limit that is never reached has a flat likelihood below a certain reciprocal."""
+    _, records = late
+    plant = Plant((effect("dead_time"), effect("rate_limit")))
+    fit = fit_output_error(plant, records, [np.array([26.0, 524.0, 508.0, 0.03, 1e-3])])
+    found = interval_of(fit, "rate_deg_per_s", records, NOISE)
+    whole = profile(fit, "rate_deg_per_s", records, NOISE)
+    assert found == (whole.lower, whole.upper)
+    assert found[0] == 0.0 < found[1] < 1.0
+
+
+@pytest.mark.parametrize(("absence", "lower"), [(3.84, 0.05), (5.99, 0.0)])
+def test_absence_is_excluded_by_its_threshold(absence, lower):
+    """The deviance (x − 1)²·4.25 is 3.84 at 0.05 and 4.25 at 0."""
+    found = _end(lambda x: 4.25 * (x - 1.0) ** 2, 1.0, -0.5, 0.0, 0.0, absence)
+    assert found == pytest.approx(lower, abs=0.02)
 
 
 def test_a_further_uncertainty_widens_the_interval(late):

@@ -42,7 +42,7 @@ def tested_noise(fit, records):
         noise = SIGMA * rng.standard_normal(len(fit.white))
         noisy = replace(fit, white=fit.slopes.without_followed(noise))
         chosen = directions(noisy, records, changes(noisy, records, ledger))
-        result = run_residual_test(noisy, records, chosen, rng, 0.0)
+        result = run_residual_test(noisy, records, chosen, rng, 0.0, phi_estimated=False)
         found.append((result, forecasts(noisy, chosen)[0].gain))
     patch.undo()
     return found
@@ -80,7 +80,7 @@ def test_a_disturbance_as_large_as_the_noise_is_found_at_its_frequency(fit, reco
     white = SIGMA * (rng.standard_normal(len(change)) + change / np.sqrt(np.mean(change**2)))
     noisy = replace(fit, white=fit.slopes.without_followed(white))
     chosen = directions(noisy, records, changes(noisy, records, [effect("periodic_disturbance")]))
-    result = run_residual_test(noisy, records, chosen, rng, 0.0)
+    result = run_residual_test(noisy, records, chosen, rng, 0.0, phi_estimated=False)
     assert result.p_value == pytest.approx(0.001)
     assert {test.name: test.p_value for test in result.tests}["effect periodic_disturbance"] < 1e-12
     assert forecasts(noisy, chosen)[0].start[1] == pytest.approx(3.3, abs=0.03)
@@ -91,10 +91,10 @@ def test_long_series_are_tested_in_blocks_of_single_precision_with_the_same_resu
     noise = SIGMA * np.random.default_rng(4).standard_normal(len(fit.white))
     noisy = replace(fit, white=fit.slopes.without_followed(noise))
     chosen = directions(noisy, records, changes(noisy, records, [effect("quadratic_drag"), effect("cogging")]))
-    whole = run_residual_test(noisy, records, chosen, np.random.default_rng(1), 0.0)
+    whole = run_residual_test(noisy, records, chosen, np.random.default_rng(1), 0.0, phi_estimated=False)
     monkeypatch.setattr(residual_test, "MOST_DOUBLE", 0)
     monkeypatch.setattr(residual_test, "AT_ONCE", 7 * len(fit.white))
-    parts = run_residual_test(noisy, records, chosen, np.random.default_rng(1), 0.0)
+    parts = run_residual_test(noisy, records, chosen, np.random.default_rng(1), 0.0, phi_estimated=False)
     found, expected = (
         [test.p_value for test in result.tests if "effect" not in test.name] for result in (parts, whole)
     )
