@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,11 @@ class Prediction:
     def rmse(self) -> float:
         """Root mean square residual, rad."""
         return float(np.sqrt(np.mean(np.concatenate(self.residuals) ** 2)))
+
+    def clipped(self, most: float) -> Prediction:
+        """Return the prediction with errors of at most ``most``, rad, for comparisons only; it no longer diverges."""
+        clipped = tuple(np.clip(np.nan_to_num(one, nan=most), -most, most) for one in self.residuals)
+        return replace(self, residuals=clipped, cost=math.nan)
 
     @property
     def robust_sigma(self) -> float:
@@ -202,6 +207,29 @@ def fold_numbers(record: Record, policy: Policy) -> NDArray[np.int_]:
     length = max(min(policy.cross_validation.left_out_s, (record.time[-1] - first) / count), record.interval)
     blocks = np.floor((record.time - first) / length).astype(int)
     return np.where(blocks < 0, NEVER_LEFT_OUT, blocks % count)
+
+
+def predicts_better(
+    before: Prediction, after: Prediction, least: float, rng: np.random.Generator, policy: Policy = DEFAULT
+) -> bool:
+    """Return whether one prediction is significantly better than another, and by at least ``least``, rad RMS.
+
+    Larger errors count as `CrossValidationPolicy.outlier_sigmas` of the earlier model's robust standard deviation. A
+    few left-out frames may hold everything that determines a parameter. A fit without them then predicts them wildly,
+    which says nothing against the effect: the other frames decide.
+
+    Parameters
+    ----------
+    before, after, rng, policy
+        As of `compare`.
+    least : float
+        rad.
+    """
+    most = policy.cross_validation.outlier_sigmas * before.robust_sigma
+    if not math.isfinite(most):  # most of it diverges
+        return math.isfinite(after.robust_sigma)
+    before, after = before.clipped(most), after.clipped(most)
+    return before.rmse**2 - after.rmse**2 > least**2 and compare(before, after, rng, policy).lower_bound > 0.0
 
 
 def compare(before: Prediction, after: Prediction, rng: np.random.Generator, policy: Policy = DEFAULT) -> Gain:

@@ -182,6 +182,13 @@ class CrossValidationPolicy:
         "prediction errors further apart than this count as independent in the bootstrap of the gain",
         "coverage of the gain's interval: with shorter blocks correlated errors would count several times",
     )
+    outlier_sigmas: float = _threshold(
+        4.0,
+        "robust standard deviations of the earlier model's prediction errors",
+        "larger prediction errors count as this when it is decided whether an effect predicts better",
+        "missing an effect because a few left-out frames hold everything that determines a parameter",
+        "normal noise exceeds it in 1 of 16,000 frames; set with one session of a speed-dependent torque in view",
+    )
     false_gain_rate: float = _threshold(
         0.025,
         "probability",

@@ -29,7 +29,7 @@ from anglecam.loop.candidates import (
     promising,
     rms_difference,
 )
-from anglecam.loop.cross_validation import Prediction, chosen_without, compare, predict_held_out
+from anglecam.loop.cross_validation import Prediction, chosen_without, predict_held_out, predicts_better
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_left, effects_of, refit_with_phi, refit_without
 from anglecam.loop.residual_test import ResidualTest, run_residual_test
@@ -217,14 +217,14 @@ def _names(one: Assessment) -> set[str]:
 
 def _significant(task: Task, now: Assessment, candidates: Sequence[Candidate], least: float) -> bool:
     """Return whether the first candidate fits better than noise would, and predicts better by ``least``, rad RMS."""
-    best, before = candidates[0], now.cross_validated
+    best = candidates[0]
     if now.residual_test.chance(best.effect, best.log_likelihood_gain) >= now.residual_test.level:
         return False
     validated = [(one.cross_validated, one.penalty) for one in candidates if one.cross_validated is not None]
     if best.cross_validated is None:
         return False
     after = chosen_without(*zip(*validated, strict=True))
-    return before.rmse**2 - after.rmse**2 > least**2 and compare(before, after, task.rng, task.policy).lower_bound > 0.0
+    return predicts_better(now.cross_validated, after, least, task.rng, task.policy)
 
 
 def _add(task: Task, best: Candidate) -> Assessment:
@@ -236,8 +236,7 @@ def _add(task: Task, best: Candidate) -> Assessment:
             break
         reduced = refit_without(fit, effect, task.fitted)
         _, fewer = predict_held_out(reduced, task.fitted, task.predicted, task.policy)
-        # a diverging prediction has no bound (NaN), and is no reason to remove an effect
-        if compare(fewer, cross_validated, task.rng, task.policy).lower_bound <= 0.0:
+        if not predicts_better(fewer, cross_validated, 0.0, task.rng, task.policy):
             fit, cross_validated = reduced, fewer
     return assess(task, fit)
 
