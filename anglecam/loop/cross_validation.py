@@ -229,10 +229,17 @@ def predicts_better(
     if not math.isfinite(most):  # most of it diverges
         return math.isfinite(after.robust_sigma)
     before, after = before.clipped(most), after.clipped(most)
-    return before.rmse**2 - after.rmse**2 > least**2 and compare(before, after, rng, policy).lower_bound > 0.0
+    gain = compare(before, after, rng, policy, most)
+    return before.rmse**2 - after.rmse**2 > least**2 and gain.lower_bound > 0.0
 
 
-def compare(before: Prediction, after: Prediction, rng: np.random.Generator, policy: Policy = DEFAULT) -> Gain:
+def compare(
+    before: Prediction,
+    after: Prediction,
+    rng: np.random.Generator,
+    policy: Policy = DEFAULT,
+    clipped_at: float = math.inf,
+) -> Gain:
     """Compare two predictions of the same recordings by a paired wild bootstrap of blocks.
 
     Let e be the errors after and e + δ those before. The sum of squares then falls by Σ(δ² + 2δe). The motion, and with
@@ -246,6 +253,9 @@ def compare(before: Prediction, after: Prediction, rng: np.random.Generator, pol
         For the signs (Wu, Ann. Statist. 14, 1986).
     policy : Policy
         Thresholds.
+    clipped_at : float
+        Size, rad, at which errors were clipped. Such an error is a wrong prediction and no noise, so it has no random
+        sign.
 
     Returns
     -------
@@ -255,7 +265,7 @@ def compare(before: Prediction, after: Prediction, rng: np.random.Generator, pol
     cross = []
     for record, old, new in zip(before.records, before.residuals, after.residuals, strict=True):
         size = max(1, round(policy.cross_validation.independence_s / record.interval))
-        product = (old - new) * new
+        product = (old - new) * np.where(np.abs(new) < clipped_at, new, 0.0)
         cross += [np.sum(product[i : i + size]) for i in range(0, len(new), size)]
     # errors of a diverging prediction are not finite; its gain is then nothing, or everything over a diverging one
     with np.errstate(over="ignore", invalid="ignore"):

@@ -10,7 +10,7 @@ import pytest
 
 from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.close import begin
-from anglecam.loop.cross_validation import Prediction, chosen_without, fold_numbers, predict_held_out
+from anglecam.loop.cross_validation import Prediction, chosen_without, fold_numbers, predict_held_out, predicts_better
 from anglecam.loop.policy import DEFAULT
 from anglecam.models.plant import Plant
 from support.motion import Plant as TruePlant
@@ -68,3 +68,17 @@ def test_no_block_is_longer_than_a_twentieth_of_the_longest_recording():
     ]
     task, _ = begin(records, (), (), np.random.default_rng(0), lambda stage: None, DEFAULT)
     assert task.policy.cross_validation.left_out_s == pytest.approx(max(np.ptp(r.time) for r in records) / 20)
+
+
+def test_a_block_that_is_predicted_wildly_does_not_hide_a_gain_in_all_other_frames():
+    rng = np.random.default_rng(2)
+    record = session(TruePlant(), 0)[0]
+    noise = 1e-3 * rng.standard_normal(len(record.time))
+    before = Prediction((record,), (noise + 7e-4 * np.sin(9.0 * record.time),), 1.0)
+    wild = np.where((record.time > 2.0) & (record.time < 2.2), 0.1, 0.0)
+    assert predicts_better(before, Prediction((record,), (noise,), 1.0), 0.0, rng)
+    assert predicts_better(before, Prediction((record,), (noise + wild,), 1.0), 0.0, rng)
+    assert not predicts_better(before, Prediction((record,), (noise + wild + before.residuals[0],), 1.0), 0.0, rng)
+    diverging = Prediction((record,), (np.full(len(record.time), np.nan),), 1.0)
+    assert predicts_better(diverging, before, 0.0, rng)
+    assert not predicts_better(before, diverging, 0.0, rng)

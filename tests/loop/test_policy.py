@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from anglecam.loop.close import close_records
-from anglecam.loop.policy import DEFAULT, Policy, StepwisePolicy, VerdictPolicy
+from anglecam.loop.policy import DEFAULT, Policy, ResidualTestPolicy, StepwisePolicy, VerdictPolicy
 from anglecam.loop.verdict_json import verdict_as_dict
 from support.motion import Plant
 from support.series import session
@@ -45,8 +45,13 @@ def test_a_larger_contradiction_ratio_accepts_a_held_out_recording_that_contradi
     assert verdicts == ["unexplained", "nothing_missing"]
 
 
-def test_an_effect_is_named_only_if_its_p_value_is_below_the_policys_rate():
+def test_an_effect_is_named_only_if_its_p_value_is_below_the_level_of_its_round():
     records = session(Plant(quadratic_drag=2.0), 21)[::2]
-    strict = Policy(stepwise=StepwisePolicy(false_effect_rate=0.0))
+    strict = Policy(residual_test=ResidualTestPolicy(false_alarm_rate=0.001))  # of 999 draws the least p-value is 0.001
     assert close_records(records).verdict == "attributed"
-    assert close_records(records, policy=strict).verdict == "unexplained"
+    assert close_records(records, policy=strict).verdict == "nothing_missing"
+
+
+def test_the_rounds_together_spend_the_false_alarm_rate():
+    levels = [DEFAULT.level(effects) for effects in range(DEFAULT.stepwise.most_effects + 1)]
+    assert sum(levels) == pytest.approx(DEFAULT.residual_test.false_alarm_rate)
