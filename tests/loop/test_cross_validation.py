@@ -74,7 +74,7 @@ def test_a_block_that_is_predicted_wildly_does_not_hide_a_gain_in_all_other_fram
     rng = np.random.default_rng(2)
     record = session(TruePlant(), 0)[0]
     noise = 1e-3 * rng.standard_normal(len(record.time))
-    before = Prediction((record,), (noise + 7e-4 * np.sin(9.0 * record.time),), 1.0)
+    before = Prediction((record,), (noise + 1.4e-3 * np.sin(9.0 * record.time),), 1.0)
     wild = np.where((record.time > 2.0) & (record.time < 2.2), 0.1, 0.0)
     assert predicts_better(before, Prediction((record,), (noise,), 1.0), 0.0, rng)
     assert predicts_better(before, Prediction((record,), (noise + wild,), 1.0), 0.0, rng)

@@ -32,7 +32,10 @@ def test_loop_json_lists_every_threshold_with_its_documentation(contradicted):
         for group in fields(policy)
         for one in fields(getattr(policy, group.name))
     }
-    assert {entry["name"]: entry["value"] for entry in listed["policy"]} == declared
+    stated = {entry["name"]: entry["value"] for entry in listed["policy"]}
+    period = stated["cross_validation.period_s"]  # that of the base model
+    assert period == pytest.approx(2.0 * np.pi / np.sqrt(listed["model"]["b_per_s2"]["value"]), rel=0.01)
+    assert stated == declared | {"cross_validation.period_s": period}
     assert declared["stepwise.most_effects"] == 2
     for entry in listed["policy"]:
         assert entry.keys() == {"name", "value", "unit", "meaning", "controls", "calibration"}
