@@ -76,6 +76,9 @@ class Parameter:
     """Whether it moves the body as a wrong zero of the angle does, so that it is determined only if zero is known."""
     is_speed: bool = False
     """Whether it is a speed of the body, which much slower recordings cannot determine."""
+    geometric: bool = False
+    """Whether geometry sets its bounds, as a camera seldom stands more than 50° aslant; they then limit the size
+    whatever the recordings show."""
     swing_power: int = 0
     """Power of the motion's width with which the value in files grows where the effect keeps its share of the motion:
     1 for a friction torque, −2 for a cubic stiffness; 0 where it does not scale, as for a direction in space."""

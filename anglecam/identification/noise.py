@@ -41,6 +41,10 @@ UNKNOWN = math.inf
 """Standard error of an AR(1) coefficient that nothing determines."""
 
 
+LARGEST_PHI = 0.98
+"""Largest AR(1) coefficient that is estimated; a larger one would be that of a drift and not of noise."""
+
+
 @dataclass(frozen=True)
 class Noise:
     """First-order autoregressive noise."""
@@ -169,7 +173,7 @@ def autoregression(parts: Sequence[Floats], source: str) -> Noise:
     Returns
     -------
     Noise
-        With φ corrected for the bias that subtracting the means causes, and clipped to [0, 0.98].
+        With φ corrected for the bias that subtracting the means causes, and clipped to [0, `LARGEST_PHI`].
     """
     around = [part - part.mean() for part in parts]
     total, pairs = sum(float(e @ e) for e in around), sum(len(e) - 1 for e in around)
@@ -190,10 +194,10 @@ def ar1_coefficient(parts: Sequence[Floats]) -> Floats:
     Returns
     -------
     () or (k,) ndarray
-        φ, corrected for the bias that subtracting the means causes, and clipped to [0, 0.98].
+        φ, corrected for the bias that subtracting the means causes, and clipped to [0, `LARGEST_PHI`].
     """
     total = sum(np.sum(e**2, axis=0) for e in parts)
     lagged = sum(np.sum(e[1:] * e[:-1], axis=0) for e in parts)
     length = sum(len(e) - 1 for e in parts) / len(parts) + 1.0
     raw = lagged / np.maximum(total, 1e-300) * length / (length - 1.0)
-    return np.clip((raw * length + 1.0) / (length - 3.0) if length > 6 else raw, 0.0, 0.98)
+    return np.clip((raw * length + 1.0) / (length - 3.0) if length > 6 else raw, 0.0, LARGEST_PHI)

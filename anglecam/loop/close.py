@@ -20,7 +20,7 @@ from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.multiple_shooting import drifts, loses_step, windows
-from anglecam.identification.noise import RESIDUAL, autoregression, noise_floor
+from anglecam.identification.noise import LARGEST_PHI, RESIDUAL, autoregression, noise_floor
 from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.loop.candidates import Candidate, find_rivals, fit_to_more, log_likelihood_gain, promising
 from anglecam.loop.cross_validation import compare, predict_held_out, robust_sigma, split_records
@@ -274,7 +274,9 @@ def _structure_remains(task: Task, first: Assessment, last: Assessment, before: 
         return False
     driven = any(r.command is not None for r in task.fitted)
     noise = task.noise_within(last.fit)
-    share = policy.verdict.unexplained_share if driven else policy.verdict.undriven_unexplained_share
+    # the share of a free swing is for disturbances outside the mechanism, which a residual that only drifts is not
+    drifting = last.fit.phi >= LARGEST_PHI
+    share = policy.verdict.unexplained_share if driven or drifting else policy.verdict.undriven_unexplained_share
     # two measures of what remains: the error beyond the noise floor, and the finer one, what further causes would
     # explain of the log-likelihood; if the noise is unknown, the whole error counts
     return (

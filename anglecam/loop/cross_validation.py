@@ -48,6 +48,8 @@ class Prediction:
     """Measured minus predicted angle of each recording, (n,) each, rad."""
     cost: float
     """Sum of squared whitened residuals, rad²."""
+    phi: float = 0.0
+    """AR(1) coefficient of the noise, frame to frame."""
     folds: tuple[NDArray[np.int_], ...] = ()
     """Fold in which each frame was left out, (n,) for each recording; empty if none was cross-validated."""
     training: tuple[tuple[float, int], ...] = ()
@@ -137,11 +139,12 @@ def predict_held_out(
     if not held_out:
         return folds, folds
     predicted = predict_output_error(fit, held_out)
-    declared = Prediction(tuple(held_out), predicted.residuals, predicted.cost)
+    declared = Prediction(tuple(held_out), predicted.residuals, predicted.cost, fit.phi)
     all_frames = Prediction(
         declared.records + folds.records,
         declared.residuals + folds.residuals,
         declared.cost + folds.cost,
+        fit.phi,
         tuple(np.full(len(r.time), NEVER_LEFT_OUT) for r in held_out) + folds.folds,
         folds.training,
     )
@@ -177,13 +180,13 @@ def chosen_without(predictions: Sequence[Prediction], penalties: Sequence[float]
         best = predictions[int(np.argmax(likelihoods))]
         for part, folds, other in zip(residuals, first.folds, best.residuals, strict=True):
             part[folds == fold] = other[folds == fold]
-    return Prediction(first.records, tuple(residuals), math.nan)
+    return Prediction(first.records, tuple(residuals), math.nan, first.phi)
 
 
 def _cross_validate(fit: Fit, records: Sequence[Record], policy: Policy) -> Prediction:
     """Predict every recording except its first frames, each fold by a fit to the other folds."""
     errors, training = [np.zeros(len(r.time)) for r in records], []
-    fold_of, joined = [fold_numbers(r, policy) for r in records], join(records, fit.phi)
+    fold_of, joined = [fold_numbers(r, fit.phi, policy) for r in records], join(records, fit.phi)
     for fold in range(policy.cross_validation.folds):
         train = [record.only(folds != fold) for record, folds in zip(records, fold_of, strict=True)]
         trained = fit_output_error(fit.model, train, [fit.parameters], nuisance=fit.nuisance, phi=fit.phi)
@@ -197,15 +200,31 @@ def _cross_validate(fit: Fit, records: Sequence[Record], policy: Policy) -> Pred
     left_out = tuple(folds[keep] for folds, keep in zip(fold_of, kept, strict=True))
     with np.errstate(over="ignore"):  # a prediction may diverge if the training frames do not determine a parameter
         white = [whiten(record, fit.phi, error) for record, error in zip(tested, residuals, strict=True)]
-        return Prediction(tested, residuals, float(sum(e @ e for e in white)), left_out, tuple(training))
+        return Prediction(tested, residuals, float(sum(e @ e for e in white)), fit.phi, left_out, tuple(training))
 
 
-def fold_numbers(record: Record, policy: Policy) -> NDArray[np.int_]:
-    """Return the fold in which each frame is left out, (n,); `NEVER_LEFT_OUT` for the first frames."""
+def _uncorrelated_s(record: Record, phi: float, policy: Policy) -> float:
+    """Return the distance, s, from which on AR(1) noise counts as uncorrelated; it correlates by 1/e over −Δt/ln φ."""
+    correlated = -record.interval / math.log(phi) if phi > 0.0 else 0.0
+    return policy.cross_validation.noise_correlation_times * correlated
+
+
+def block_s(record: Record, phi: float, policy: Policy) -> float:
+    """Return the length of a block that is left out, s: at least a frame, at most one block for each fold."""
+    first = record.time[min(FIRST_FRAMES, len(record.time) - 1)]
+    most = float(record.time[-1] - first) / policy.cross_validation.folds
+    wanted = max(policy.cross_validation.left_out_s, _uncorrelated_s(record, phi, policy))
+    return max(min(wanted, most), record.interval)
+
+
+def fold_numbers(record: Record, phi: float, policy: Policy) -> NDArray[np.int_]:
+    """Return the fold in which each frame is left out, (n,); `NEVER_LEFT_OUT` for the first frames.
+
+    A block is long enough that its noise is not correlated with that of the frames around it.
+    """
     count = policy.cross_validation.folds
     first = record.time[min(FIRST_FRAMES, len(record.time) - 1)]
-    length = max(min(policy.cross_validation.left_out_s, (record.time[-1] - first) / count), record.interval)
-    blocks = np.floor((record.time - first) / length).astype(int)
+    blocks = np.floor((record.time - first) / block_s(record, phi, policy)).astype(int)
     return np.where(blocks < 0, NEVER_LEFT_OUT, blocks % count)
 
 
@@ -264,7 +283,8 @@ def compare(
     """
     cross = []
     for record, old, new in zip(before.records, before.residuals, after.residuals, strict=True):
-        size = max(1, round(policy.cross_validation.independence_s / record.interval))
+        apart = max(policy.cross_validation.independence_s, _uncorrelated_s(record, after.phi, policy))
+        size = max(1, round(apart / record.interval))
         product = (old - new) * np.where(np.abs(new) < clipped_at, new, 0.0)
         cross += [np.sum(product[i : i + size]) for i in range(0, len(new), size)]
     # errors of a diverging prediction are not finite; its gain is then nothing, or everything over a diverging one

@@ -169,18 +169,27 @@ class CrossValidationPolicy:
         "0.27 s is the natural period of the paper's neck",
     )
     left_out_periods: float = _threshold(
-        1.0,
+        0.3,
         "natural periods",
         "length of a block that is left out",
         "missing an effect that acts briefly, because a longer block holds everything that determines it",
-        "set at periods of 0.25 to 0.3 s: with blocks of 1 s five of seven torque limits with a residual of a quarter "
-        "of the noise were unexplained",
+        "set on four sessions in which a limit or a loss of torque acts once or twice: all predict better with blocks "
+        "of 0.2 to 0.4 periods, one to three of them with 0.5 to 1.3",
     )
     independence_periods: float = _threshold(
         2.0,
         "natural periods",
         "prediction errors further apart than this count as independent in the bootstrap of the gain",
         "coverage of the gain's interval: with shorter blocks correlated errors would count several times",
+    )
+    noise_correlation_times: float = _threshold(
+        2.0,
+        "correlation times of the noise",
+        "neither length is below this; the noise correlates by 1/e over one correlation time",
+        "accepting an effect whose fit follows the noise of frames beside those that are left out, and coverage of the "
+        "gain's interval",
+        "two correlation times apart AR(1) noise correlates by 0.14; set with the film of a ball in view (φ = 0.94): "
+        "with shorter blocks a misplaced pivot and drag were named as well",
     )
     outlier_sigmas: float = _threshold(
         4.0,

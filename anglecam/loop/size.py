@@ -41,7 +41,7 @@ def sizes_determined(fit: Fit, records: Sequence[Record], policy: Policy = DEFAU
     Returns
     -------
     bool
-        False if a size is at a bound, changes no prediction or has no upper limit.
+        False if a size is at a bound, changes no prediction or has no upper limit; geometry is a limit.
     """
     return all(_determined(fit, effect, records, policy) for effect in effects_of(fit))
 
@@ -52,7 +52,7 @@ def _determined(fit: Fit, effect: Effect, records: Sequence[Record], policy: Pol
     size, sigma = fit.parameters[place] - first.null, fit.sigma[place]
     if not np.isfinite(sigma):
         return False
-    if abs(size) > policy.candidates.linear_size_sigmas * sigma:
+    if first.geometric or abs(size) > policy.candidates.linear_size_sigmas * sigma:
         return True
     farther = float(np.clip(first.null + FARTHER * size, first.lower, first.upper))
     fixed = effect.with_fixed({first.name: farther})

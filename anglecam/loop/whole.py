@@ -65,4 +65,4 @@ def _predict(fit: Fit, fitted: Sequence[Record], predicted: Sequence[Record], po
     if not predicted:
         return predict_held_out(fit, fitted, (), policy)[0]
     found = predict_output_error(fit, predicted)
-    return Prediction(tuple(predicted), found.residuals, found.cost)
+    return Prediction(tuple(predicted), found.residuals, found.cost, fit.phi)

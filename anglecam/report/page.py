@@ -12,6 +12,7 @@ from anglecam.data.series import AngleSeries
 from anglecam.errors import printable
 from anglecam.identification.identified import Identified
 from anglecam.io.session import CORRECTED, SERIES_ENDING
+from anglecam.loop.cross_validation import block_s
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.residual_torque import estimate_residual_torque
 from anglecam.loop.verdict import Verdict
@@ -183,11 +184,12 @@ def validation_in_words(verdict: Verdict) -> str:
     if verdict.held_out:
         held_out = ", ".join(r.name for r in verdict.held_out)
         return f"These recordings are declared as held out; they were predicted and never fitted: {held_out}."
-    settings = verdict.policy.cross_validation
+    folds = verdict.policy.cross_validation.folds
+    length = max(block_s(record, verdict.after.phi, verdict.policy) for record in verdict.fitted)
     return (
         f"No recording is declared as held out, so the error is that of block cross-validation: blocks of"
-        f" {settings.left_out_s:.2g} s, one in every {settings.folds * settings.left_out_s:.2g} s, were predicted by a"
-        f" model that was fitted to the other frames, {settings.folds} times in turn."
+        f" {length:.2g} s, one in every {folds * length:.2g} s, were predicted by a model that was fitted to the other"
+        f" frames, {folds} times in turn."
     )
 
 

@@ -52,11 +52,13 @@ def test_a_wrongly_predicted_breakaway_does_not_contradict_dry_friction(seed):
     assert abs(verdict.after.parameters[3] - 1.83) < 3.0 * verdict.after.sigma[3]
 
 
-def test_a_limit_that_is_reached_once_is_named():
-    # it acts for a fraction of a second; if a second were left out at a time, the rest would not determine it
+def test_a_limit_that_is_reached_once_is_named_or_its_only_alias():
+    # it acts for a fraction of a second; if a second were left out at a time, the rest would not determine it. A torque
+    # that falls with the speed explains it as well: the log-likelihoods differ by 0.1
     limit = {"torque_saturation": {"limit": 159.7, "share": 0.628}}
     verdict = close_records(drawn_session(limit, seed=0, sigma_deg=0.05), held_out=HELD_OUT)
-    assert [a.effect.id for a in verdict.accepted] == ["torque_saturation"]
+    (found,) = verdict.accepted
+    assert {"torque_saturation"} <= set(found.alias_set) <= {"torque_saturation", "speed_dependent_torque"}
 
 
 def test_a_driven_body_without_its_command_is_unexplained_and_no_noisy_free_swing():

@@ -21,7 +21,9 @@ FOLDS = np.array([-1, 0, 0, 1, 1])
 
 def prediction(size, training):
     record = session(TruePlant(), 0)[0]
-    return Prediction((record,), (np.full(5, size),), 1.0, (FOLDS,), tuple((cost, 100) for cost in training))
+    return Prediction(
+        (record,), (np.full(5, size),), 1.0, folds=(FOLDS,), training=tuple((cost, 100) for cost in training)
+    )
 
 
 def test_each_fold_is_predicted_by_the_model_that_explains_the_other_folds_best():
@@ -36,7 +38,7 @@ def test_each_fold_is_predicted_by_the_model_that_explains_the_other_folds_best(
 def test_the_choice_for_a_fold_does_not_depend_on_its_frames():
     records = session(TruePlant(), 16)
     fit = fit_output_error(Plant(), records, [np.array([26.0, 524.0, 508.0])])
-    first = fold_numbers(records[0], DEFAULT) == 0
+    first = fold_numbers(records[0], 0.0, DEFAULT) == 0
     nonsense = replace(records[0], angle=np.where(first, 1.0, records[0].angle))
     training = [predict_held_out(fit, [one, *records[1:]], (), DEFAULT)[0].training for one in (records[0], nonsense)]
     assert training[0][0] == pytest.approx(training[1][0], rel=1e-6)
@@ -44,30 +46,29 @@ def test_the_choice_for_a_fold_does_not_depend_on_its_frames():
 
 
 @pytest.mark.parametrize("rate", [0.1, 1.0, 10.0])
-def test_blocks_are_as_long_as_the_natural_period(rate):
+def test_blocks_are_a_share_of_the_natural_period(rate):
     """The same motion played slower or faster gives the same blocks."""
     records = [
         replace(r, time=r.time / rate, command=replace(r.command, time=r.command.time / rate))
         for r in session(TruePlant(), 3)
     ]
     task, base = begin(records, (), (), np.random.default_rng(0), lambda stage: None, DEFAULT)
-    assert task.policy.cross_validation.left_out_s == pytest.approx(
-        2.0 * math.pi / math.sqrt(base.parameters[1]), rel=1e-6
-    )
+    period = 2.0 * math.pi / math.sqrt(base.parameters[1])
+    assert task.policy.cross_validation.left_out_s == pytest.approx(0.3 * period, rel=1e-6)
     slow = [replace(r, time=r.time * rate) for r in records]
     settings = task.policy.cross_validation
     usual = replace(DEFAULT, cross_validation=replace(settings, period_s=settings.period_s * rate))
     for record, one in zip(records, slow, strict=True):
-        assert np.array_equal(fold_numbers(record, task.policy), fold_numbers(one, usual))
+        assert np.array_equal(fold_numbers(record, 0.6, task.policy), fold_numbers(one, 0.6, usual))
 
 
-def test_no_block_is_longer_than_a_twentieth_of_the_longest_recording():
+def test_no_period_is_longer_than_a_twentieth_of_the_longest_recording():
     """A slow plant in short recordings: every fold still has several blocks."""
     records = [
         replace(r, time=r.time[:60], angle=r.angle[:60], sigma=r.sigma[:60]) for r in session(TruePlant(b=4.0), 3)
     ]
     task, _ = begin(records, (), (), np.random.default_rng(0), lambda stage: None, DEFAULT)
-    assert task.policy.cross_validation.left_out_s == pytest.approx(max(np.ptp(r.time) for r in records) / 20)
+    assert task.policy.cross_validation.period_s == pytest.approx(max(np.ptp(r.time) for r in records) / 20)
 
 
 def test_a_block_that_is_predicted_wildly_does_not_hide_a_gain_in_all_other_frames():

@@ -88,7 +88,8 @@ def test_what_is_held_out_is_named(dragged):
 def test_without_held_out_recordings_the_page_names_block_cross_validation(write, dragged):
     page = unescape(write(dragged, problems=[ValueError("swing.avi: no mouth")]))
     assert sentence(dragged) in page
-    assert "blocks of 0.25 s, one in every 1.25 s, were predicted by a model" in page
+    left_out = 0.3 * 2.0 * np.pi / np.sqrt(dragged.before.parameters[1])
+    assert f"blocks of {left_out:.2g} s, one in every {5.0 * left_out:.2g} s, were predicted by a model" in page
     figures = labels_of_figures(page)
     assert figures["The effect as fitted"] == 1
     assert figures["Prediction error"] == 2 * len(dragged.fitted)  # before and after, and after on a finer scale

@@ -81,7 +81,7 @@ def screen(visited: Visited, policy: Policy = DEFAULT) -> list[Screened]:
     fit, names = visited.fit, visited.names
     known, left = fit.slopes.projected, fit.slopes.without_followed(fit.white)
     own = fit.slopes.without_own(fit.white)
-    folds = np.concatenate([fold_numbers(record, policy) for record in visited.records])
+    folds = np.concatenate([fold_numbers(record, fit.phi, policy) for record in visited.records])
     found = []
     for over in [*((name,) for name in names), *combinations(names, 2)]:
         curve = curve_over(visited, over)
