@@ -102,6 +102,22 @@ def candidate_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, A
     ]
 
 
+def interval_in_words(ends: Sequence[float], unit: str) -> str:
+    """Return an interval as text; an end that the recordings do not set is left open.
+
+    Examples
+    --------
+    >>> interval_in_words([0.02, 0.0415], " s")
+    '0.02 to 0.0415 s'
+    >>> interval_in_words([3.0, float("inf")], " °/s²")
+    'above 3 °/s²'
+    """
+    low, high = ends
+    if not np.isfinite(high):
+        return f"above {low:.4g}{unit}" if np.isfinite(low) else "without ends"
+    return f"{low:.4g} to {high:.4g}{unit}" if np.isfinite(low) else f"below {high:.4g}{unit}"
+
+
 def effect_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any]]:
     """List the attributed effects with their parameters and rivals."""
     return [
@@ -118,6 +134,7 @@ def effect_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any]
                 }
                 for parameter, stated in zip(a.effect.parameters, shown["parameters"].values(), strict=True)
             ],
+            "interval": interval_in_words(shown["size"]["interval_95"], _unit(shown["size"]["parameter"])),
             "left_out": [p.symbol for p in effect(a.effect.id).parameters[len(a.effect.parameters) :]],
             "relaxes": a.effect.relaxes,
             "station_note": STATION_NOTES[a.effect.station],

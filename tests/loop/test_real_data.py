@@ -81,6 +81,5 @@ def test_the_loop_finds_gravity_and_drag_of_a_real_pendulum_and_no_other_effect(
 def test_the_loop_finds_gravity_in_the_film_of_a_ball_on_a_thread_and_no_other_effect():
     verdict = close_records(real_data.records_of(real_data.link_film, REAL / "pendulum-red-ball"))
     assert [accepted.effect.id for accepted in verdict.accepted] == ["gravity_geometry"]
-    assert np.degrees(verdict.after.rmse) < 0.6
     # blocks of a second are predicted, because the residual is correlated over half a second
     assert verdict.after_held_out.rmse < 0.6 * verdict.before_held_out.rmse
