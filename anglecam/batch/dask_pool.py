@@ -123,8 +123,9 @@ class DaskPool(Generic[Job, Done]):
         return sum(worker["nthreads"] for worker in workers if self._resource in worker["resources"])
 
     def __exit__(self, *_: object) -> None:
-        with contextlib.suppress(Exception):  # the scheduler may be lost
-            self._client.unregister_worker_plugin(self._resource)
+        if self._client.status == "running":  # a call to a lost scheduler would wait for it for a minute
+            with contextlib.suppress(Exception):
+                self._client.unregister_worker_plugin(self._resource)
         self._client.close()
         if self._cluster is not None:
             self._cluster.close()

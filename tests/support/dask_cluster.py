@@ -67,7 +67,7 @@ def dask_cluster(folder: Path, versions: Sequence[str | None] = (None, None)) ->
             process.terminate()
         for process in (*workers, scheduler):
             try:
-                process.wait(30)
+                process.wait(3)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
