@@ -15,7 +15,7 @@ from numba import njit
 
 from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter, Values
-from anglecam.effects.seen import Seen, sines_and_cosines
+from anglecam.effects.seen import Motion, Seen, sines_and_cosines
 
 FEWEST, MOST = 2.0, 16.0
 """Periods over the usual range of the motion between which the residual is searched."""
@@ -50,9 +50,10 @@ def _starts(seen: Seen) -> list[Values]:
     ]
 
 
-def _possible(parameters: Values, abc: Values, motion: Values) -> bool:
+def _possible(parameters: Values, abc: Values, motion: Motion) -> bool:
     """Return whether the torque repeats itself within the usual motion; one period is any curved torque."""
-    return parameters[1] * (motion[3] - motion[2]) >= FEWEST * math.tau
+    low, high = motion.usual
+    return parameters[1] * (high - low) >= FEWEST * math.tau
 
 
 EFFECT = Effect(

@@ -25,7 +25,7 @@ import numpy as np
 
 from anglecam.data.camera_evidence import View
 from anglecam.data.typing import Floats
-from anglecam.effects.seen import Seen
+from anglecam.effects.seen import Motion, Seen
 from anglecam.effects.unit_names import split_unit
 
 Values = tuple[float, ...]
@@ -213,9 +213,8 @@ class Effect:
     with a flexible shape takes the place of another one, or of an error of the measurement."""
     opposite: str = ""
     """What happens where the effect's size is below its null; empty if ``summary`` holds for both signs."""
-    possible: Callable[[Values, Values, Values], bool] = field(default=lambda values, abc, motion: True, repr=False)
-    """(parameters, (a, b, c), (lowest and highest angle, limits of the usual angles, rad)) → whether they describe this
-    effect at all; a fit elsewhere is some other cause."""
+    possible: Callable[[Values, Values, Motion], bool] = field(default=lambda values, abc, motion: True, repr=False)
+    """(parameters, (a, b, c), motion) → whether they describe this effect; a fit elsewhere is some other cause."""
 
     def with_fixed(self, values: Mapping[str, float]) -> Effect:
         """Return the effect with more parameters fixed: ``values`` by name, SI; itself if none of them is named."""

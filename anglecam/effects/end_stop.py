@@ -14,7 +14,7 @@ import math
 from numba import njit
 
 from anglecam.effects.effect import Effect, Parameter, Values
-from anglecam.effects.seen import Seen
+from anglecam.effects.seen import Motion, Seen
 
 DISSIPATION = 0.3
 """s/rad, at which a fit starts. Without it the energy that an impact takes shows as a stop that is stiffer and further
@@ -44,9 +44,9 @@ def _starts(seen: Seen) -> list[Values]:
     ]
 
 
-def _possible(parameters: Values, abc: Values, motion: Values) -> bool:
+def _possible(parameters: Values, abc: Values, motion: Motion) -> bool:
     """Return whether a stop is reached, and stiffer than the body's springs; what yields more is no stop."""
-    reached = parameters[1] * motion[1] > 1.0 or parameters[2] * motion[0] > 1.0
+    reached = parameters[1] * motion.high > 1.0 or parameters[2] * motion.low > 1.0
     return reached and parameters[0] > abs(abc[1])
 
 

@@ -13,7 +13,7 @@ import math
 from numba import njit
 
 from anglecam.effects.effect import Effect, Parameter, Values
-from anglecam.effects.seen import Seen
+from anglecam.effects.seen import Motion, Seen
 
 
 @njit
@@ -31,9 +31,9 @@ def _starts(seen: Seen) -> list[Values]:
     return [(side * size, low + share * (seen.high - low)) for share in shares for side in (1.0, -1.0)]
 
 
-def _possible(parameters: Values, abc: Values, motion: Values) -> bool:
+def _possible(parameters: Values, abc: Values, motion: Motion) -> bool:
     """Return whether the spring is slack in a part of the motion; elsewhere it is a part of b."""
-    return motion[0] < parameters[1] < motion[1]
+    return motion.low < parameters[1] < motion.high
 
 
 EFFECT = Effect(

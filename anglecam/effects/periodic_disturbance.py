@@ -3,7 +3,8 @@
     θ̈ = c·u − a·θ̇ − b·θ + A·sin(2π·f·t + φ)
 
 t is the time of the recording. The phase φ is therefore the same in all recordings only if their clocks start in step
-with the disturbance; otherwise each recording has to be closed by itself.
+with the disturbance; otherwise each recording has to be closed by itself. With fewer than two periods in the longest
+recording nothing repeats there, and the torque is a step or a slow change that other causes can have as well.
 """
 
 from __future__ import annotations
@@ -15,9 +16,11 @@ from numba import njit
 
 from anglecam.data.typing import Floats
 from anglecam.effects.effect import Effect, Parameter, Values
-from anglecam.effects.seen import Seen, sines_and_cosines
+from anglecam.effects.seen import Motion, Seen, sines_and_cosines
 
 LOWEST_HZ, HIGHEST_HZ = 0.25, 15.0
+FEWEST = 2.0
+"""Periods in the longest recording."""
 PER_CYCLE = 2
 """Frequencies that are tried for each cycle more in the longest recording. A wave between two of them shares 81 % of
 its energy with either."""
@@ -32,9 +35,10 @@ def _load(time: float, theta: float, omega: float, abc: Values, parameters: Valu
 
 
 def _frequencies(seen: Seen) -> Floats:
-    highest = min(HIGHEST_HZ, BELOW_NYQUIST * 0.5 / seen.interval)
-    tried = min(MOST_TRIED, max(8, round(PER_CYCLE * seen.span * (highest - LOWEST_HZ))))
-    return np.linspace(LOWEST_HZ, highest, tried)
+    lowest, highest = max(LOWEST_HZ, FEWEST / seen.span), min(HIGHEST_HZ, BELOW_NYQUIST * 0.5 / seen.interval)
+    highest = max(highest, 2.0 * lowest)
+    tried = min(MOST_TRIED, max(8, round(PER_CYCLE * seen.span * (highest - lowest))))
+    return np.linspace(lowest, highest, tried)
 
 
 def _searched(seen: Seen) -> list[Floats]:
@@ -46,6 +50,11 @@ def _starts(seen: Seen) -> list[Values]:
     waves = seen.waves(seen.times, math.tau * _frequencies(seen), most=3)
     found: list[Values] = [(max(w.amplitude, 1e-6), w.number / math.tau, w.phase) for w in waves]
     return found or [(0.01 * seen.torque + 1e-6, 1.0, 0.0)]
+
+
+def _possible(parameters: Values, abc: Values, motion: Motion) -> bool:
+    """Return whether the disturbance repeats itself within a recording."""
+    return parameters[1] * motion.span >= FEWEST
 
 
 EFFECT = Effect(
@@ -65,5 +74,6 @@ EFFECT = Effect(
     load=_load,
     starts=_starts,
     searched=_searched,
+    possible=_possible,
     in_free_swing=False,
 )

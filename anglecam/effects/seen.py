@@ -15,6 +15,19 @@ import numpy as np
 from anglecam.data.typing import Floats
 
 
+class Motion(NamedTuple):
+    """The motion that recordings show."""
+
+    low: float
+    """Lowest angle, rad."""
+    high: float
+    """Highest angle, rad."""
+    usual: tuple[float, float]
+    """Range of the angle for nine tenths of the time, rad."""
+    span: float
+    """Duration of the longest recording, s."""
+
+
 class Wave(NamedTuple):
     """A torque amplitude·sin(wave number·x + phase)."""
 

@@ -26,6 +26,7 @@ MEASURED = "stated by the measurement"
 """Source of noise whose size the measurement states and whose correlation the distance from the pivot shows."""
 QUANTISED = "step of the angles"
 """Source of noise that is the rounding of the angles to a grid."""
+REST, REPEATED = "rest", "repeated recordings"
 RESIDUAL = "residual of the model, which bounds it"
 """Source where nothing but a model shows the noise: what the model leaves is noise, structure, or both."""
 MIN_REST_FRAMES = 8
@@ -39,8 +40,8 @@ REPEATED_START = 3.0
 have started alike."""
 UNKNOWN = math.inf
 """Standard error of an AR(1) coefficient that nothing determines."""
-
-
+ESTIMATED = (DISTANCE, REST, REPEATED)
+"""Sources of a noise whose size is estimated from a limited number of frames."""
 LARGEST_PHI = 0.98
 """Largest AR(1) coefficient that is estimated; a larger one would be that of a drift and not of noise."""
 
@@ -56,12 +57,25 @@ class Noise:
     phi_error: float
     """Standard error of ``phi``; `UNKNOWN` if nothing determines it."""
     source: str
-    """`DISTANCE`, `MEASURED`, ``stated``, `QUANTISED`, ``rest``, ``repeated recordings`` or `RESIDUAL`."""
+    """`DISTANCE`, `MEASURED`, ``stated``, `QUANTISED`, `REST`, `REPEATED` or `RESIDUAL`."""
 
     @property
     def filmed(self) -> bool:
         """Whether the noise is a camera's, whose errors may follow the motion."""
         return self.source in (DISTANCE, MEASURED)
+
+    @property
+    def least_sigma(self) -> float:
+        """Lower limit of the 95 % interval of ``sigma``, rad; ``sigma`` itself where it is stated and not estimated.
+
+        The variance of n samples of AR(1) noise scatters as that of n·(1 − φ²)/(1 + φ²) independent ones (Priestley,
+        Spectral Analysis and Time Series, 1981, sec. 5.3).
+        """
+        if self.source not in ESTIMATED:
+            return self.sigma
+        samples = (1.0 - self.phi**2) / self.phi_error**2
+        free = samples * (1.0 - self.phi**2) / (1.0 + self.phi**2)
+        return self.sigma * math.sqrt(free / special.chdtri(free, 0.025))
 
     @property
     def known(self) -> bool:
@@ -106,9 +120,9 @@ def _scatter(records: Sequence[Record]) -> Noise | None:
     """Return the scatter at rest or, if there is no rest, between repeated recordings; ``None`` without either."""
     rests = [rest for record in records if (rest := _rest(record)) is not None]
     if rests:
-        return autoregression(rests, "rest")
+        return autoregression(rests, REST)
     differences = [difference / math.sqrt(2.0) for difference in _differences(records)]
-    return autoregression(differences, "repeated recordings") if differences else None
+    return autoregression(differences, REPEATED) if differences else None
 
 
 def _rest(record: Record) -> Floats | None:
@@ -127,7 +141,7 @@ def _moves(angle: Floats) -> bool:
     e = angle - angle.mean()
     if not np.any(e):
         return False
-    if autoregression([angle], "rest").phi > MOST_REST_PHI:
+    if autoregression([angle], REST).phi > MOST_REST_PHI:
         return True
     few = np.column_stack([np.ones(len(e) - 2), e[1:-1]])
     many = np.column_stack([few, e[:-2], np.linspace(-1.0, 1.0, len(e) - 2)])

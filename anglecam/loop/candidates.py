@@ -13,7 +13,7 @@ from scipy import special
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.effects import Effect
-from anglecam.effects.seen import usual_range
+from anglecam.effects.seen import Motion, usual_range
 from anglecam.identification.fit import Fit
 from anglecam.identification.output_error import first_state, fit_best_start, fit_output_error, output_error
 from anglecam.loop.cross_validation import Prediction, predict_held_out
@@ -29,6 +29,8 @@ FLAT_FACTORS = tuple(np.geomspace(0.5, 2.0, 13).tolist())
 """Multiples of a fitted staged parameter that are tried, 12 % apart."""
 FLAT_ROUNDS = 4
 """Most fits from such multiples."""
+NORMAL_95 = 1.96
+"""Half the width of a 95 % interval, in standard uncertainties."""
 
 
 @dataclass(frozen=True)
@@ -310,6 +312,8 @@ def find_rivals(
     deviations of the noise, from B's prediction to the nearest prediction of A (Cox, J. R. Statist. Soc. B 24, 1962).
     Whatever d is, the difference exceeds z²/2 no more often than a standard normal variable exceeds z. In a film,
     errors of the measurement may follow the motion, too, so a difference below the angle's uncertainty does not count.
+    Each parameter that A has more than B follows noise, and counts one nat (Akaike). B need not be possible as fitted,
+    but with its size somewhere in its 95 % interval.
 
     Parameters
     ----------
@@ -336,24 +340,48 @@ def find_rivals(
     fits = map_in_threads(lambda other: fit_with(base, records, other, camera=camera, policy=policy), others)
     widest = 0.5 * special.ndtri(policy.candidates.true_rival_rejection_rate) ** 2
     gaps = [log_likelihood_gain(fit.cost, best.cost, len(best.white)) for fit in fits]
+
+    def richer(fit: Fit) -> int:
+        return max(0, len(best.parameters) - len(fit.parameters))
+
     return {
         other.effect.id: fit
         for other, fit, gap in zip(others, fits, gaps, strict=True)
-        if is_possible(fit, records)
-        and (gap <= widest or rms_difference(fit, best) <= camera)
+        if is_possible(fit, records, NORMAL_95)
+        and (gap - richer(fit) <= widest or rms_difference(fit, best) <= camera)
         and other.effect.id != effect.id
     }
 
 
-def is_possible(fit: Fit, records: Sequence[Record]) -> bool:
-    """Return whether the parameters of a plant's last effect describe that effect at all; see `Effect.possible`."""
+def is_possible(fit: Fit, records: Sequence[Record], within: float = 0.0) -> bool:
+    """Return whether the parameters of a plant's last effect describe that effect at all; see `Effect.possible`.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of a plant with at least one effect.
+    records : sequence of Record
+        The recordings that it was fitted to.
+    within : float
+        How far the effect's size may be moved to be possible, in its standard uncertainties.
+    """
     plant, effect = plant_of(fit), effects_of(fit)[-1]
     first = len(fit.parameters) - len(effect.parameters)
     abc = np.zeros(3)
     abc[: plant.base_count] = fit.parameters[: plant.base_count]
     predicted = np.concatenate([r.angle - left for r, left in zip(records, fit.residuals, strict=True)])
-    motion = float(predicted.min()), float(predicted.max()), *usual_range(predicted)
-    return effect.possible(tuple(effect.complete(fit.parameters[first:]).tolist()), tuple(abc.tolist()), motion)
+    span = max(float(r.time[-1] - r.time[0]) for r in records)
+    motion = Motion(float(predicted.min()), float(predicted.max()), usual_range(predicted), span)
+
+    def possible(change: float) -> bool:
+        values = fit.parameters[first:].copy()
+        values[0] += change
+        return effect.possible(tuple(effect.complete(values).tolist()), tuple(abc.tolist()), motion)
+
+    if possible(0.0) or within == 0.0:
+        return possible(0.0)
+    reach = within * float(np.nan_to_num(fit.sigma[first]))
+    return possible(reach) or possible(-reach)
 
 
 def rms_difference(one: Fit, other: Fit) -> float:

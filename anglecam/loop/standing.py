@@ -53,6 +53,10 @@ def _without(task: Task, fit: Fit, effect: Effect) -> Prediction:
 
 
 def error_beyond_noise(prediction: Prediction, noise: Noise | None) -> float:
-    """Return the RMS error of a prediction beyond the noise, rad; all of it if the noise is unknown."""
-    sigma = noise.sigma if noise else 0.0
+    """Return the RMS error of a prediction beyond the noise, rad; all of it if the noise is unknown.
+
+    The noise is taken at the lower limit of its interval: a rest in which something pushed the body would otherwise
+    hide what remains.
+    """
+    sigma = noise.least_sigma if noise else 0.0
     return math.sqrt(max(prediction.rmse**2 - sigma**2, 0.0))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anglecam.identification.noise import QUANTISED, noise_floor
+from anglecam.identification.noise import QUANTISED, REST, autoregression, noise_floor
 from anglecam.identification.quantisation import quantisation
 from support.motion import Plant
 from support.series import session
@@ -72,3 +72,20 @@ def test_repeated_recordings_show_the_noise_where_there_is_no_rest():
     assert floor.source == "repeated recordings"
     # the second time has the first one's noise and as much again, so half the difference's variance is half of it
     assert np.degrees(floor.sigma) == pytest.approx(0.05 / np.sqrt(2.0), rel=0.1)
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.6])
+def test_the_estimated_noise_states_a_lower_limit_that_holds_in_95_percent(phi):
+    rng, held, draws = np.random.default_rng(1), 0, 400
+    for _ in range(draws):
+        e = rng.standard_normal(150)
+        for i in range(1, len(e)):
+            e[i] = phi * e[i - 1] + np.sqrt(1.0 - phi**2) * e[i]
+        held += autoregression([e], REST).least_sigma < 1.0
+    # a two-sided 95 % interval leaves 2.5 % above its lower limit; 3 sigma of the binomial about it
+    assert held / draws == pytest.approx(0.975, abs=3.0 * np.sqrt(0.975 * 0.025 / draws))
+
+
+def test_a_stated_uncertainty_is_its_own_lower_limit():
+    floor = noise_floor([replace(r, sigma=np.full(len(r.time), 2e-4)) for r in session(Plant(), 6)])
+    assert floor.least_sigma == pytest.approx(2e-4)

@@ -10,8 +10,10 @@ import pytest
 from anglecam.effects import LEDGER, effect
 from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.candidates import is_possible
+from anglecam.loop.close import close_records
 from anglecam.loop.stepwise import applicable
 from anglecam.models.plant import Plant
+from benchmarks.blind.sessions import session as drawn_session
 from support.motion import Plant as TruePlant
 from support.series import session
 
@@ -52,3 +54,34 @@ def test_cogging_repeats_itself_within_the_usual_motion_and_not_only_within_its_
         residuals=(np.zeros(n),),
     )
     assert is_possible(at, [replace(record, angle=angle)]) is possible
+
+
+@pytest.mark.parametrize(("periods", "possible"), [(1.9, False), (2.1, True)])
+def test_a_periodic_disturbance_repeats_itself_within_the_longest_recording(periods, possible):
+    records = session(TruePlant(), 0)[:2]
+    fit = fit_output_error(Plant(), records, [np.array([26.0, 524.0, 508.0])])
+    frequency = periods / max(r.time[-1] - r.time[0] for r in records)
+    at = replace(
+        fit,
+        model=Plant((effect("periodic_disturbance"),)),
+        parameters=np.array([26.0, 524.0, 508.0, 1.0, frequency, 0.0]),
+    )
+    assert is_possible(at, records) is possible
+
+
+def test_a_load_that_shifts_once_is_no_periodic_disturbance():
+    shifted = {"shifted_load": {"torque": 0.93, "at_s": 4.1}}
+    verdict = close_records(drawn_session(shifted, seed=412), held_out=["random"])
+    assert "periodic_disturbance" not in [a.effect.id for a in verdict.accepted]
+    assert verdict.verdict == "unexplained"
+
+
+def test_a_stop_that_is_hardly_touched_stays_beside_the_spring_that_fits_as_well():
+    stop = {"end_stop": {"upper_deg": 15.93, "lower_deg": -18.16, "stiffness": 2111.0, "dissipation": 0.43}}
+    verdict = close_records(drawn_session(stop, seed=410), held_out=["random"])
+    assert [set(a.alias_set) for a in verdict.accepted] == [{"end_stop", "one_sided_spring"}]
+
+
+def test_an_effect_with_fewer_parameters_is_not_excluded_by_what_more_parameters_gain_from_noise():
+    verdict = close_records(drawn_session({"lens_distortion": {"k1": -0.122}}, seed=410), held_out=["random"])
+    assert "lens_distortion" in verdict.accepted[0].alias_set
