@@ -21,8 +21,8 @@ from anglecam.identification.fit import Fit
 from anglecam.identification.output_error import fit_best_start, fit_output_error, output_error
 from anglecam.loop.candidates import fit_with
 from anglecam.loop.next_experiment.design import Experiment, separating_experiment
-from anglecam.loop.profile import Profile, fit_at, profile
-from anglecam.loop.refit import effects_of, plant_of
+from anglecam.loop.profile import Profile, profile
+from anglecam.loop.refit import effects_of, fit_at, plant_of
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.loop.stepwise import applicable
 from anglecam.loop.verdict import Accepted, Verdict

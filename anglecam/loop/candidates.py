@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from types import MappingProxyType
 
 import numpy as np
@@ -18,7 +19,7 @@ from anglecam.identification.fit import Fit
 from anglecam.identification.output_error import first_state, fit_best_start, fit_output_error, output_error
 from anglecam.loop.cross_validation import Prediction, predict_held_out
 from anglecam.loop.policy import DEFAULT, Policy
-from anglecam.loop.refit import effects_of, plant_of, refit_without
+from anglecam.loop.refit import effects_of, fit_at, plant_of, refit_without
 from anglecam.loop.screen import Forecast
 from anglecam.threads import map_in_threads
 
@@ -29,8 +30,8 @@ FLAT_FACTORS = tuple(np.geomspace(0.5, 2.0, 13).tolist())
 """Multiples of a fitted staged parameter that are tried, 12 % apart."""
 FLAT_ROUNDS = 4
 """Most fits from such multiples."""
-NORMAL_95 = 1.96
-"""Half the width of a 95 % interval, in standard uncertainties."""
+LARGER = (2.0, 4.0, 8.0)
+"""Multiples of a fitted size that are tried where it does not describe its effect."""
 
 
 @dataclass(frozen=True)
@@ -312,8 +313,8 @@ def find_rivals(
     deviations of the noise, from B's prediction to the nearest prediction of A (Cox, J. R. Statist. Soc. B 24, 1962).
     Whatever d is, the difference exceeds z²/2 no more often than a standard normal variable exceeds z. In a film,
     errors of the measurement may follow the motion, too, so a difference below the angle's uncertainty does not count.
-    Each parameter that A has more than B follows noise, and counts one nat (Akaike). B need not be possible as fitted,
-    but with its size somewhere in its 95 % interval.
+    Each parameter that A has more than B follows noise, and counts one nat (Akaike). Where B's
+    best fit does not describe B, the nearest one that does is judged.
 
     Parameters
     ----------
@@ -337,34 +338,34 @@ def find_rivals(
     dict
         Id of each B that cannot be excluded → the same plant with B in place of ``effect``.
     """
-    fits = map_in_threads(lambda other: fit_with(base, records, other, camera=camera, policy=policy), others)
+
+    def fit_rival(other: Forecast) -> Fit | None:
+        return _nearest_possible(fit_with(base, records, other, camera=camera, policy=policy), records)
+
+    others = [other for other in others if other.effect.id != effect.id]
+    fits = [(other, fit) for other, fit in zip(others, map_in_threads(fit_rival, others), strict=True) if fit]
     widest = 0.5 * special.ndtri(policy.candidates.true_rival_rejection_rate) ** 2
-    gaps = [log_likelihood_gain(fit.cost, best.cost, len(best.white)) for fit in fits]
 
-    def richer(fit: Fit) -> int:
-        return max(0, len(best.parameters) - len(fit.parameters))
+    def gap(fit: Fit) -> float:
+        more = max(0, len(best.parameters) - len(fit.parameters))
+        return log_likelihood_gain(fit.cost, best.cost, len(best.white)) - more
 
-    return {
-        other.effect.id: fit
-        for other, fit, gap in zip(others, fits, gaps, strict=True)
-        if is_possible(fit, records, NORMAL_95)
-        and (gap - richer(fit) <= widest or rms_difference(fit, best) <= camera)
-        and other.effect.id != effect.id
-    }
+    return {other.effect.id: fit for other, fit in fits if gap(fit) <= widest or rms_difference(fit, best) <= camera}
 
 
-def is_possible(fit: Fit, records: Sequence[Record], within: float = 0.0) -> bool:
-    """Return whether the parameters of a plant's last effect describe that effect at all; see `Effect.possible`.
+def _nearest_possible(fit: Fit, records: Sequence[Record]) -> Fit | None:
+    """Return a fit, or else one with a larger size of its last effect that describes that effect; see `is_possible`.
 
-    Parameters
-    ----------
-    fit : Fit
-        Of a plant with at least one effect.
-    records : sequence of Record
-        The recordings that it was fitted to.
-    within : float
-        How far the effect's size may be moved to be possible, in its standard uncertainties.
+    A stop that is hardly touched is fitted as well by a spring that is softer than any stop.
     """
+    name = effects_of(fit)[-1].parameters[0].name
+    size = float(fit.parameters[fit.model.names.index(name)])
+    tried = chain([fit], (fit_at(fit, name, times * size, records) for times in LARGER))
+    return next((one for one in tried if is_possible(one, records)), None)
+
+
+def is_possible(fit: Fit, records: Sequence[Record]) -> bool:
+    """Return whether the parameters of a plant's last effect describe that effect at all; see `Effect.possible`."""
     plant, effect = plant_of(fit), effects_of(fit)[-1]
     first = len(fit.parameters) - len(effect.parameters)
     abc = np.zeros(3)
@@ -372,16 +373,7 @@ def is_possible(fit: Fit, records: Sequence[Record], within: float = 0.0) -> boo
     predicted = np.concatenate([r.angle - left for r, left in zip(records, fit.residuals, strict=True)])
     span = max(float(r.time[-1] - r.time[0]) for r in records)
     motion = Motion(float(predicted.min()), float(predicted.max()), usual_range(predicted), span)
-
-    def possible(change: float) -> bool:
-        values = fit.parameters[first:].copy()
-        values[0] += change
-        return effect.possible(tuple(effect.complete(values).tolist()), tuple(abc.tolist()), motion)
-
-    if possible(0.0) or within == 0.0:
-        return possible(0.0)
-    reach = within * float(np.nan_to_num(fit.sigma[first]))
-    return possible(reach) or possible(-reach)
+    return effect.possible(tuple(effect.complete(fit.parameters[first:]).tolist()), tuple(abc.tolist()), motion)
 
 
 def rms_difference(one: Fit, other: Fit) -> float:

@@ -32,7 +32,7 @@ from anglecam.identification.noise import Noise
 from anglecam.identification.output_error import fit_output_error
 from anglecam.identification.systematic import full_sigma
 from anglecam.identification.variable_projection import point_at
-from anglecam.loop.refit import plant_of
+from anglecam.loop.refit import fit_at, plant_of
 from anglecam.models.plant import Plant
 
 THRESHOLD = 3.841459
@@ -165,33 +165,6 @@ def interval_of(fit: Fit, name: str, records: Sequence[Record], noise: Noise) ->
 def _variance(fit: Fit) -> float:
     """Return the variance of the whitened residuals, rad²."""
     return float(max(fit.cost / max(1, len(fit.white) - fit.slopes.rank), SMALLEST_SIGMA**2))
-
-
-def fit_at(fit: Fit, name: str, value: float, records: Sequence[Record], near: Fit | None = None) -> Fit:
-    """Fit a plant again with one parameter held at a value.
-
-    Parameters
-    ----------
-    fit : Fit
-        With the parameter among its parameters.
-    name : str
-        The parameter.
-    value : float
-        SI.
-    records : sequence of Record
-        The fitted recordings.
-    near : Fit, optional
-        A fit of this kind, with the parameter held at another value, to start from in place of ``fit``.
-
-    Returns
-    -------
-    Fit
-        Without the parameter.
-    """
-    plant, place = plant_of(fit), fit.model.names.index(name)
-    held = replace(plant, effects=tuple(e.with_fixed({name: value}) for e in plant.effects))
-    start = np.delete(fit.parameters, place) if near is None else near.parameters
-    return fit_output_error(held, records, [start], nuisance=(near or fit).nuisance, phi=fit.phi)
 
 
 def _profile_once(

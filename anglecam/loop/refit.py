@@ -1,9 +1,11 @@
-"""Variants of a fitted plant: with another AR(1) coefficient, without one of its effects, or with reordered effects."""
+"""Variants of a fitted plant: another AR(1) coefficient, a parameter held, without an effect, effects reordered."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from anglecam.data.record import Record
 from anglecam.effects import Effect
@@ -49,3 +51,30 @@ def plant_of(fit: Fit) -> Plant:
     if not isinstance(fit.model, Plant):
         raise TypeError("only a Plant has effects")
     return fit.model
+
+
+def fit_at(fit: Fit, name: str, value: float, records: Sequence[Record], near: Fit | None = None) -> Fit:
+    """Fit a plant again with one parameter held at a value.
+
+    Parameters
+    ----------
+    fit : Fit
+        With the parameter among its parameters.
+    name : str
+        The parameter.
+    value : float
+        SI.
+    records : sequence of Record
+        The fitted recordings.
+    near : Fit, optional
+        A fit of this kind, with the parameter held at another value, to start from in place of ``fit``.
+
+    Returns
+    -------
+    Fit
+        Without the parameter.
+    """
+    plant, place = plant_of(fit), fit.model.names.index(name)
+    held = replace(plant, effects=tuple(e.with_fixed({name: value}) for e in plant.effects))
+    start = np.delete(fit.parameters, place) if near is None else near.parameters
+    return fit_output_error(held, records, [start], nuisance=(near or fit).nuisance, phi=fit.phi)
