@@ -311,10 +311,11 @@ def find_rivals(
 
     If B is true, log L(A) − log L(B) is normal with mean −d²/2 and variance d², where d is the distance, in standard
     deviations of the noise, from B's prediction to the nearest prediction of A (Cox, J. R. Statist. Soc. B 24, 1962).
-    Whatever d is, the difference exceeds z²/2 no more often than a standard normal variable exceeds z. In a film,
-    errors of the measurement may follow the motion, too, so a difference below the angle's uncertainty does not count.
-    Each parameter that A has more than B follows noise, and counts one nat (Akaike). Where B's
-    best fit does not describe B, the nearest one that does is judged.
+    Whatever d is, the difference exceeds z²/2 no more often than a standard normal variable exceeds z. A is the best of
+    several effects, and each of them can exceed it, so the rate is divided among them (Bonferroni). Each parameter that
+    A has more than B follows noise, and counts one nat (Akaike). Where B's best fit does not describe B, the nearest
+    one that does is judged. In a film, errors of the measurement may follow the motion, too, so a difference below the
+    angle's uncertainty does not count.
 
     Parameters
     ----------
@@ -344,7 +345,7 @@ def find_rivals(
 
     others = [other for other in others if other.effect.id != effect.id]
     fits = [(other, fit) for other, fit in zip(others, map_in_threads(fit_rival, others), strict=True) if fit]
-    widest = 0.5 * special.ndtri(policy.candidates.true_rival_rejection_rate) ** 2
+    widest = 0.5 * special.ndtri(policy.candidates.true_rival_rejection_rate / max(1, len(others))) ** 2
 
     def gap(fit: Fit) -> float:
         more = max(0, len(best.parameters) - len(fit.parameters))
