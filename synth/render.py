@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 Frames = NDArray[np.uint8]
 
-CHUNK = 8
+CHUNK = 4
 """Frames that a worker draws at a time."""
 WORTH_A_WORKER = 60
 """Number of frames that take about as long to draw as another worker takes to start."""
