@@ -73,8 +73,8 @@ class Command:
             return None
         level = self.at(np.arange(begin, self.time[-1], SAMPLE))
         lags = np.arange(1, len(level) // 2 + 1)
-        energy = 2.0 * float(np.var(level))
-        if len(lags) == 0 or energy == 0.0:
+        energy = 2.0 * float(np.var(level)) if len(lags) else 0.0
+        if energy == 0.0:
             return None
         off = np.array([np.mean((level[lag:] - level[:-lag]) ** 2) for lag in lags]) / energy
         unlike = np.maximum.accumulate(off) > 0.5  # a slow command resembles itself a moment later

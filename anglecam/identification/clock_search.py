@@ -37,7 +37,7 @@ def coarse_offset(record: Record) -> float:
     Returns
     -------
     float
-        Within half a recording; 0 where the command never changes.
+        Within half a recording; 0 where the command or the angle never changes.
     """
     command = record.command
     if command is None or command.first_change() is None:
@@ -47,6 +47,8 @@ def coarse_offset(record: Record) -> float:
     most = math.ceil(SEARCHED_SHARE * span / step)
     grid = record.time[0] + step * np.arange(math.floor(span / step) + 1)
     angle = np.interp(grid, record.time, record.angle)
+    if not np.any(np.diff(angle)):
+        return 0.0
     wide = grid[0] + step * np.arange(-most, len(grid) + most)
     left: Floats = np.full(2 * most + 1, np.inf)
     for hz, ratio in PLANTS:

@@ -39,6 +39,8 @@ from anglecam.threads import map_in_threads
 
 NARROW, WIDE = math.radians(20.0), math.radians(120.0)
 """Ranges of motion, rad, between which bounds and starts of the effects hold as they stand."""
+STILL = 1e-6
+"""Smallest range of motion, rad, to which they are scaled: that of a body at rest is zero."""
 
 
 @dataclass(frozen=True)
@@ -288,7 +290,7 @@ def applicable(records: Sequence[Record], rate: float = 1.0) -> list[Effect]:
     upright = next((r.mass_from_upright for r in records if r.mass_from_upright is not None), None)
     if upright is not None:
         fixed["gravity_deg"] = upright
-    width = max(float(np.ptp(r.angle)) for r in records)
+    width = max(STILL, *(float(np.ptp(r.angle)) for r in records))
     swing = width / min(max(width, NARROW), WIDE)
     return [
         e

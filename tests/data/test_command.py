@@ -104,3 +104,7 @@ def test_where_no_camera_was_no_effect_of_its_picture_is_offered(session):
     (session / "sine.angles.csv").rename(session / "sine.avi")
     with pytest.raises(RigError, match="source: encoder"):
         read_session(session)
+
+
+def test_a_command_whose_only_change_is_its_last_row_has_no_cycle():
+    assert Command(np.arange(3.0), np.array([0.0, 0.0, 1.0])).cycle is None

@@ -9,6 +9,7 @@ import pytest
 
 from anglecam.effects import effect
 from anglecam.identification.clock_fit import fit_clocks
+from anglecam.identification.clock_search import coarse_offset
 from anglecam.identification.clocks import clocks_of
 from anglecam.identification.identify_records import identify_records
 from anglecam.io.rig import Rig
@@ -108,3 +109,9 @@ def test_clocks_are_fitted_together_with_the_effects_of_the_plant():
     sigma = np.sqrt(np.diag(found.covariance))[:3]
     assert np.all(np.abs(found.delays - [0.2, 0.0, -0.1]) < 4.0 * sigma)
     assert found.fit.parameters[3] == pytest.approx(2.0, rel=0.05)
+
+
+def test_an_angle_that_moves_in_its_last_frame_only_shows_no_offset():
+    still = session(TruePlant(), 0)[0]
+    still = replace(still, angle=np.append(np.full(len(still.time) - 1, 0.5), 0.9))
+    assert coarse_offset(still.between(0.0, still.time[-1])) == 0.0

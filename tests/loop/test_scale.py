@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -64,3 +66,8 @@ def test_bounds_and_starts_are_widened_with_the_value_and_never_narrowed():
     assert delay.at_scale(10.0, 1.0) == delay
     limit = effect("rate_limit").parameters[0]  # its reciprocal is fitted, so a small limit is a large value
     assert limit.at_scale(1.0, 0.1).upper == pytest.approx(10.0 * limit.upper)
+
+
+def test_a_body_that_never_moves_lacks_nothing():
+    at_rest = replace(oscillation("rest", 0), angle=np.full(540, 0.2))
+    assert close_records([at_rest]).verdict == "nothing_missing"
