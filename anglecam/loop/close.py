@@ -288,7 +288,7 @@ def _structure_remains(task: Task, first: Assessment, last: Assessment, before: 
 
 def _model_that_stands(task: Task, first: Assessment, last: Assessment) -> Assessment:
     """Return the model with the effects that stand although structure remains; the base model if it is wrong."""
-    final = model_that_stands(task, last)
+    final = model_that_stands(task, first, last)
     return first if _is_wrong(task, final, smallest_structure(task, first)) else final
 
 

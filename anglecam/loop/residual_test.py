@@ -32,7 +32,7 @@ from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit, whiten
-from anglecam.identification.joined import Joined, join
+from anglecam.identification.joined import RUNAWAY, Joined, join
 from anglecam.identification.noise import ar1_coefficient
 from anglecam.identification.quantisation import Grid, quantisation
 from anglecam.identification.slopes import Slopes
@@ -400,8 +400,10 @@ def _p_of_space(basis: Floats, slopes: Slopes, residuals: Floats, energy: Floats
     """Return p-value and log-likelihood gain of a space for each residual (column).
 
     They follow from the share of the residual's energy in the part of the space that the fit cannot follow. For white
-    noise in n dimensions the share in k of them has the distribution Beta(k/2, (n − k)/2).
+    noise in n dimensions the share in k of them has the distribution Beta(k/2, (n − k)/2). Columns in which an unstable
+    plant runs away are left out.
     """
+    basis = basis[:, np.max(np.abs(basis), axis=0) < RUNAWAY]
     u, size, _ = np.linalg.svd(slopes.without_followed(basis), full_matrices=False)
     u = u[:, size > 1e-6 * max(float(np.linalg.norm(basis)), 1e-300)]
     k = u.shape[1]

@@ -112,11 +112,13 @@ def changes(fit: Fit, records: Sequence[Record], effects: Sequence[Effect]) -> l
             return richer.predict_all(np.append(fit.parameters, effect_parameters), runs, first)[0]
 
         base = predict(effect.null)  # with the effect in the model, so that errors of the integrator cancel
+        if not np.all(np.abs(base) < RUNAWAY):
+            continue
         starts = starts_of(effect, seen)
         for start in starts:
-            change = predict(start) - base
-            if np.all(np.abs(change) < RUNAWAY):
-                found.append(Change(effect, start, change, starts[0]))
+            changed = predict(start)
+            if np.all(np.abs(changed) < RUNAWAY):
+                found.append(Change(effect, start, changed - base, starts[0]))
     return found
 
 

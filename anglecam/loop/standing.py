@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.noise import Noise
@@ -18,22 +20,26 @@ from anglecam.loop.refit import effects_of, refit_without
 from anglecam.loop.stepwise import Assessment, Task, assess
 
 
-def model_that_stands(task: Task, last: Assessment) -> Assessment:
+def model_that_stands(task: Task, first: Assessment, last: Assessment) -> Assessment:
     """Remove the effects that leave most of the error which they were added to explain.
 
     Parameters
     ----------
     task : Task
         Recordings and policy.
+    first : Assessment
+        Of the base model.
     last : Assessment
         Of the final model, whose residual shows structure.
 
     Returns
     -------
     Assessment
-        Of the model with the effects that stand; ``last`` if all of them do.
+        Of the model with the effects that stand; ``last`` if all of them do, ``first`` if none does, or if what is
+        left of the model predicts worse than a constant angle.
     """
     now, noise = last, task.noise_within(last.fit)
+    spread = float(np.std(np.concatenate([r.angle - r.angle.mean() for r in task.fitted])))
     while effects_of(now.fit):
         weakest, without = min(
             ((effect, _without(task, now.fit, effect)) for effect in effects_of(now.fit)),
@@ -43,7 +49,10 @@ def model_that_stands(task: Task, last: Assessment) -> Assessment:
         if share <= task.policy.verdict.partly_explained_share:
             break
         task.progress(f"without {weakest.id}")
-        now = assess(task, refit_without(now.fit, weakest, task.fitted))
+        fewer = refit_without(now.fit, weakest, task.fitted)
+        if not effects_of(fewer) or not fewer.rmse < spread:
+            return first
+        now = assess(task, fewer)
     return now
 
 
