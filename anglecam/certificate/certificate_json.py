@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from anglecam.certificate.certify import Certificate, Certified
-from anglecam.certificate.statement import aliases, conditions, doubt, statement
+from anglecam.certificate.statement import aliases, conditions, doubt, is_certified, statement
 from anglecam.effects import effect
 from anglecam.identification.systematic import full_sigma
 from anglecam.loop.refit import effects_of, plant_of
@@ -64,19 +64,20 @@ def what_to_play(one: Certified) -> str | None:
 
 def _quantity_as_dict(one: Certified, certificate: Certificate) -> dict[str, Any]:
     quantity, play = one.quantity, what_to_play(one)
-    value = math.nan if one.profile is None else quantity.in_file(one.profile.estimate)
-    low, high = quantity.interval_in_file(*one.interval)
+    certified = is_certified(certificate)
+    value = quantity.in_file(one.profile.estimate) if certified and one.profile is not None else math.nan
+    low, high = quantity.interval_in_file(*one.interval) if certified else (-math.inf, math.inf)
     content: dict[str, Any] = {
         "id": quantity.id,
         "meaning": quantity.meaning,
         "effect": quantity.effect_id,
         "attributed": one.accepted,
-        "state": one.state,
-        "statement": statement(one, certificate.clock.lamp),
+        "state": one.state if certified else "not_certified",
+        "statement": statement(one, certificate.clock.shared, certified),
         quantity.key: {"value": value, "interval_95": [low, high]},
     }
     gain = command_gain(certificate)
-    if quantity.is_torque and gain is not None:
+    if certified and quantity.is_torque and gain is not None:
         content["command_deg"] = {"value": value / gain, "interval_95": [low / gain, high / gain]}
     command = one.experiment.command if one.experiment else None
     return content | {

@@ -41,9 +41,17 @@ class Clock:
     """Whether a lamp in the picture shows the first change of the command."""
     sigma: float = 0.0
     """Standard uncertainty of the instant at which the lamp lit, s."""
+    one_log: bool = False
+    """Whether an encoder's angle and the command were logged by one clock."""
+
+    @property
+    def shared(self) -> bool:
+        """Whether a delay is the servo's alone, and not the sum with an offset between two clocks."""
+        return self.lamp or self.one_log
 
 
 NO_LAMP = Clock(False)
+ONE_LOG = Clock(False, one_log=True)
 
 
 @dataclass(frozen=True)
@@ -135,8 +143,8 @@ def _certified(verdict: Verdict, quantity: Quantity, effect: Effect | None, cloc
 
 
 def _bounded(effect: Effect, clock: Clock) -> Effect:
-    """Return dead time without negative values where a lamp shows the command's clock; other effects as they are."""
-    if effect.id != "dead_time" or not clock.lamp:
+    """Return dead time without negative values where the command's clock is known; other effects as they are."""
+    if effect.id != "dead_time" or not clock.shared:
         return effect
     size = effect.parameters[0]
     return replace(effect, parameters=(replace(size, lower=0.0, starts=tuple(s for s in size.starts if s > 0.0)),))

@@ -25,7 +25,7 @@ NOT_NAMED = (
 ONE_AT_A_TIME = "Dead time and a lag of the same length act almost alike: this is the interval with no {other}."
 
 
-def statement(one: Certified, clock_shared: bool = False) -> str:
+def statement(one: Certified, clock_shared: bool = False, certified: bool = True) -> str:
     """Return what the recordings show of a quantity, as one phrase.
 
     Parameters
@@ -33,7 +33,9 @@ def statement(one: Certified, clock_shared: bool = False) -> str:
     one : Certified
         The quantity.
     clock_shared : bool
-        Whether a lamp shows the clock of the command, so that dead time is not the sum with a clock offset.
+        Whether command and angle have one clock, so that dead time is not the sum with a clock offset.
+    certified : bool
+        Whether the verdict explains the motion. If not, no interval is stated.
 
     Returns
     -------
@@ -47,6 +49,8 @@ def statement(one: Certified, clock_shared: bool = False) -> str:
     if one.profile is None:
         return f"{name}: not determined by these recordings"
     low, high = quantity.interval_in_file(*one.interval)
+    if not certified:
+        return f"{name}: not certified"
     if one.state == "not_determined":
         known = [f"above {_down(low, quantity.unit)}"] if math.isfinite(low) and low > 0.0 else []
         known += [f"below {_up(high, quantity.unit)}"] if math.isfinite(high) else []
@@ -66,21 +70,28 @@ def statement(one: Certified, clock_shared: bool = False) -> str:
 
 def aliases(one: Certified, certificate: Certificate) -> list[str]:
     """Return what could be mistaken for a quantity in these recordings, a sentence each."""
+    if not is_certified(certificate):
+        return []
     notes = [NOT_NAMED] if one.state == "measured" and not one.accepted else []
-    lamp = certificate.clock.lamp
+    shared = certificate.clock.shared
     named = {e.id for e in effects_of(certificate.verdict.after)}
     if one.rivals:
         listed = ", ".join(_plain(rival) for rival in one.rivals)
         notes.append(f"These recordings cannot distinguish it from: {listed}. The interval leaves each of them open.")
     if one.quantity.id == "dead_time":
-        notes += [] if lamp else [SUM_OF_DELAYS]
+        notes += [] if shared else [SUM_OF_DELAYS]
         if "actuator_lag" not in {*named, *one.rivals}:
             notes.append(ONE_AT_A_TIME.format(other="lag"))
     if one.quantity.id == "lag":
-        notes += [] if lamp else [LAG_WITHOUT_LAMP]
+        notes += [] if shared else [LAG_WITHOUT_LAMP]
         if "dead_time" not in {*named, *one.rivals}:
             notes.append(ONE_AT_A_TIME.format(other="dead time"))
     return notes
+
+
+def is_certified(certificate: Certificate) -> bool:
+    """Return whether the verdict explains enough of the motion for its intervals to be stated."""
+    return certificate.verdict.verdict != "unexplained"
 
 
 def doubt(certificate: Certificate) -> str | None:
@@ -93,8 +104,8 @@ def doubt(certificate: Certificate) -> str | None:
     size += f", the noise {noise:.2g}°" if verdict.noise.known else ""
     if verdict.verdict == "unexplained":
         return (
-            f"The intervals do not hold. The model leaves structure that no effect explains ({size}). What is missing "
-            "may have changed every value below; anglecam close shows its shape."
+            f"Nothing is certified. The model leaves structure that no effect explains ({size}). What is missing may "
+            "have changed every value; the report shows its shape."
         )
     return (
         f"The intervals may be too narrow. The model explains most of the motion, but leaves structure that no further "

@@ -59,16 +59,21 @@ def fit_clocks(records: Sequence[Record], effects: Sequence[tuple[Effect, Floats
     Parameters
     ----------
     records : sequence of Record
-        Of one rig; those without a command are left out.
+        Of one rig; those without a command that changes, or that never move, are left out.
     effects : sequence of (Effect, (k,) ndarray)
         Of the plant, with starting values of their parameters, SI; those that the clocks stand for are left out.
 
     Returns
     -------
     ClockFit or None
-        ``None`` where no recording has a command, and for more than `MOST_RECORDINGS`.
+        ``None`` where no recording has a command that changes and an angle that moves, and for more than
+        `MOST_RECORDINGS`.
     """
-    driven = [r for r in records if r.command is not None]
+    driven = [
+        r
+        for r in records
+        if r.command is not None and r.command.first_change() is not None and np.any(np.diff(r.angle))
+    ]
     if not 0 < len(driven) <= MOST_RECORDINGS:
         return None
     coarse = np.array([coarse_offset(r) for r in driven])

@@ -75,11 +75,11 @@ class Clocks:
         """Return the value of ``clock`` in ``model.json``."""
         found: dict[str, Any] = {}
         for i, name in enumerate(self.names):
-            drift = None
+            drift, sigma = None, self.offset_sigmas[i]
             if self.drifts is not None and self.drift_sigmas is not None:
                 drift = {"value": 1e6 * self.drifts[i], "sigma": 1e6 * self.drift_sigmas[i]}
             found[name] = {
-                "offset_s": {"value": self.offsets[i], "sigma": self.offset_sigmas[i]},
+                "offset_s": {"value": self.offsets[i] if np.isfinite(sigma) else np.nan, "sigma": sigma},
                 "drift_ppm": drift,
             }
         dead = None if self.dead_time is None else dict(zip(("value", "sigma"), self.dead_time, strict=True))

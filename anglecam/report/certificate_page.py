@@ -13,14 +13,20 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from rich.table import Table
 
 from anglecam import __version__
-from anglecam.certificate.certificate_json import certificate_as_dict, command_gain
+from anglecam.certificate.certificate_json import certificate_as_dict
 from anglecam.certificate.certify import Certificate, Certified
+from anglecam.certificate.statement import is_certified
 from anglecam.io.files import write_atomically
 from anglecam.loop.profile import THRESHOLD
 from anglecam.report.figures import AFTER, BEFORE, FAINT, MEASURED, STYLE, _svg
 
 COLOURS = {True: "#1f6f8b", False: "#b5651d"}
-STATES = {"measured": "measured", "bounded": "bound", "not_determined": "not determined"}
+STATES = {
+    "measured": "measured",
+    "bounded": "bound",
+    "not_determined": "not determined",
+    "not_certified": "not certified",
+}
 TALLEST = 12.0
 """Largest deviance that a figure shows; beyond it the value is excluded without any doubt."""
 
@@ -45,10 +51,9 @@ def write_certificate_page(
     """
     environment = Environment(loader=PackageLoader("anglecam.report", "."), autoescape=True, undefined=StrictUndefined)
     content = certificate_as_dict(certificate)
-    rows = [
-        _row(one, shown, certificate) for one, shown in zip(certificate.quantities, content["quantities"], strict=True)
-    ]
+    rows = [_row(one, shown) for one, shown in zip(certificate.quantities, content["quantities"], strict=True)]
     drawn = [one for one in certificate.quantities if one.profile is not None and len(one.profile.values) > 2]
+    drawn = drawn if is_certified(certificate) else []
     text = environment.get_template("certificate.html").render(
         title=title,
         version=__version__,
@@ -77,16 +82,16 @@ def certificate_table(certificate: Certificate) -> Table:
     return table
 
 
-def _row(one: Certified, content: dict[str, Any], certificate: Certificate) -> dict[str, Any]:
+def _row(one: Certified, content: dict[str, Any]) -> dict[str, Any]:
     """Return a quantity's row; a torque also in degrees of command."""
-    gain, command = command_gain(certificate), ""
-    if one.quantity.is_torque and gain is not None and one.state != "not_determined":
-        low, high = (end / gain for end in one.quantity.interval_in_file(*one.interval))
+    command = ""
+    if "command_deg" in content and one.state != "not_determined":
+        low, high = content["command_deg"]["interval_95"]
         command = {
             "measured": f"{low:.3g}° to {high:.3g}°",
             "bounded": f"above {low:.2g}°" if one.quantity.is_limit else f"below {high:.2g}°",
         }[one.state]
-    return content | {"state": STATES[one.state], "name": one.quantity.name, "command": command}
+    return content | {"state": STATES[content["state"]], "name": one.quantity.name, "command": command}
 
 
 def _figure(drawn: Sequence[Certified]) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from anglecam.certificate.certificate_json import COMMAND_ENDING, certificate_as_dict
-from anglecam.certificate.certify import NO_LAMP, Certificate, Clock, certify
+from anglecam.certificate.certify import NO_LAMP, ONE_LOG, Certificate, Clock, certify
 from anglecam.io.command_csv import COMMAND_ENDING as COMMAND_FILE
 from anglecam.io.files import write_json
 from anglecam.io.session import Session, recording_name
@@ -59,7 +59,9 @@ def write_certificate(
 
 
 def clock_of(measured: MeasuredSession) -> Clock:
-    """Return how the clocks of a session agree: by the lamps that its clips show, in all clips that have a command."""
+    """Return how the clocks of a session agree: by lamps in all clips that have a command, or in one log."""
+    if measured.session.rig.source == "encoder":
+        return ONE_LOG
     commands = {r.name: r.command for r in measured.session.recordings}
     between = []
     for series in measured.series:

@@ -31,8 +31,11 @@ def session_clocks(
     Returns
     -------
     Clocks or None
-        ``None`` as of `anglecam.identification.clock_fit.fit_clocks`.
+        ``None`` for the logs of an encoder, which have one clock, and as of
+        `anglecam.identification.clock_fit.fit_clocks`.
     """
+    if measured.session.rig.source == "encoder":
+        return None
     commands = {recording.name: recording.command for recording in measured.session.recordings}
     as_filed = [replace(r, command=commands[r.name]) if r.command is not None else r for r in records]
     fit = fit_clocks(as_filed, effects)

@@ -103,7 +103,11 @@ def test_an_unexplained_verdict_says_that_its_intervals_do_not_hold():
     unexplained = replace(certificate, verdict=replace(certificate.verdict, verdict="unexplained"))
     content = certificate_as_dict(unexplained)
     assert not content["intervals_hold"]
-    assert content["doubt"].startswith("The intervals do not hold. The model leaves structure")
+    assert content["doubt"].startswith("Nothing is certified. The model leaves structure")
+    for one in content["quantities"]:
+        assert one["state"] == "not_certified"
+        assert one["statement"].endswith(": not certified")
+        assert "command_deg" not in one
     partly = replace(certificate, verdict=replace(certificate.verdict, verdict="partly_explained"))
     assert "may be too narrow" in certificate_as_dict(partly)["doubt"]
 
