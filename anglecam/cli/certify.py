@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from anglecam.cli.json_output import report_file
 from anglecam.cli.options import HoldOut, Out, SessionFolder
-from anglecam.cli.progress import end, progress_bars
+from anglecam.cli.progress import leave, stages
 from anglecam.cli.sessions import close_and_report
 from anglecam.terminal import screen
 
@@ -19,13 +19,9 @@ def certify(
     from anglecam.workflow.certified import FILE, PAGE, write_certificate
 
     measured, verdict = close_and_report(session, out, hold_out or ())
-    with progress_bars() as bars:
-        bar = bars.add_task("", total=None)
-        certificate = write_certificate(
-            measured, verdict, out, progress=lambda stage: bars.update(bar, description=stage)
-        )
-        bars.update(bar, description="done", completed=1, total=1)
+    with stages() as begin:
+        certificate = write_certificate(measured, verdict, out, progress=begin)
     report_file("certificate", out / FILE)
     screen.print(certificate_table(certificate))
     screen.print(f"certificate: {out / PAGE}", soft_wrap=True)
-    end(measured.problems)
+    leave(measured.problems)

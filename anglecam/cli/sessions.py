@@ -13,7 +13,7 @@ import typer
 
 from anglecam.cli.json_output import report, report_file
 from anglecam.cli.options import HoldOut, Out, SessionFolder
-from anglecam.cli.progress import end, progress_bars
+from anglecam.cli.progress import leave, progress_bars, stages, tell
 from anglecam.cli.this_run import this_run
 from anglecam.errors import InputError, RigError, printable
 from anglecam.io.session import Session, read_session
@@ -54,7 +54,7 @@ def identify(
         screen.print(doubt, soft_wrap=True, highlight=False, markup=False)
     if takes_neck and neck is None:
         screen.print("the neck is the paper's: one spring, constant γ; declare yours with --neck", soft_wrap=True)
-    end(measured.problems)
+    leave(measured.problems)
 
 
 def close(
@@ -64,7 +64,7 @@ def close(
 ) -> None:
     """Find what the model lacks: loop.json, report.html and, where it helps, the command to play next."""
     measured, _ = close_and_report(session, out, hold_out or ())
-    end(measured.problems)
+    leave(measured.problems)
 
 
 def close_and_report(session: Path, out: Path, hold_out: Sequence[str]) -> tuple[MeasuredSession, Verdict]:
@@ -82,17 +82,8 @@ def close_and_report(session: Path, out: Path, hold_out: Sequence[str]) -> tuple
             "measuring corrected an effect of the camera (lens, slanted view, or a marker off the axis); the loop "
             "starts from the uncorrected angles and reports the effect if its size exceeds the stated uncertainty"
         )
-    with progress_bars() as bars:
-        bar = bars.add_task("", total=None)
-        closed = write_closed(
-            measured,
-            shown,
-            out,
-            hold_out=hold_out,
-            progress=lambda stage: bars.update(bar, description=stage),
-            run=this_run(),
-        )
-        bars.update(bar, description="done", completed=1, total=1)
+    with stages() as begin:
+        closed = write_closed(measured, shown, out, hold_out=hold_out, progress=begin, run=this_run())
     report_file("loop", out / "loop.json")
     report(report=str(out / REPORT) if (out / REPORT).exists() else None, notes=list(measured.notes))
     screen.print(model_table(closed.models))
@@ -118,9 +109,10 @@ def measure_recordings(opened: Session, out: Path) -> MeasuredSession:
         )
     for note in measured.notes:
         screen.print(printable(note), soft_wrap=True, highlight=False, markup=False)
+    tell(measured.problems)
+    if measured.problems and measured.records:
+        used = ", ".join(record.name for record in measured.records)
+        screen.print(printable(f"{opened.directory}: what follows is of {used} alone"), soft_wrap=True)
     if not measured.records:
-        for problem in measured.problems:
-            errors.print(str(problem))
-            report(problems=list(problem.args))
         raise InputError(f"{opened.directory}: no recording can be used")
     return measured
