@@ -79,6 +79,9 @@ class Parameter:
     geometric: bool = False
     """Whether geometry sets its bounds, as a camera seldom stands more than 50° aslant; they then limit the size
     whatever the recordings show."""
+    unlimited: bool = False
+    """Whether the effect remains what it is however large this size, as a rigid stop is a stop; recordings then need
+    not limit it from above."""
     swing_power: int = 0
     """Power of the motion's width with which the value in files grows where the effect keeps its share of the motion:
     1 for a friction torque, −2 for a cubic stiffness; 0 where it does not scale, as for a direction in space."""

@@ -57,7 +57,7 @@ EFFECT = Effect(
     equation="θ̈ = c·u − a·θ̇ − b·θ − k·δ·(1 + χ·δ̇) with δ = θ − θ₊ > 0, and mirrored below θ₋",
     relaxes="Table 1, Fig. 4: the range of the linkage is not reached",
     parameters=(
-        Parameter("stop_stiffness_per_s2", "k", 0.0, 0.0, 5e4),
+        Parameter("stop_stiffness_per_s2", "k", 0.0, 0.0, 5e4, unlimited=True),
         Parameter("upper_stop_deg", "θ₊", 0.0, 0.0, 1e3, to_file=math.degrees(1.0), inverse=True, swing_power=1),
         Parameter("lower_stop_deg", "θ₋", 0.0, -1e3, 0.0, to_file=math.degrees(1.0), inverse=True, swing_power=1),
         Parameter("dissipation_s_per_rad", "χ", 0.0, 0.0, 10.0, swing_power=-1),

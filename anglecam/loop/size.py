@@ -41,7 +41,8 @@ def sizes_determined(fit: Fit, records: Sequence[Record], policy: Policy = DEFAU
     Returns
     -------
     bool
-        False if a size is at a bound, changes no prediction or has no upper limit; geometry is a limit.
+        False if a size is at a bound, changes no prediction or has no upper limit; geometry is a limit, and
+        the stiffness of a stop needs none.
     """
     return all(_determined(fit, effect, records, policy) for effect in effects_of(fit))
 
@@ -50,6 +51,8 @@ def _determined(fit: Fit, effect: Effect, records: Sequence[Record], policy: Pol
     first = effect.parameters[0]
     place = fit.model.names.index(first.name)
     size, sigma = fit.parameters[place] - first.null, fit.sigma[place]
+    if first.unlimited:
+        return bool(size != 0.0)
     if not np.isfinite(sigma):
         return False
     if first.geometric or abs(size) > policy.candidates.linear_size_sigmas * sigma:

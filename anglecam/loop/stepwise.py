@@ -183,7 +183,7 @@ def add_effects(task: Task, first: Assessment, now: Assessment, candidates: Sequ
     Assessment
         Of the final model.
     """
-    negligible, visited = smallest_structure(task, first), [_names(now)]
+    negligible, visited = smallest_structure(task, first), [now]
     most = task.policy.stepwise.most_effects
     while candidates:
         best = candidates[0]
@@ -200,9 +200,9 @@ def add_effects(task: Task, first: Assessment, now: Assessment, candidates: Sequ
         if not sizes_determined(added.fit, task.fitted, task.policy):
             candidates = candidates[1:]
             continue
-        if _names(added) in visited:  # otherwise an effect could be replaced and added again without end
-            break
-        visited.append(_names(added))
+        if _names(added) in map(_names, visited):  # effects replace each other without end
+            return min(visited, key=lambda one: one.cross_validated.robust_sigma)
+        visited.append(added)
         now, candidates = _next(task, added, negligible)
     return now
 
