@@ -27,7 +27,7 @@ STATION_NOTES = {
     "camera": "It is an effect of the camera, not of the mechanism: the body moves as the model predicts, but the film "
     "shows another angle or time.",
 }
-OPTIONAL_COLUMNS = {"sigma": "median σ, °", "bound": "6 px bound, °", "lever": "lever arm, px"}
+OPTIONAL_COLUMNS = {"sigma": "median σ, °", "bound": "worst case if the mark is off by 6 px, °", "lever": "lever arm, px"}
 """Columns of the table of recordings that are shown only if they are not empty."""
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 TESTS = {
