@@ -65,7 +65,7 @@ def write_overlay(film: Film, measured: Measured, path: Path) -> None:
 def draw_frame(image: Image, measured: Measured, index: int) -> Image:
     """Draw one frame's line pivot→mark, outline, 6 px and 10 px circles, angle and sigma, or the status.
 
-    Of a pivot outside the picture, an arrow at the edge shows the direction, and a number how far beyond the edge it is.
+    Of a pivot outside the picture, an arrow at the edge shows the direction, and a number the distance from there.
 
     Parameters
     ----------
