@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from anglecam.data.rounding import with_uncertainty
 from anglecam.data.series import AngleSeries
 from anglecam.effects import effect
 from anglecam.effects.unit_names import split_unit
@@ -17,7 +18,7 @@ from anglecam.loop.residual_test import StructureTest
 from anglecam.loop.stepwise import applicable
 from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import size_of
-from anglecam.report.wording import plain, summary_of, with_uncertainty
+from anglecam.report.wording import plain, summary_of
 
 ESTIMATORS = {"ekf": "extended Kalman filter", "oe2": "output error"}
 STATION_NOTES = {
@@ -27,7 +28,11 @@ STATION_NOTES = {
     "camera": "It is an effect of the camera, not of the mechanism: the body moves as the model predicts, but the film "
     "shows another angle or time.",
 }
-OPTIONAL_COLUMNS = {"sigma": "median σ, °", "bound": "worst case if the mark is off by 6 px, °", "lever": "lever arm, px"}
+OPTIONAL_COLUMNS = {
+    "sigma": "median σ, °",
+    "bound": "worst case if the mark is off by 6 px, °",
+    "lever": "lever arm, px",
+}
 """Columns of the table of recordings that are shown only if they are not empty."""
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 TESTS = {

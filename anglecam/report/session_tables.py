@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from rich.table import Table
 
+from anglecam.data.rounding import with_uncertainty
 from anglecam.identification.identified import Identified
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.verdict import Verdict
@@ -21,15 +22,15 @@ def model_table(models: Sequence[Identified]) -> Table:
         parameters = zip(model.names, model.values, model.sigmas, strict=True)
         table.add_row(
             model.estimator,
-            "\n".join(f"{name} = {value:.5g}" + _plus_minus(sigma) for name, value, sigma in parameters),
+            "\n".join(f"{name} = {_stated(value, sigma)}" for name, value, sigma in parameters),
             f"{np.degrees(model.fit.rmse):.4f}",
             "" if model.held_out is None else f"{np.degrees(model.held_out.rmse):.4f}",
         )
     return table
 
 
-def _plus_minus(sigma: float) -> str:
-    return f" ± {sigma:.2g}" if np.isfinite(sigma) else ", no uncertainty"
+def _stated(value: float, sigma: float) -> str:
+    return with_uncertainty(value, sigma) if np.isfinite(sigma) else f"{value:.4g}, no uncertainty"
 
 
 def loop_table(verdict: Verdict, experiment: Experiment | None = None) -> Table:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from anglecam.data.rounding import with_uncertainty
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.loop.free_form.result import FreeForm
@@ -121,22 +122,6 @@ def describe(effect: Effect, verdict: Verdict) -> str:
     model = fitted_parameters(verdict)
     fitted = ((p.name, model[p.name]) for p in effect.parameters)
     return ", ".join(f"{name} = {with_uncertainty(one['value'], one['sigma'])}" for name, one in fitted)
-
-
-def with_uncertainty(value: float, sigma: float, unit: str = "") -> str:
-    """Return a value, rounded to the second digit of its standard uncertainty, with the uncertainty and ``unit``.
-
-    Examples
-    --------
-    >>> with_uncertainty(12.3456, 0.078, " 1/s")
-    '12.346 ± 0.078 1/s'
-    """
-    if not np.isfinite(value):
-        return "none"
-    if not 0.0 < sigma < np.inf:
-        return f"{value:.4g}{unit} (not determined by these recordings, or at a bound)"
-    digits = int(np.clip(1 - np.floor(np.log10(sigma)), 0, 8))
-    return f"{value:.{digits}f} ± {sigma:.{digits}f}{unit}"
 
 
 def summary_of(effect: Effect, fit: Fit) -> str:
