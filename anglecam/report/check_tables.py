@@ -11,6 +11,7 @@ from anglecam.check.prediction import Prediction
 from anglecam.check.sigma_terms import SPREAD
 from anglecam.check.smallest import SIZE_SPREAD
 from anglecam.data.rounding import with_uncertainty
+from anglecam.effects.unit_names import unit_on_screen
 from anglecam.errors import printable
 
 _CAUSES = {
@@ -57,7 +58,7 @@ def smallest_table(found: Prediction) -> Table:
     for one in sizes.smallest:
         first = one.effect.parameters[0]
         limit = "up to " if first.inverse else ""
-        table.add_row(one.effect.id, first.name, f"{limit}{one.size:.2g} {first.unit}".strip())
+        table.add_row(one.effect.id, first.name, f"{limit}{one.size:.2g}{unit_on_screen(first.name)}")
     return table
 
 
