@@ -8,6 +8,7 @@ import numpy as np
 from rich.table import Table
 
 from anglecam.data.rounding import with_uncertainty
+from anglecam.identification.estimators import ESTIMATORS
 from anglecam.identification.identified import Identified
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.verdict import Verdict
@@ -21,7 +22,7 @@ def model_table(models: Sequence[Identified]) -> Table:
     for model in models:
         parameters = zip(model.names, model.values, model.sigmas, strict=True)
         table.add_row(
-            model.estimator,
+            f"{model.estimator}: {ESTIMATORS[model.estimator].summary}",
             "\n".join(f"{name} = {_stated(value, sigma)}" for name, value, sigma in parameters),
             f"{np.degrees(model.fit.rmse):.4f}",
             "" if model.held_out is None else f"{np.degrees(model.held_out.rmse):.4f}",
@@ -44,7 +45,7 @@ def loop_table(verdict: Verdict, experiment: Experiment | None = None) -> Table:
         file = "" if experiment.command is None else f": {NEXT_COMMAND}"
         table.add_row("record this next", f"{experiment.description}, {experiment.duration:g} s{file}")
     if verdict.free_form is not None:
-        table.add_row("missing torque", free_form_sentence(verdict.free_form))
+        table.add_row("missing torque", free_form_sentence(verdict.free_form, verdict))
     before, after = np.degrees(verdict.before_held_out.rmse), np.degrees(verdict.after_held_out.rmse)
     table.add_row("prediction error, ° RMS", f"{before:.4f} before, {after:.4f} after")
     table.add_row("noise floor, ° RMS", noise_in_words(verdict))

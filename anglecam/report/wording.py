@@ -57,15 +57,21 @@ QUANTITIES = {
 """What a torque of free form can depend on, in words."""
 
 
-def free_form_sentence(found: FreeForm) -> str:
-    """Return what a torque of free form means, as one sentence and the causes with such a shape."""
+def free_form_sentence(found: FreeForm, verdict: Verdict) -> str:
+    """Return what a torque of free form means, of what data its errors are, and the causes with such a shape."""
     over = " and on the ".join(QUANTITIES[name] for name in found.band.over)
     before, after = (f"{np.degrees(p.rmse):.3g}°" for p in (found.before, found.after))
     effects = ", ".join(plain(name) for name in found.resembles)
-    causes = f"Effects with a similar shape: {effects}." if effects else "No effect of the ledger has such a shape."
+    causes = f"Effects with a similar shape: {effects}." if effects else "No effect that anglecam knows has such a shape."
+    cut = verdict.searched is not verdict.fitted
+    if verdict.held_out:
+        on = "stretches of the held-out recordings" if cut else "the held-out recordings"
+    else:
+        on = f"blocks of {'stretches of ' if cut else ''}the recordings, each left out of the fit that predicts it,"
+    whole = " The verdict's prediction error is another one: it is of all frames." if cut else ""
     return (
-        f"The model lacks a torque that depends on the {over}; with a smooth function of it, the error on data that "
-        f"the model was not fitted to falls from {before} to {after}. {causes}"
+        f"The model lacks a torque that depends on the {over}; with a smooth function of it, the error on {on} "
+        f"falls from {before} to {after}.{whole} {causes}"
     )
 
 
