@@ -62,7 +62,7 @@ def free_form_sentence(found: FreeForm, verdict: Verdict) -> str:
     over = " and on the ".join(QUANTITIES[name] for name in found.band.over)
     before, after = (f"{np.degrees(p.rmse):.3g}°" for p in (found.before, found.after))
     effects = ", ".join(plain(name) for name in found.resembles)
-    causes = f"Effects with a similar shape: {effects}." if effects else "No effect that anglecam knows has such a shape."
+    causes = f"Effects with a similar shape: {effects}." if effects else "No known effect has such a shape."
     cut = verdict.searched is not verdict.fitted
     if verdict.held_out:
         on = "stretches of the held-out recordings" if cut else "the held-out recordings"
