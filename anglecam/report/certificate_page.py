@@ -127,7 +127,8 @@ def _draw_profile(ax: Any, one: Certified) -> None:
     ax.set_xlabel(quantity.unit.strip(), fontsize=8)
     ax.set_ylim(0.0, TALLEST)
     if quantity.is_limit:
-        places, names = limit_ticks(*ax.get_xlim(), quantity.to_file)
+        low, high = ax.get_xlim()
+        places, names = limit_ticks(low, high, quantity.to_file)
         ax.set_xticks(places, names)
         ax.invert_xaxis()
     else:
@@ -159,7 +160,7 @@ def limit_ticks(low: float, high: float, to_file: float) -> tuple[list[float], l
     """
     least = to_file / high
     if low > 0.5 * high:
-        limits = MaxNLocator(4).tick_values(least, to_file / low)[::-1]
+        limits = np.asarray(MaxNLocator(4).tick_values(least, to_file / low))[::-1]
     else:
         decades = 10.0 ** np.arange(np.floor(np.log10(least)), np.floor(np.log10(least)) + 3)
         limits = np.outer(decades, (1.0, 2.0, 5.0)).ravel()[::-1]
