@@ -18,6 +18,7 @@ from anglecam.cli.documents import clip_as_dict, live_as_dict
 from anglecam.cli.json_output import report
 from anglecam.cli.options import Out
 from anglecam.cli.progress import end, progress_bars
+from anglecam.data.rounding import with_uncertainty
 from anglecam.data.series import OK
 from anglecam.errors import AnglecamError, InputError, printable
 from anglecam.io.live_csv import LiveRow
@@ -129,8 +130,8 @@ def _line(row: LiveRow, latencies: deque[float], late: int) -> str:
         parts.append(f"latency {1e3 * latencies[-1]:.0f} ms, 95 %: {1e3 * np.quantile(latencies, 0.95):.0f} ms")
         parts.append(f"late {late}")
     for name, value, sigma in zip("abc", row.parameters, row.parameter_sigmas, strict=True):
-        if np.isfinite(value) and value != 0.0:
-            parts.append(f"{name} {value:.4g} ± {sigma:.2g}")
+        if np.isfinite([value, sigma]).all() and value != 0.0:
+            parts.append(f"{name} {with_uncertainty(value, sigma)}")
     return "  ".join(parts)
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from scipy import special
 
+from anglecam.data.rounding import with_uncertainty
 from anglecam.data.typing import Floats
 from anglecam.identification.clock_fit import ClockFit
 
@@ -64,11 +65,16 @@ class Clocks:
         offset, sigma = float(self.offsets[i]), float(self.offset_sigmas[i])
         if abs(offset) > SIGNIFICANT * sigma:
             side = "after" if offset > 0.0 else "before"
-            parts.append(f"the motion comes {abs(offset):.4f} ± {sigma:.1g} s {side} the command's time stamps")
+            parts.append(
+                f"the motion comes {with_uncertainty(abs(offset), sigma, ' s')} {side} the command's time stamps"
+            )
         if self.drifts is not None and self.drift_sigmas is not None:
             drift, sigma = 1e6 * float(self.drifts[i]), 1e6 * float(self.drift_sigmas[i])
             if abs(drift) > SIGNIFICANT * sigma:
-                parts.append(f"the clip's clock runs {drift:+.0f} ± {sigma:.1g} ppm against the command's")
+                sign = "+" if drift > 0.0 else ""
+                parts.append(
+                    f"the clip's clock runs {sign}{with_uncertainty(drift, sigma, ' ppm')} against the command's"
+                )
         return f"{self.names[i]}: {', and '.join(parts)}" if parts else None
 
     def as_dict(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from anglecam.data.record import Record
+from anglecam.data.rounding import with_uncertainty
 from anglecam.data.tables import html_table, pandas_table
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
@@ -127,7 +128,7 @@ class Verdict:
         rows = []
         for accepted in self.accepted:
             sizes = (
-                f"{p.name} = {self.parameters[p.name]['value']:.4g} ± {self.parameters[p.name]['sigma']:.2g}"
+                f"{p.name} = {with_uncertainty(self.parameters[p.name]['value'], self.parameters[p.name]['sigma'])}"
                 for p in accepted.effect.parameters
             )
             rows.append([accepted.effect.id, ", ".join(sizes)])

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 
 from anglecam.camera.calibrate import BoardCalibration
 from anglecam.camera.lens import Lens
+from anglecam.data.rounding import with_uncertainty
 from anglecam.errors import printable
 from anglecam.report.figures import AFTER, FAINT, MEASURED, STYLE
 
@@ -35,9 +36,10 @@ def plot_calibration(found: BoardCalibration, path: Path, title: str) -> None:
         _draw_residuals(axes[1], found)
         _draw_distortion(axes[2], found)
         lens = found.calibration
+        focal = with_uncertainty(lens.focal_px, lens.sigma("fx"), " px")
         figure.suptitle(
-            f"{printable(title)}: {lens.views} poses, {lens.rms_px:.3f} px RMS, focal length {lens.focal_px:.1f} ±"
-            f" {lens.sigma('fx'):.1f} px, distortion {' '.join(found.terms) or 'none'}",
+            f"{printable(title)}: {lens.views} poses, {lens.rms_px:.3f} px RMS, focal length {focal},"
+            f" distortion {' '.join(found.terms) or 'none'}",
             fontsize=10,
             parse_math=False,
         )

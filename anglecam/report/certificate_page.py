@@ -10,12 +10,14 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from matplotlib.ticker import MaxNLocator
 from rich.table import Table
 
 from anglecam import __version__
 from anglecam.certificate.certificate_json import certificate_as_dict
 from anglecam.certificate.certify import Certificate, Certified
 from anglecam.certificate.statement import is_certified
+from anglecam.data.rounding import with_uncertainty
 from anglecam.io.files import write_atomically
 from anglecam.loop.profile import THRESHOLD
 from anglecam.report.figures import AFTER, BEFORE, FAINT, MEASURED, STYLE, _svg
@@ -62,6 +64,7 @@ def write_certificate_page(
         content=content,
         rows=rows,
         figure=environment.filters["safe"](_figure(drawn)) if drawn else "",
+        with_uncertainty=with_uncertainty,
         inputs=inputs,
         problems=problems,
     )
@@ -112,9 +115,8 @@ def _figure(drawn: Sequence[Certified]) -> str:
 def _draw_profile(ax: Any, one: Certified) -> None:
     assert one.profile is not None
     quantity, near = one.quantity, one.profile.deviances <= TALLEST
-    # a limit is drawn as its reciprocal, whose 0 is no limit
-    factor = 1.0 / quantity.to_file if quantity.is_limit else quantity.to_file
-    unit = f"1/({quantity.unit.strip()})" if quantity.is_limit else quantity.unit.strip()
+    # A limit is drawn over its reciprocal, whose 0 is no limit; the ticks are named by the limit.
+    factor = 1.0 if quantity.is_limit else quantity.to_file
     ax.plot(factor * one.profile.values[near], one.profile.deviances[near], color=AFTER, lw=1.2, marker=".", ms=3)
     ax.axhline(THRESHOLD, color=BEFORE, lw=0.8, ls="--")
     ends = [end for end in one.interval if np.isfinite(end)]
@@ -122,7 +124,49 @@ def _draw_profile(ax: Any, one: Certified) -> None:
         ax.axvspan(factor * ends[0], factor * ends[1], color=FAINT, alpha=0.6, zorder=0)
     ax.axvline(factor * one.profile.estimate, color=MEASURED, lw=0.8)
     ax.set_title(quantity.name, loc="left", fontsize=9)
-    ax.set_xlabel(("1/limit, " if quantity.is_limit else "") + unit, fontsize=8)
-    ax.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
-    ax.locator_params(axis="x", nbins=4)
+    ax.set_xlabel(quantity.unit.strip(), fontsize=8)
     ax.set_ylim(0.0, TALLEST)
+    if quantity.is_limit:
+        low, high = ax.get_xlim()
+        places, names = limit_ticks(low, high, quantity.to_file)
+        ax.set_xticks(places, names)
+        ax.invert_xaxis()
+    else:
+        ax.ticklabel_format(axis="x", style="sci", scilimits=(-3, 4))
+        ax.locator_params(axis="x", nbins=4)
+
+
+def limit_ticks(low: float, high: float, to_file: float) -> tuple[list[float], list[str]]:
+    """Return the ticks of an axis over the reciprocal of a limit.
+
+    Parameters
+    ----------
+    low, high : float
+        Ends of the axis, SI.
+    to_file : float
+        The limit is this divided by the reciprocal.
+
+    Returns
+    -------
+    places : list of float
+        Round values of the limit as reciprocals, ascending, at least a quarter of the axis apart.
+    names : list of str
+        The limit at each place; ``∞`` at zero.
+
+    Examples
+    --------
+    >>> limit_ticks(0.0, 0.01, 1.0)[1]
+    ['∞', '200', '100']
+    """
+    least = to_file / high
+    if low > 0.5 * high:
+        limits = np.asarray(MaxNLocator(4).tick_values(least, to_file / low))[::-1]
+    else:
+        decades = 10.0 ** np.arange(np.floor(np.log10(least)), np.floor(np.log10(least)) + 3)
+        limits = np.outer(decades, (1.0, 2.0, 5.0)).ravel()[::-1]
+    candidates = [*([0.0] if low <= 0.0 else []), *(to_file / limits)]
+    places: list[float] = []
+    for place in candidates:
+        if low <= place <= high * (1.0 + 1e-9) and (not places or place - places[-1] > 0.25 * (high - low)):
+            places.append(float(place))
+    return places, ["∞" if place == 0.0 else f"{to_file / place:.6g}" for place in places]

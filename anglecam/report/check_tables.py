@@ -10,6 +10,8 @@ from rich.table import Table
 from anglecam.check.prediction import Prediction
 from anglecam.check.sigma_terms import SPREAD
 from anglecam.check.smallest import SIZE_SPREAD
+from anglecam.data.rounding import with_uncertainty
+from anglecam.effects.unit_names import unit_on_screen
 from anglecam.errors import printable
 
 _CAUSES = {
@@ -32,7 +34,7 @@ def prediction_table(found: Prediction) -> Table:
     table.add_row("noise", f"{found.noise_grey:.1f} grey levels{contrast}")
     if found.exposure_s is not None:
         value, sigma = (1000.0 * x for x in found.exposure_s)
-        table.add_row("exposure", f"{value:.1f} ± {sigma:.1f} ms, from the blur")
+        table.add_row("exposure", f"{with_uncertainty(value, sigma, ' ms')}, from the blur")
     whole = math.degrees(found.whole.sigma)
     table.add_row("sigma of a frame", f"{whole:.2g}°, expected between {whole / SPREAD:.2g}° and {whole * SPREAD:.2g}°")
     terms = {_CAUSES[f.name]: getattr(found.whole, f.name) ** 2 for f in fields(found.whole)}
@@ -56,7 +58,7 @@ def smallest_table(found: Prediction) -> Table:
     for one in sizes.smallest:
         first = one.effect.parameters[0]
         limit = "up to " if first.inverse else ""
-        table.add_row(one.effect.id, first.name, f"{limit}{one.size:.2g} {first.unit}".strip())
+        table.add_row(one.effect.id, first.name, f"{limit}{one.size:.2g}{unit_on_screen(first.name)}")
     return table
 
 

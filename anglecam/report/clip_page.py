@@ -27,7 +27,7 @@ from anglecam.video.film import Film
 
 MEANINGS = {
     "ok": "the angle is measured",
-    "no_mouth": "the mark was not found",
+    "no_mouth": "the mark was not found; in the paper the mark was a mouth",
     "occluded": "the mark is covered, or has another shape than in the other frames",
     "ambiguous": "several places could be the mark",
     "no_pivot": "the pivot was not found",

@@ -79,7 +79,10 @@ def angle_plot(series: Sequence[Columns], curves: Sequence[Curve] = ()) -> Plot:
     command = [Curve("command", "command", COMMAND, "step")] if "command" in names else []
     bands = [SIGMA_BAND] if "sigma" in names else []
     radii = sorted((n for n in names if n.startswith("bound")), key=lambda n: float(n.removeprefix("bound")))
-    bands += [Band(f"{n.removeprefix('bound')} px bound", "#f3e3c3", n, "angle", shown=False) for n in radii[::-1]]
+    bands += [
+        Band(f"worst case, mark off by {n.removeprefix('bound')} px", "#f3e3c3", n, "angle", shown=False)
+        for n in radii[::-1]
+    ]
     return Plot("angle, °", (*command, *curves, Curve("angle", "angle", MEASURED)), tuple(bands))
 
 

@@ -137,7 +137,7 @@ def held_out_panels(before: Prediction, after: Prediction | None) -> list[Panel]
 
 
 def residual_torque_panels(torques: Sequence[ResidualTorque]) -> list[Panel]:
-    """Draw the residual torque against angle, velocity, command and time, with means over bins."""
+    """Draw the residual torque against angle, velocity and command, as means over bins, and over time."""
     torque = np.degrees(np.concatenate([r.torque for r in torques]))
     noise = 2.0 * np.degrees(float(np.median(np.concatenate([r.sigma for r in torques]))))
     against = {
@@ -153,8 +153,9 @@ def residual_torque_panels(torques: Sequence[ResidualTorque]) -> list[Panel]:
 
     def draw(axes: Axes, x: Floats) -> None:
         band(axes)
-        axes.plot(x, torque, ".", color=AFTER, ms=2.5, alpha=0.35, label="frame")
-        axes.plot(*_means(x, torque), "o-", color=MEASURED, ms=4, lw=1.2, label="mean")
+        middle, mean, low, high = _binned(x, torque)
+        axes.fill_between(middle, low, high, color=AFTER, alpha=0.3, lw=0.0, label="middle 80 % of the frames")
+        axes.plot(middle, mean, "o-", color=MEASURED, ms=4, lw=1.2, label="mean")
 
     def over_time(axes: Axes) -> None:
         band(axes)
@@ -212,12 +213,16 @@ def _predict_from_rest(fit: Fit, command: Command, time: Floats, like: Record) -
     return fit.model.predict(fit.parameters, time, command, state, like.view)
 
 
-def _means(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Return means of x and y over bins of equal width with at least `FEWEST_FRAMES` frames."""
+def _binned(x: Floats, y: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return the means of x and y, and the ends of the middle 80 % of y, over bins of equal width.
+
+    Bins with fewer than `FEWEST_FRAMES` frames are left out.
+    """
     edges = np.linspace(x.min(), np.nextafter(x.max(), np.inf), BINS + 1)
     inside = [(x >= low) & (x < high) for low, high in pairwise(edges)]
     full = [i for i in inside if i.sum() >= FEWEST_FRAMES]
-    return np.array([x[i].mean() for i in full]), np.array([y[i].mean() for i in full])
+    low, high = np.array([np.quantile(y[i], (0.1, 0.9)) for i in full]).reshape(-1, 2).T
+    return np.array([x[i].mean() for i in full]), np.array([y[i].mean() for i in full]), low, high
 
 
 def worst(residuals: Sequence[Floats], most: int = MOST_RECORDINGS) -> list[int]:

@@ -98,7 +98,7 @@ def write_report(
         colour=COLOURS[verdict.verdict],
         verdict=verdict,
         sentence=sentence(verdict),
-        free_form="" if verdict.free_form is None else free_form_sentence(verdict.free_form),
+        free_form="" if verdict.free_form is None else free_form_sentence(verdict.free_form, verdict),
         noise=noise_in_words(verdict),
         remains=remaining_structure(verdict),
         free_run=free_run(verdict),

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from anglecam.data.rounding import with_uncertainty
 from anglecam.data.series import AngleSeries
 from anglecam.effects import effect
-from anglecam.effects.unit_names import split_unit
+from anglecam.effects.unit_names import split_unit, unit_on_screen
 from anglecam.errors import printable
 from anglecam.identification.identified import Identified
 from anglecam.loop.refit import plant_of
@@ -17,7 +18,7 @@ from anglecam.loop.residual_test import StructureTest
 from anglecam.loop.stepwise import applicable
 from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import size_of
-from anglecam.report.wording import plain, summary_of, with_uncertainty
+from anglecam.report.wording import plain, summary_of
 
 ESTIMATORS = {"ekf": "extended Kalman filter", "oe2": "output error"}
 STATION_NOTES = {
@@ -27,7 +28,11 @@ STATION_NOTES = {
     "camera": "It is an effect of the camera, not of the mechanism: the body moves as the model predicts, but the film "
     "shows another angle or time.",
 }
-OPTIONAL_COLUMNS = {"sigma": "median σ, °", "bound": "6 px bound, °", "lever": "lever arm, px"}
+OPTIONAL_COLUMNS = {
+    "sigma": "median σ, °",
+    "bound": "worst case if the mark is off by 6 px, °",
+    "lever": "lever arm, px",
+}
 """Columns of the table of recordings that are shown only if they are not empty."""
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 TESTS = {
@@ -130,11 +135,11 @@ def effect_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, Any]
                 {
                     "symbol": parameter.symbol,
                     "name": split_unit(parameter.name)[0],
-                    "value": with_uncertainty(stated["value"], stated["sigma"], _unit(parameter.name)),
+                    "value": with_uncertainty(stated["value"], stated["sigma"], unit_on_screen(parameter.name)),
                 }
                 for parameter, stated in zip(a.effect.parameters, shown["parameters"].values(), strict=True)
             ],
-            "interval": interval_in_words(shown["size"]["interval_95"], _unit(shown["size"]["parameter"])),
+            "interval": interval_in_words(shown["size"]["interval_95"], unit_on_screen(shown["size"]["parameter"])),
             "left_out": [p.symbol for p in effect(a.effect.id).parameters[len(a.effect.parameters) :]],
             "relaxes": a.effect.relaxes,
             "station_note": STATION_NOTES[a.effect.station],
@@ -153,7 +158,7 @@ def final_rows(verdict: Verdict, result: dict[str, Any]) -> list[dict[str, str]]
     """List a, b and c of the final model."""
     count = plant_of(verdict.after).base_count
     return [
-        {"name": split_unit(name)[0], "value": with_uncertainty(stated["value"], stated["sigma"], _unit(name))}
+        {"name": split_unit(name)[0], "value": with_uncertainty(stated["value"], stated["sigma"], unit_on_screen(name))}
         for name, stated in list(result["model"].items())[:count]
     ]
 
@@ -166,7 +171,7 @@ def detectable_rows(result: dict[str, Any]) -> list[dict[str, Any]]:
             "what": split_unit(size_of(d["id"]).name)[0],
             "least": "at most" if size_of(d["id"]).inverse else "at least",
             "size": _number(d["smallest"]),
-            "unit": _unit(size_of(d["id"]).name),
+            "unit": unit_on_screen(size_of(d["id"]).name),
         }
         for d in sorted(result["detectable"], key=lambda d: d["id"])
     ]
@@ -176,12 +181,6 @@ def undetectable(verdict: Verdict) -> list[str]:
     """Name the effects that the residual test would not have detected at any size that was tried."""
     detected = {*verdict.last_test.detectable, *(name for a in verdict.accepted for name in a.alias_set)}
     return [plain(e.id) for e in applicable([*verdict.fitted, *verdict.held_out]) if e.id not in detected]
-
-
-def _unit(name: str) -> str:
-    """Return a parameter's unit as it follows a number."""
-    words = split_unit(name)[1].replace("deg", "°").replace("s2", "s²")
-    return words if words == "°" else " " + words
 
 
 def _number(value: float) -> str:

@@ -119,7 +119,7 @@ def _picture(image: Image, series: AngleSeries, moment: Moment, chosen: bool) ->
     return Picture(
         row,
         series.first_frame + row,
-        f"{caption_of(series, row)}; {moment.why}",
+        caption_of(series, row) + ("" if moment.why == EVENLY else f"; {moment.why}"),
         "data:image/webp;base64," + base64.b64encode(thumbnail(image)).decode(),
         (width, height),
         **places,

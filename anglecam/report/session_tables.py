@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from rich.table import Table
 
+from anglecam.data.rounding import with_uncertainty
+from anglecam.identification.estimators import ESTIMATORS
 from anglecam.identification.identified import Identified
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.verdict import Verdict
@@ -20,16 +22,16 @@ def model_table(models: Sequence[Identified]) -> Table:
     for model in models:
         parameters = zip(model.names, model.values, model.sigmas, strict=True)
         table.add_row(
-            model.estimator,
-            "\n".join(f"{name} = {value:.5g}" + _plus_minus(sigma) for name, value, sigma in parameters),
+            f"{model.estimator}: {ESTIMATORS[model.estimator].summary}",
+            "\n".join(f"{name} = {_stated(value, sigma)}" for name, value, sigma in parameters),
             f"{np.degrees(model.fit.rmse):.4f}",
             "" if model.held_out is None else f"{np.degrees(model.held_out.rmse):.4f}",
         )
     return table
 
 
-def _plus_minus(sigma: float) -> str:
-    return f" ± {sigma:.2g}" if np.isfinite(sigma) else ", no uncertainty"
+def _stated(value: float, sigma: float) -> str:
+    return with_uncertainty(value, sigma) if np.isfinite(sigma) else f"{value:.4g}, no uncertainty"
 
 
 def loop_table(verdict: Verdict, experiment: Experiment | None = None) -> Table:
@@ -43,7 +45,7 @@ def loop_table(verdict: Verdict, experiment: Experiment | None = None) -> Table:
         file = "" if experiment.command is None else f": {NEXT_COMMAND}"
         table.add_row("record this next", f"{experiment.description}, {experiment.duration:g} s{file}")
     if verdict.free_form is not None:
-        table.add_row("missing torque", free_form_sentence(verdict.free_form))
+        table.add_row("missing torque", free_form_sentence(verdict.free_form, verdict))
     before, after = np.degrees(verdict.before_held_out.rmse), np.degrees(verdict.after_held_out.rmse)
     table.add_row("prediction error, ° RMS", f"{before:.4f} before, {after:.4f} after")
     table.add_row("noise floor, ° RMS", noise_in_words(verdict))

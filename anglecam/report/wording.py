@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from anglecam.data.rounding import with_uncertainty
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.loop.free_form.result import FreeForm
@@ -56,15 +57,21 @@ QUANTITIES = {
 """What a torque of free form can depend on, in words."""
 
 
-def free_form_sentence(found: FreeForm) -> str:
-    """Return what a torque of free form means, as one sentence and the causes with such a shape."""
+def free_form_sentence(found: FreeForm, verdict: Verdict) -> str:
+    """Return what a torque of free form means, of what data its errors are, and the causes with such a shape."""
     over = " and on the ".join(QUANTITIES[name] for name in found.band.over)
     before, after = (f"{np.degrees(p.rmse):.3g}°" for p in (found.before, found.after))
     effects = ", ".join(plain(name) for name in found.resembles)
-    causes = f"Effects with a similar shape: {effects}." if effects else "No effect of the ledger has such a shape."
+    causes = f"Effects with a similar shape: {effects}." if effects else "No known effect has such a shape."
+    cut = verdict.searched is not verdict.fitted
+    if verdict.held_out:
+        on = "stretches of the held-out recordings" if cut else "the held-out recordings"
+    else:
+        on = f"blocks of {'stretches of ' if cut else ''}the recordings, each left out of the fit that predicts it,"
+    whole = " The verdict's prediction error is another one: it is of all frames." if cut else ""
     return (
-        f"The model lacks a torque that depends on the {over}; with a smooth function of it, the error on data that "
-        f"the model was not fitted to falls from {before} to {after}. {causes}"
+        f"The model lacks a torque that depends on the {over}; with a smooth function of it, the error on {on} "
+        f"falls from {before} to {after}.{whole} {causes}"
     )
 
 
@@ -121,22 +128,6 @@ def describe(effect: Effect, verdict: Verdict) -> str:
     model = fitted_parameters(verdict)
     fitted = ((p.name, model[p.name]) for p in effect.parameters)
     return ", ".join(f"{name} = {with_uncertainty(one['value'], one['sigma'])}" for name, one in fitted)
-
-
-def with_uncertainty(value: float, sigma: float, unit: str = "") -> str:
-    """Return a value, rounded to the second digit of its standard uncertainty, with the uncertainty and ``unit``.
-
-    Examples
-    --------
-    >>> with_uncertainty(12.3456, 0.078, " 1/s")
-    '12.346 ± 0.078 1/s'
-    """
-    if not np.isfinite(value):
-        return "none"
-    if not 0.0 < sigma < np.inf:
-        return f"{value:.4g}{unit} (not determined by these recordings, or at a bound)"
-    digits = int(np.clip(1 - np.floor(np.log10(sigma)), 0, 8))
-    return f"{value:.{digits}f} ± {sigma:.{digits}f}{unit}"
 
 
 def summary_of(effect: Effect, fit: Fit) -> str:

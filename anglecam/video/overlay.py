@@ -23,6 +23,9 @@ _TICKS = 90_000
 """Per second; represents 24, 25, 30, 29.97, 60 Hz and milliseconds exactly."""
 _SHIFT = 4
 """Fractional bits of cv2's drawing coordinates."""
+_FONT, _SMALL = cv2.FONT_HERSHEY_SIMPLEX, 0.45
+_ARROW_PX = 30
+"""Length of the arrow that points at a pivot outside the picture."""
 _LINE, _CONTOUR, _CIRCLES, _BAD = (255, 220, 0), (0, 255, 0), (0, 220, 255), (60, 60, 255)
 
 
@@ -60,7 +63,9 @@ def write_overlay(film: Film, measured: Measured, path: Path) -> None:
 
 
 def draw_frame(image: Image, measured: Measured, index: int) -> Image:
-    """Draw one frame's line pivot→mark, outline, 6 px and 10 px circles, angle ± sigma, or the status.
+    """Draw one frame's line pivot→mark, outline, 6 px and 10 px circles, angle and sigma, or the status.
+
+    Of a pivot outside the picture, an arrow at the edge shows the direction, and a number the distance from there.
 
     Parameters
     ----------
@@ -87,18 +92,42 @@ def draw_frame(image: Image, measured: Measured, index: int) -> Image:
         pivot, mark = _fixed(series.pivot_px[index]), _fixed(series.mark_px[index])
         cv2.line(drawn, pivot, mark, _LINE, 1, cv2.LINE_AA, _SHIFT)
         cv2.circle(drawn, pivot, 3 << _SHIFT, _LINE, 1, cv2.LINE_AA, _SHIFT)
+        _point_at_pivot_outside(drawn, series.pivot_px[index], series.mark_px[index])
         for radius in RADII_PX:
             cv2.circle(drawn, mark, round(radius * 2**_SHIFT), _CIRCLES, 1, cv2.LINE_AA, _SHIFT)
         angle, sigma = np.degrees((series.angle[index], series.sigma[index]))
         digits = int(np.clip(1 - np.floor(np.log10(sigma)), 2, 5)) if sigma > 0.0 else 3
-        text += f"{angle:+.{digits}f} +- {sigma:.{digits}f} deg"
+        text += f"{angle:+.{digits}f} deg, sigma {sigma:.{digits}f}"
     else:
         text += series.status[index]
-    font, scale, at = cv2.FONT_HERSHEY_SIMPLEX, 0.6, (10, drawn.shape[0] - 12)
-    (width, height), below = cv2.getTextSize(text, font, scale, 1)
-    cv2.rectangle(drawn, (at[0] - 4, at[1] - height - 4), (at[0] + width + 4, at[1] + below), (0, 0, 0), cv2.FILLED)
-    cv2.putText(drawn, text, at, font, scale, (255, 255, 255) if good else _BAD, 1, cv2.LINE_AA)
+    _write(drawn, text, (10, drawn.shape[0] - 12), 0.6, (255, 255, 255) if good else _BAD)
     return drawn
+
+
+def _point_at_pivot_outside(drawn: Image, pivot_px: Floats, mark_px: Floats) -> None:
+    """Draw an arrow at the edge, where the line from the mark to a pivot outside leaves the picture."""
+    height, width = drawn.shape[:2]
+    mark, pivot = (tuple(int(x) for x in np.round(point)) for point in (mark_px, pivot_px))
+    crosses, _, edge = cv2.clipLine((0, 0, width, height), mark, pivot)
+    beyond = float(np.hypot(*np.subtract(pivot, edge)))
+    if not crosses or beyond == 0.0:
+        return
+    back = np.subtract(mark, pivot) / np.hypot(*np.subtract(mark, pivot))
+    tail = np.round(edge + _ARROW_PX * back).astype(int)
+    cv2.arrowedLine(drawn, (int(tail[0]), int(tail[1])), tuple(edge), _LINE, 2, cv2.LINE_AA, tipLength=0.4)
+    text = f"pivot {beyond:.0f} px outside"
+    (length, tall), _ = cv2.getTextSize(text, _FONT, _SMALL, 1)
+    # Beside the arrow's tail, within the picture and above the line of text at its bottom.
+    x = int(np.clip(tail[0] + 10, 4, max(4, width - length - 4)))
+    y = int(np.clip(tail[1] + 2 * tall, tall + 4, max(tall + 4, height - 40)))
+    _write(drawn, text, (x, y), _SMALL, _LINE)
+
+
+def _write(drawn: Image, text: str, at: tuple[int, int], scale: float, colour: tuple[int, int, int]) -> None:
+    """Write text on black; ``at`` is the left end of its base line."""
+    (width, height), below = cv2.getTextSize(text, _FONT, scale, 1)
+    cv2.rectangle(drawn, (at[0] - 4, at[1] - height - 4), (at[0] + width + 4, at[1] + below), (0, 0, 0), cv2.FILLED)
+    cv2.putText(drawn, text, at, _FONT, scale, colour, 1, cv2.LINE_AA)
 
 
 def _encode(container: av.container.OutputContainer, frames: Iterable[Frame], measured: Measured) -> None:

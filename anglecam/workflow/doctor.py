@@ -139,7 +139,7 @@ def check_self_test() -> Check:
         "duration_s": result.duration_s,
     }
     found = (
-        f"{result.measured} of {result.frames} frames in {result.duration_s:.1f} s,"
+        f"{result.measured} of {result.frames} frames in {result.duration_s:.1f} s after compiling,"
         f" error {error:.2g}° RMS, stated uncertainty {sigma:.2g}°"
     )
     problem = None

@@ -154,12 +154,12 @@ def test_the_picture_next_to_the_cursor_says_how_far_away_it_is(opened):
 
 def test_worst_case_bounds_are_drawn_on_demand_only(opened):
     page = opened.page
-    entry = page.locator('section.recording[data-recording="0"] .legend li', has_text="6 px bound")
+    entry = page.locator('section.recording[data-recording="0"] .legend li', has_text="mark off by 6 px")
     assert entry.is_hidden()
     page.locator("#bounds").check()
     assert entry.is_visible()
     page.locator("#recording").select_option(index=1)
-    assert page.locator('section.recording[data-recording="1"] .legend li', has_text="6 px bound").is_visible()
+    assert page.locator('section.recording[data-recording="1"] .legend li', has_text="mark off by 6 px").is_visible()
 
 
 def test_a_recording_without_a_film_has_curves_and_no_pictures(opened, verdict):

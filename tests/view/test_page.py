@@ -186,7 +186,7 @@ def test_the_stages_are_seen_on_any_frame(page: Page) -> None:
 
 def test_pivot_lamp_and_box_are_declared(page: Page, lab: Path) -> None:
     pivot = page.get_by_role("group", name="Pivot")
-    pivot.get_by_role("button", name="Fix it").click()
+    pivot.get_by_role("button", name="Exactly here").click()
     page.mouse.click(*_on_screen(page, (40.0, 70.0)))
     page.get_by_role("group", name="Lamp").get_by_role("button", name="Point at it").click()
     page.mouse.click(*_on_screen(page, (150.0, 10.0)))

@@ -64,7 +64,7 @@ function fill(): void {
   fillPair("lamp-x", "lamp-y", lamp ?? undefined);
   input("mark-colour").value = named.rgb ? hexOf(named.rgb) : "#808080";
   byId("mark-is").textContent = describeMark();
-  byId("pivot-is").textContent = pivot?.at ? `fixed, ± ${pivot.sigma_px ?? 1} px` : pivot?.near ? "a hint, to some 10 px" : "found by itself";
+  byId("pivot-is").textContent = pivot?.at ? `exactly here, ± ${pivot.sigma_px ?? 1} px` : pivot?.near ? "roughly here, within some 10 px" : "found by itself";
   byId("lamp-is").textContent = lamp ? "lights at the first change of the command" : "none";
   input("from").value = text(frames?.from);
   input("to").value = text(frames?.to);
