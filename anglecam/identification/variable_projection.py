@@ -152,6 +152,7 @@ def _fit_by_trust_region(model: Model, joined: Joined, begin: Point, most: int) 
     patience = 1 if isinstance(model, Plant) and not model.kinked else PATIENCE
     finite = [np.where(np.isfinite(bound), bound, 0.0) for bound in (model.lower, model.upper)]
     margin = [INSIDE * np.maximum(1.0, np.abs(bound)) for bound in finite]
+    margin = [np.minimum(each, 0.25 * (model.upper - model.lower)) for each in margin]
     inside = np.clip(here.parameters, model.lower + margin[0], model.upper - margin[1])
     if not np.array_equal(inside, here.parameters):
         latest = _follow(model, joined, here, slopes, inside)

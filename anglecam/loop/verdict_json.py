@@ -10,7 +10,7 @@ import numpy as np
 
 from anglecam.data.record import Record
 from anglecam.effects import Effect, Parameter, effect
-from anglecam.identification.output_error import predict_output_error
+from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.loop.candidates import Candidate
 from anglecam.loop.cross_validation import predict_held_out
 from anglecam.loop.free_form.result import FreeForm
@@ -177,7 +177,10 @@ def _held_out_error(candidate: Candidate, verdict: Verdict) -> float:
         return candidate.held_out.rmse
     if verdict.searched_held_out:
         return predict_output_error(candidate.fit, verdict.searched_held_out).rmse
-    return predict_held_out(candidate.fit, verdict.searched, (), verdict.policy)[0].rmse
+    fit = candidate.fit
+    if len(fit.nuisance) != len(verdict.searched):  # it was fitted in windows, which later effects made needless
+        fit = fit_output_error(fit.model, verdict.searched, [fit.parameters], phi=fit.phi)
+    return predict_held_out(fit, verdict.searched, (), verdict.policy)[0].rmse
 
 
 def fitted_parameters(verdict: Verdict) -> dict[str, dict[str, float]]:
