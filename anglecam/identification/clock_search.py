@@ -87,4 +87,5 @@ def _correlations(angle: Floats, response: Floats) -> Floats:
     size = np.maximum(squares[n:] - squares[:-n] - total**2 / n, 0.0)
     whole = np.sqrt(size * float(centred @ centred))
     least = 1e-9 * float(whole.max())
-    return np.where(whole > least, along / np.maximum(whole, max(least, 1e-300)), 0.0)
+    # of an angle that hardly moves, rounding leaves more than 1
+    return np.clip(np.where(whole > least, along / np.maximum(whole, max(least, 1e-300)), 0.0), -1.0, 1.0)
