@@ -23,7 +23,7 @@ from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.duplicates import duplicate_frames
 from anglecam.measurement.followed import Followed, follow_mark_or_body
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
-from anglecam.measurement.trust import why_elsewhere, why_few, why_not_rigid
+from anglecam.measurement.trust import why_elsewhere, why_few, why_not_rigid, why_unproven
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.mark.outline_turn import outline_turn
@@ -54,7 +54,7 @@ class Measurement:
     few: str | None = None
     """Message where less than the required share of the frames is measured."""
     other_thing: str | None = None
-    """Message where the mark is seen in part, or turns about another point than the hint's."""
+    """Message where the mark is seen in part, turns about another point than the hint's, or may be another thing."""
 
     @property
     def pivot(self) -> str:
@@ -143,7 +143,11 @@ def measure_clip(
     few = why_few(series.status, rig.least_measured)
     other = None
     if followed.angles.registered is None:
-        other = why_elsewhere(followed.detections, rig) or why_not_rigid(followed.detections, followed.ok)
+        other = (
+            why_elsewhere(followed.detections, rig)
+            or why_not_rigid(followed.detections, followed.ok)
+            or why_unproven(followed.detections)
+        )
     interlaced = _interlaced(film)
     return Measurement(
         series,

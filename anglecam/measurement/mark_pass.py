@@ -26,6 +26,7 @@ from anglecam.measurement.detections import Detections, frame_of_mark, frames_to
 from anglecam.measurement.frame_reading import Sought, read_frames
 from anglecam.measurement.parallel_reading import read_in_parts, readers_for
 from anglecam.measurement.pivot import HEIGHT_SHARE, find_pivot
+from anglecam.measurement.trust import shows_its_centre, travel
 from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.mark.found_mark import FoundMark, Samples, region_in_plane
@@ -236,12 +237,21 @@ def _follow(
 
 
 def _choice(found: FoundMark, track: MarkTrack) -> str | None:
-    """Return what was taken for the mark; ``None`` for a declared mark or a clear red one."""
-    if found.cue in ("declared", "pointed") or (found.cue == "red" and found.margin > _CLEAR):
+    """Return what was taken for the mark; ``None`` for a clear red one, and for a declared one that is seen to turn."""
+    declared = found.cue in ("declared", "pointed")
+    if declared and (found.circle is None or shows_its_centre(track.circle)):
+        return None
+    if found.cue == "red" and found.margin > _CLEAR:
         return None
     places = np.array(
         [r.centre_px for r, s in zip(track.regions, track.status, strict=True) if r is not None and s == OK]
     )
+    if declared:
+        x, y = np.median(places, axis=0)
+        return (
+            f"the thing of the declared colour, around {x:.0f},{y:.0f}, travels {travel(places):.2g} px RMS, too "
+            "little to show that it turns about the pivot: is it the mark?"
+        )
     where = "" if not len(places) else " around {:.0f},{:.0f}".format(*np.median(places, axis=0))
     rgb = ",".join(map(str, found.model.mean_rgb))
     rival = "" if np.isinf(found.margin) else f"; its score is {found.margin:.1f} times that of the next best"
@@ -278,10 +288,13 @@ def _no_mark(path: Path, sample: Sample, rig: Rig) -> str:
     if not sample.decoded:
         return f"{path}: none of its {sample.count} frames can be decoded"
     hint = "" if rig.pivot.expected is None else ", rotating about {:g},{:g}".format(*rig.pivot.expected)
-    return (
-        f"{path}: no mark found in {sample.count} of {sample.count} frames (colour {_colour(rig)}{hint});"
-        " is it in the picture?"
-    )
+    advice = "is it in the picture?"
+    if rig.pointed_mark is not None:
+        advice = (
+            "nothing of that colour turns through the declared place; point at a part of one colour that its "
+            "surroundings lack, or stick a round dot of such a colour on it"
+        )
+    return f"{path}: no mark found in {sample.count} of {sample.count} frames (colour {_colour(rig)}{hint}); {advice}"
 
 
 def _nothing_measured(path: Path, status: Sequence[str], sample: Sample, rig: Rig) -> str:

@@ -23,6 +23,7 @@ from anglecam.measurement.detections import Detections
 from anglecam.measurement.pivot import HINT_PX
 from anglecam.vision.mark.outline_turn import outline_turn
 from anglecam.vision.mark.segment import Region
+from anglecam.vision.pivot.circle import Circle
 
 _MAX_OFF_CIRCLE = 0.02
 """Largest systematic variation of the distance from the pivot, as a share of the mark's travel. An error along the
@@ -112,8 +113,8 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
             f"in {lost} of {len(ok)} frames the mark is not found where a rotation about a fixed pivot would carry it;"
             " it moves otherwise, or is another thing in the other frames"
         )
-    travel = _travel(angles.mark_px)
-    at_rest = not detections.moves or travel < _TRAVEL_PX
+    travelled = travel(angles.mark_px)
+    at_rest = not detections.moves or travelled < _TRAVEL_PX
     if at_rest and not declared:
         return f"nothing is seen to turn; to measure a mechanism at rest, declare {_DECLARE}"
     otherwise = None if at_rest else why_off_circle(detections, angles)
@@ -121,7 +122,7 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
         otherwise = _why_not_its_line(detections, ok, angles)
     if otherwise is not None:
         return otherwise
-    if not declared and not seen_to_turn and not _shows_its_centre(detections):
+    if not declared and not seen_to_turn and not shows_its_centre(detections.circle):
         return (
             f"the mark's path is too short or too straight to show about which point it turns; declare it: {_DECLARE}"
         )
@@ -143,16 +144,16 @@ def why_off_circle(detections: Detections, angles: Angles) -> str | None:
     str or None
         With the variation of the distance, and the travel.
     """
-    travel = _travel(angles.mark_px)
+    travelled = travel(angles.mark_px)
     off, share = _off_circle(detections, angles), _MAX_OFF_CIRCLE
     if detections.body is not None:
         off, share = detections.body.pivot_scatter_px, _MAX_OFF_CENTRE
-        travel = float(np.hypot(travel, detections.body.extent_px * np.nanstd(detections.body.turn)))
-    if off <= max(share * travel, _FLOOR_PX):
+        travelled = float(np.hypot(travelled, detections.body.extent_px * np.nanstd(detections.body.turn)))
+    if off <= max(share * travelled, _FLOOR_PX):
         return None
     return (
         f"what moves does not turn about a fixed pivot: its distance from the centre varies by {off:.2g} px RMS"
-        f" while it travels {travel:.2g} px RMS"
+        f" while it travels {travelled:.2g} px RMS"
     )
 
 
@@ -254,7 +255,12 @@ def why_elsewhere(detections: Detections, rig: Rig) -> str | None:
         With both places; ``None`` where they agree, and for a path that does not show its centre.
     """
     circle = detections.circle
-    if rig.pivot.near is None or detections.lens.tilt != 0.0 or circle is None or not _shows_its_centre(detections):
+    if (
+        rig.pivot.near is None
+        or detections.lens.tilt != 0.0
+        or circle is None
+        or not shows_its_centre(detections.circle)
+    ):
         return None
     off = circle.centre_px - detections.lens.rectify(np.array(rig.pivot.near))
     if off @ np.linalg.solve(circle.centre_covariance_px2 + HINT_PX**2 * np.eye(2), off) < _HINT_SIGMAS**2:
@@ -267,7 +273,34 @@ def why_elsewhere(detections: Detections, rig: Rig) -> str | None:
     )
 
 
-def _travel(mark_px: Floats) -> float:
+def why_unproven(detections: Detections) -> str | None:
+    """Return a message where nothing shows that what is followed is the mark.
+
+    It was not declared, another thing in the picture moves nearly as convincingly, and its path is too short to show
+    about which point it turns. A wire that trembles beside a servo is such a thing.
+
+    Parameters
+    ----------
+    detections : Detections
+        The coarse pass.
+
+    Returns
+    -------
+    str or None
+        With place and travel.
+    """
+    if detections.clear or shows_its_centre(detections.circle):
+        return None
+    places = np.array([r.centre_px for r in detections.regions if r is not None])
+    x, y = detections.lens.distort(np.median(places, axis=0))
+    return (
+        f"what is followed, around {x:.0f},{y:.0f}, travels {travel(places):.2g} px RMS, too little to show that it "
+        "turns about the pivot, and another thing moves nearly as much: nothing shows that it is the mark; declare it: "
+        "mark: {at: [x, y], frame: k} in rig.yaml"
+    )
+
+
+def travel(mark_px: Floats) -> float:
     """Return the RMS distance of the mark from its mean position along the direction of most motion, px."""
     return float(np.sqrt(max(np.linalg.eigvalsh(np.cov(mark_px.T))[-1], 0.0))) if len(mark_px) > 1 else 0.0
 
@@ -293,7 +326,6 @@ def _off_circle(detections: Detections, angles: Angles) -> float:
     return float(np.sqrt(max(variance, 0.0)))
 
 
-def _shows_its_centre(detections: Detections) -> bool:
-    """Return whether the mark's path alone determines its centre."""
-    circle = detections.circle
+def shows_its_centre(circle: Circle | None) -> bool:
+    """Return whether the circle of the mark's path is determined by the path alone."""
     return circle is not None and bool(circle.covariance_px2[2, 2] < (_MAX_SCALE_SIGMA * circle.radius_px) ** 2)

@@ -15,9 +15,7 @@ from anglecam.measurement.tracks import MeasuredTracks
 
 def series_table(measurements: Sequence[Measurement | MeasuredTracks]) -> Table:
     """Tabulate measured recordings: frames, range of angles, uncertainty, pivot and method."""
-    table = Table(
-        "clip", "measured", "angle, °", "median sigma, °", "worst case if the mark is off by 6 px, °", "pivot", "by"
-    )
+    table = Table("clip", "measured", "angle, °", "median sigma, °", "if 6 px off, °", "pivot", "by")
     for column in table.columns[1:5]:
         column.justify = "right"
     for column in table.columns[:3]:

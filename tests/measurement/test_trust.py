@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 
 import cv2
@@ -9,10 +10,10 @@ import numpy as np
 import pytest
 
 from anglecam.errors import InputError
-from anglecam.io.rig import Rig, RigPivot
+from anglecam.io.rig import Rig, RigMark, RigPivot
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.rigid_body_pass import detect_rigid_body
-from anglecam.measurement.trust import why_few, why_not_rigid
+from anglecam.measurement.trust import why_few, why_not_rigid, why_unproven
 from anglecam.video.open_film import open_film
 
 SIZE = (240, 180)
@@ -132,3 +133,29 @@ def test_a_mark_that_is_seen_in_part_is_no_success(tmp_path, covered, doubted):
 def test_a_ball_and_a_screw_at_rest_are_no_rigid_body(tmp_path, screw):
     film = _film(tmp_path, _swing(20.0, lever=100.0), marker=screw)
     assert isinstance(detect_rigid_body(film, Rig()), str)
+
+
+@pytest.mark.parametrize(("amplitude_deg", "doubted"), [(2.0, True), (40.0, False)])
+def test_what_is_not_clearly_the_mark_has_to_show_that_it_turns_about_the_pivot(tmp_path, amplitude_deg, doubted):
+    rig = Rig(pivot=RigPivot(near=(120.0, 30.0)))
+    found = measure_clip(_film(tmp_path, _swing(amplitude_deg, lever=100.0)), rig)
+    assert found.doubt is None
+    message = why_unproven(replace(found.detections, clear=False))
+    assert (message is not None) == doubted
+
+
+def test_a_thing_of_the_declared_colour_that_hardly_moves_is_pointed_out(tmp_path):
+    rig = Rig(mark=RigMark(rgb=(190, 30, 35)), pivot=RigPivot(near=(120.0, 30.0)))
+    few, far = (measure_clip(_film(tmp_path, _swing(a, lever=100.0)), rig).notes for a in (2.0, 40.0))
+    assert any("too little to show that it turns about the pivot: is it the mark?" in note for note in few)
+    assert not any("is it the mark?" in note for note in far)
+
+
+def test_a_mark_that_is_pointed_at_in_the_first_frame_is_looked_at_once(tmp_path):
+    x, y = _swing(30.0)[0]
+    rig = Rig(mark=RigMark(box=(x - 8.0, y - 8.0, x + 8.0, y + 8.0), frame=0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = measure_clip(_film(tmp_path, _swing(30.0)), rig)
+    assert found.doubt is None
+    assert len(found.series.ok) == len(TIME)

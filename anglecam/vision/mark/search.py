@@ -188,6 +188,7 @@ def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hi
     if samples.pointed_px is not None:
         first = np.flatnonzero(blobs.frame == 0)
         through = first[_in_box(blobs.picture_px[first], samples.pointed_px, np.sqrt(mark.area_px2))]
+    once = np.unique(samples.time, return_index=True)[1]  # the declared frame comes first, and may come again
     regions: list[list[Region]] = []
     best: FoundMark | None = None
     for centre in (hint,) if hint is None else (hint, None):
@@ -208,7 +209,7 @@ def _seen_again(mark: FoundMark, cue: Cue, contrast: float, samples: Samples, hi
             ]
             regions = [[region for region in some if region is not None] for some in every]
         again = replace(mark, area_px2=area, place_px=place, circle=track.circle)
-        followed = follow_mark(regions, samples.time, again)
+        followed = follow_mark([regions[i] for i in once], samples.time[once], again)
         share = followed.status.count(OK) / len(followed.status)
         score = contrast * track.score * share**2 * _steadiness(followed, track.circle)
         if share >= _LEAST_SHARE and (best is None or score > best.score):
