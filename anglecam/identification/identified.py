@@ -80,7 +80,8 @@ class Identified:
     @property
     def sigmas(self) -> Floats:
         """Standard uncertainties, in the units of ``names``."""
-        return np.sqrt(np.diag(self.covariance))
+        variance = np.diag(self.covariance)
+        return np.sqrt(np.where(variance >= 0.0, variance, np.nan))  # rounding leaves less than zero of hardly any
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of ``model.json``."""

@@ -179,18 +179,19 @@ def _fit_by_trust_region(model: Model, joined: Joined, begin: Point, most: int) 
         if len(costs) > patience and costs[-1 - patience] - costs[-1] <= _settled_gain(joined) * costs[-1]:
             raise StopIteration
 
-    found = least_squares(
-        errors,
-        inside,
-        jac=jacobian,
-        bounds=(model.lower, model.upper),
-        x_scale="jac",
-        xtol=1e-9,
-        ftol=1e-9,
-        gtol=1e-12,
-        max_nfev=most,
-        callback=settled,
-    )
+    with np.errstate(divide="ignore"):  # SciPy divides by zero where the residual no longer depends on a parameter
+        found = least_squares(
+            errors,
+            inside,
+            jac=jacobian,
+            bounds=(model.lower, model.upper),
+            x_scale="jac",
+            xtol=1e-9,
+            ftol=1e-9,
+            gtol=1e-12,
+            max_nfev=most,
+            callback=settled,
+        )
     return here, slopes, found.nfev
 
 

@@ -344,7 +344,7 @@ def _gain(share: Floats, free: int) -> Floats:
 
 def _competing(smallest: Floats) -> float:
     """Return of how many independent p-values these are the smallest, from their median; at least 1."""
-    return max(1.0, math.log(0.5) / math.log1p(-min(float(np.median(smallest)), 0.5)))
+    return max(1.0, math.log(0.5) / math.log1p(-min(max(float(np.median(smallest)), 1e-12), 0.5)))
 
 
 def _corrected(p: Floats | float, count: float) -> Floats:
