@@ -80,7 +80,7 @@ def learn_from_frames(views: Sequence[FrameView], plane: MotionPlane, pivot: Piv
     with threadpool_limits(limits=1, user_api="blas"):  # small systems, in which threads only wait for each other
         appearance = learn_body(views, [views[i] for i in stack], plane, pivot, noise)
     if appearance is None:
-        return "too little of the body is rigid and has edges"
+        return "too little of the moving body is rigid and textured for the body itself to be measured"
     if abs(appearance.absorbed_share) > _YIELDING:
         return "the body is seen in too few poses, or too obliquely, to be learnt"
     if not _determines_its_lever(appearance, pivot, float(np.ptp([view.turn for view in views]))):

@@ -72,7 +72,7 @@ def test_the_page_states_the_verdict(write, dragged, verdict):
     assert f"{np.degrees(found.before_held_out.rmse):.4f}" in page
     assert sentence(found) in page
     assert "No further recording is needed" not in page
-    assert ("but the evidence is not sufficient" in page) == (verdict == "unexplained")
+    assert ("The best candidate is" in page) == (verdict == "unexplained")
     assert ("This recording would show whether it acts" in page) == (verdict == "unexplained")
     assert ("Detectable effects" in page) == (verdict == "nothing_missing")
     assert "a <b> & c" in page
