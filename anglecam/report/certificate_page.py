@@ -75,7 +75,7 @@ def write_certificate_page(
 def certificate_table(certificate: Certificate) -> Table:
     """Tabulate a certificate for the terminal."""
     content = certificate_as_dict(certificate)
-    table = Table("quantity, 95 %", "", title=content["doubt"], title_justify="left")
+    table = Table("quantity, 95 %", "")
     for one in content["quantities"]:
         lines = list(one["aliases"])
         if one["determined_by"]:
