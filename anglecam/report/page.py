@@ -26,8 +26,8 @@ from anglecam.report.origin import Origin
 from anglecam.report.path_figure import effect_panels, signal_path
 from anglecam.report.session_curves import Watched, session_plots, watch
 from anglecam.report.wording import (
-    free_form_sentence,
     free_run,
+    missing_torque,
     noise_in_words,
     plain,
     remaining_structure,
@@ -98,7 +98,7 @@ def write_report(
         colour=COLOURS[verdict.verdict],
         verdict=verdict,
         sentence=sentence(verdict),
-        free_form="" if verdict.free_form is None else free_form_sentence(verdict.free_form, verdict),
+        free_form=missing_torque(verdict),
         noise=noise_in_words(verdict),
         remains=remaining_structure(verdict),
         free_run=free_run(verdict),

@@ -13,7 +13,7 @@ from anglecam.identification.identified import Identified
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import NEXT_COMMAND
-from anglecam.report.wording import describe, free_form_sentence, noise_in_words, remaining_structure, sentence
+from anglecam.report.wording import describe, missing_torque, noise_in_words, remaining_structure, sentence
 
 
 def model_table(models: Sequence[Identified]) -> Table:
@@ -45,7 +45,7 @@ def loop_table(verdict: Verdict, experiment: Experiment | None = None) -> Table:
         file = "" if experiment.command is None else f": {NEXT_COMMAND}"
         table.add_row("record this next", f"{experiment.description}, {experiment.duration:g} s{file}")
     if verdict.free_form is not None:
-        table.add_row("missing torque", free_form_sentence(verdict.free_form, verdict))
+        table.add_row("missing torque", missing_torque(verdict))
     before, after = np.degrees(verdict.before_held_out.rmse), np.degrees(verdict.after_held_out.rmse)
     table.add_row("prediction error, ° RMS", f"{before:.4f} before, {after:.4f} after")
     table.add_row("noise floor, ° RMS", noise_in_words(verdict))

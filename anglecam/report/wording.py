@@ -74,18 +74,35 @@ QUANTITIES = {
 """What a torque of free form can depend on, in words."""
 
 
-def free_form_sentence(found: FreeForm, verdict: Verdict) -> str:
-    """Return what a torque of free form means, of what data its errors are, and the causes with such a shape."""
+def missing_torque(verdict: Verdict) -> str:
+    """Return `free_form_sentence` of a verdict's torque; empty if it has none."""
+    if verdict.free_form is None:
+        return ""
+    return free_form_sentence(verdict.free_form, bool(verdict.held_out), verdict.searched is not verdict.fitted)
+
+
+def free_form_sentence(found: FreeForm, held_out: bool, stretches: bool) -> str:
+    """Return what a torque of free form means, of what data its errors are, and the causes with such a shape.
+
+    Parameters
+    ----------
+    found : FreeForm
+        The torque.
+    held_out : bool
+        Whether recordings were held out; if not, its errors are those of cross-validation.
+    stretches : bool
+        Whether it was sought on stretches of long recordings.
+    """
     over = " and on the ".join(QUANTITIES[name] for name in found.band.over)
     before, after = (f"{np.degrees(p.rmse):.3g}°" for p in (found.before, found.after))
     effects = ", ".join(plain(name) for name in found.resembles)
     causes = f"Effects with a similar shape: {effects}." if effects else "No known effect has such a shape."
-    cut = verdict.searched is not verdict.fitted
-    if verdict.held_out:
-        on = "stretches of the held-out recordings" if cut else "the held-out recordings"
+    if held_out:
+        on = "stretches of the held-out recordings" if stretches else "the held-out recordings"
     else:
-        on = f"blocks of {'stretches of ' if cut else ''}the recordings, each left out of the fit that predicts it,"
-    whole = " The verdict's prediction error is another one: it is of all frames." if cut else ""
+        part = "stretches of " if stretches else ""
+        on = f"blocks of {part}the recordings, each left out of the fit that predicts it,"
+    whole = " The verdict's prediction error is another one: it is of all frames." if stretches else ""
     return (
         f"The model lacks a torque that depends on the {over}; with a smooth function of it, the error on {on} "
         f"falls from {before} to {after}.{whole} {causes}"

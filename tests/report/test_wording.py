@@ -46,11 +46,7 @@ def test_a_summary_has_the_sign_of_the_fitted_size(name, size, word):
 def test_the_missing_torque_names_the_data_of_its_errors(cut, held_out, on):
     before, after = (SimpleNamespace(rmse=np.radians(error)) for error in (2.92, 1.82))
     found = SimpleNamespace(band=SimpleNamespace(over=("angle",)), before=before, after=after, resembles={})
-    fitted = ("whole",)
-    verdict = SimpleNamespace(
-        fitted=fitted, searched=("stretch",) if cut else fitted, held_out=("another",) if held_out else ()
-    )
-    text = free_form_sentence(found, verdict)
+    text = free_form_sentence(found, held_out, cut)
     assert on in text
     assert "falls from 2.92° to 1.82°." in text
     assert ("of all frames" in text) == cut
