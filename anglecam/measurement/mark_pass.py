@@ -249,7 +249,7 @@ def _choice(found: FoundMark, track: MarkTrack) -> str | None:
     if declared:
         x, y = np.median(places, axis=0)
         return (
-            f"the thing of the declared colour, around {x:.0f},{y:.0f}, travels {travel(places):.2g} px RMS, too "
+            f"what is taken for the declared mark, around {x:.0f},{y:.0f}, travels {travel(places):.2g} px RMS, too "
             "little to show that it turns about the pivot: is it the mark?"
         )
     where = "" if not len(places) else " around {:.0f},{:.0f}".format(*np.median(places, axis=0))

@@ -6,8 +6,10 @@ import numpy as np
 
 from anglecam.effects import effect
 from anglecam.identification.output_error import fit_output_error
+from anglecam.loop.close import close_records
 from anglecam.loop.size import sizes_determined
 from anglecam.models.plant import Plant
+from benchmarks.blind.sessions import session as drawn_session
 from support.motion import Plant as TruePlant
 from support.series import session
 
@@ -27,3 +29,15 @@ def test_the_size_of_what_never_acts_is_not_determined():
     # a spring that acts below an angle which the motion does not reach
     spring, records = fit("one_sided_spring", [-50.0, -1.5], TruePlant())
     assert not sizes_determined(spring, records)
+
+
+def test_a_stop_too_stiff_to_be_measured_is_a_stop_and_no_spring():
+    # the body touches the stops for a few frames, which a rigid stop explains as well
+    stops = {"end_stop": {"upper_deg": 13.87, "lower_deg": -16.42, "stiffness": 1069.7, "dissipation": 0.33}}
+    verdict = close_records(drawn_session(stops, seed=413), held_out=["random"])
+    (stop,) = verdict.accepted
+    assert set(stop.alias_set) == {"end_stop", "one_sided_spring"}
+    assert stop.effect.id == "end_stop"
+    low, high = (np.degrees(1.0 / verdict.after.parameters[i]) for i in (5, 4))
+    assert abs(high - 13.87) < 0.5
+    assert abs(low + 16.42) < 0.5
