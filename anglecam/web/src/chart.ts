@@ -10,7 +10,6 @@ const GRID = { stroke: "#eceff2", width: 1 };
 const AXIS = { stroke: "#57606a", grid: GRID, ticks: GRID, font: "11px system-ui, sans-serif" };
 
 export interface Chart {
-  plot: uPlot;
   /** Move the cursor to a row without telling anybody. */
   point(row: number): void;
   /** Show or hide the bands that are drawn on demand. */
@@ -19,8 +18,10 @@ export interface Chart {
 }
 
 export interface Listener {
-  /** The pointer rests on a row, or has left the diagram (null). */
+  /** The pointer rests on a row; null where it is beside all rows. */
   over(row: number | null): void;
+  /** The pointer has left the diagram. */
+  leave(): void;
   /** A row was clicked. */
   click(row: number): void;
 }
@@ -70,9 +71,8 @@ export function draw(parent: HTMLElement, recording: Recording, plot: Plot, heig
   );
   legend = addLegend(parent, recording, curves, bands);
   onClick(chart, listener);
-  chart.over.addEventListener("mouseleave", () => listener.over(null));
+  chart.over.addEventListener("mouseleave", () => listener.leave());
   return {
-    plot: chart,
     point(row) {
       pointing = true;
       const left = chart.valToPos(times(recording)[row]!, "x");
@@ -106,8 +106,8 @@ function onClick(chart: uPlot, listener: Listener): void {
   chart.over.addEventListener("mousedown", (event) => (pressed = event.clientX));
   chart.over.addEventListener("click", (event) => {
     if (Math.abs(event.clientX - pressed) > 3) return;
-    const row = chart.cursor.idx;
-    if (row != null) listener.click(row);
+    const left = event.clientX - chart.over.getBoundingClientRect().left; // the plot's own cursor may lag by a frame
+    listener.click(chart.posToIdx(left));
   });
 }
 

@@ -43,7 +43,7 @@ export class Curve {
     this.data = data;
     if (data === null) return;
     this.plot = new uPlot(this.options(data), columns(data), this.host);
-    this.plot.over.addEventListener("click", () => this.pickAtPointer());
+    this.plot.over.addEventListener("click", (event) => this.pickAt(event.clientX));
   }
 
   /** Put the cursor at the time of an index. */
@@ -52,9 +52,9 @@ export class Curve {
     this.plot?.redraw(false, false);
   }
 
-  private pickAtPointer(): void {
-    const index = this.plot?.cursor.idx;
-    if (index !== null && index !== undefined) this.pick(index);
+  private pickAt(x: number): void {
+    const plot = this.plot!;
+    this.pick(plot.posToIdx(x - plot.over.getBoundingClientRect().left)); // the plot's own cursor may lag by a frame
   }
 
   private resize(): void {

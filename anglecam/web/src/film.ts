@@ -7,6 +7,7 @@ interface Shown {
 }
 
 const MAGNIFIED_PX = 70;
+const LEAST_VISIBLE_PX = 80; // a picture of which less is in the window counts as out of view
 
 export class Film {
   private readonly pictures: Shown[];
@@ -27,9 +28,13 @@ export class Film {
       for (const { svg } of this.pictures) svg.classList.toggle("plain", !box.checked);
     });
     element.querySelector(".undock")?.addEventListener("click", () => this.dock(false));
-    new IntersectionObserver((seen) => {
-      if (seen[0]!.isIntersecting) this.dock(false);
-    }).observe(element.parentElement!);
+    const cameIntoView = new IntersectionObserver(
+      () => {
+        if (this.isInView()) this.dock(false); // what the observer has seen may be older than a click
+      },
+      { rootMargin: `-${LEAST_VISIBLE_PX}px 0px` },
+    );
+    cameIntoView.observe(element.parentElement!);
   }
 
   get isEmpty(): boolean {
@@ -60,7 +65,7 @@ export class Film {
 
   isInView(): boolean {
     const box = this.element.parentElement!.getBoundingClientRect();
-    return box.bottom > 80 && box.top < window.innerHeight - 80;
+    return box.bottom > LEAST_VISIBLE_PX && box.top < window.innerHeight - LEAST_VISIBLE_PX;
   }
 
   /** Set the part of the picture that is seen. */

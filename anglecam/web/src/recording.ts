@@ -35,8 +35,9 @@ export class RecordingView {
       const plot = this.curves.plots[figure.dataset["plot"]!];
       if (!plot || figure.classList.contains("live")) continue;
       figure.classList.add("live");
-      const chart = draw(figure, this.data, plot, Number(figure.dataset["height"] ?? 170), {
-        over: (row) => this.point(row ?? this.pinned),
+      const chart: Chart = draw(figure, this.data, plot, Number(figure.dataset["height"] ?? 170), {
+        over: (row) => this.point(row ?? this.pinned, chart),
+        leave: () => this.point(this.pinned),
         click: (row) => this.click(row),
       });
       this.charts.push(chart);
@@ -64,9 +65,9 @@ export class RecordingView {
     if (this.film && !this.film.isInView()) this.film.dock(true);
   }
 
-  /** Move cursor, slider and film to a row. */
-  private point(row: number): void {
-    for (const chart of this.charts) if (!chart.plot.over.matches(":hover")) chart.point(row);
+  /** Move cursor, slider and film to a row; the diagram whose own cursor asked for it is there already. */
+  private point(row: number, from?: Chart): void {
+    for (const chart of this.charts) if (chart !== from) chart.point(row);
     this.film?.show(row, this.data.first);
     if (!this.slider) return;
     this.slider.value = String(row);
