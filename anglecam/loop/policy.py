@@ -6,9 +6,10 @@ A threshold belongs here if another value could change a verdict, an alias set o
 cases of ``tests/blind``, and the error rates are those of ``benchmarks/README.md``.
 
 Settings of algorithms that decide nothing stay where they are used: numbers of bootstrap draws and of lags
-(`residual_test`, `cross_validation`), starts of a fit (`screen.START_SHARES`, `candidates.STAGED_STARTS`), knots and
-substeps (`torque_basis`), window lengths of the residual torque (`residual_torque`), fixed-point rounds
-(`camera_correction`), tolerances against rounding, and the family of commands (`next_experiment.commands`).
+(`noise_draws`, `structure_p_values`, `cross_validation`), starts of a fit (`screen.START_SHARES`,
+`candidates.STAGED_STARTS`), knots and substeps (`torque_basis`), window lengths of the residual torque
+(`residual_torque`), fixed-point rounds (`camera_correction`), tolerances against rounding, and the family of commands
+(`next_experiment.commands`).
 """
 
 from __future__ import annotations

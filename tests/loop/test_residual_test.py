@@ -9,7 +9,7 @@ import pytest
 from anglecam.effects import effect
 from anglecam.effects.seen import sines_and_cosines
 from anglecam.identification.output_error import fit_output_error
-from anglecam.loop import residual_test
+from anglecam.loop import noise_draws
 from anglecam.loop.residual_test import run_residual_test
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.loop.seen import largest_shares, seen_of
@@ -37,7 +37,7 @@ def tested_noise(fit, records):
     rng, found = np.random.default_rng(5), []
     ledger = [effect(name) for name in SEARCHED]
     patch = pytest.MonkeyPatch()
-    patch.setattr(residual_test, "DRAWS", 199)  # for speed
+    patch.setattr(noise_draws, "DRAWS", 199)  # for speed
     for _ in range(SAMPLES):
         noise = SIGMA * rng.standard_normal(len(fit.white))
         noisy = replace(fit, white=fit.slopes.without_followed(noise))
@@ -92,8 +92,8 @@ def test_long_series_are_tested_in_blocks_of_single_precision_with_the_same_resu
     noisy = replace(fit, white=fit.slopes.without_followed(noise))
     chosen = directions(noisy, records, changes(noisy, records, [effect("quadratic_drag"), effect("cogging")]))
     whole = run_residual_test(noisy, records, chosen, np.random.default_rng(1), 0.0, phi_estimated=False)
-    monkeypatch.setattr(residual_test, "MOST_DOUBLE", 0)
-    monkeypatch.setattr(residual_test, "AT_ONCE", 7 * len(fit.white))
+    monkeypatch.setattr(noise_draws, "MOST_DOUBLE", 0)
+    monkeypatch.setattr(noise_draws, "AT_ONCE", 7 * len(fit.white))
     parts = run_residual_test(noisy, records, chosen, np.random.default_rng(1), 0.0, phi_estimated=False)
     found, expected = (
         [test.p_value for test in result.tests if "effect" not in test.name] for result in (parts, whole)
