@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from anglecam.certificate.certify import Certificate, Certified
-from anglecam.certificate.statement import aliases, conditions, doubt, is_certified, statement
+from anglecam.certificate.statement import aliases, conditions, doubt, statement
 from anglecam.effects import effect
 from anglecam.identification.systematic import full_sigma
 from anglecam.loop.refit import effects_of, plant_of
@@ -64,7 +64,7 @@ def what_to_play(one: Certified) -> str | None:
 
 def _quantity_as_dict(one: Certified, certificate: Certificate) -> dict[str, Any]:
     quantity, play = one.quantity, what_to_play(one)
-    certified = is_certified(certificate)
+    certified = certificate.is_certified
     value = quantity.in_file(one.profile.estimate) if certified and one.profile is not None else math.nan
     low, high = quantity.interval_in_file(*one.interval) if certified else (-math.inf, math.inf)
     content: dict[str, Any] = {

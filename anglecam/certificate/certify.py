@@ -92,6 +92,11 @@ class Certificate:
         """Whether the model leaves no structure, which its intervals presuppose."""
         return self.verdict.verdict in ("attributed", "nothing_missing")
 
+    @property
+    def is_certified(self) -> bool:
+        """Whether the model explains enough of the motion for its intervals to be stated, if with a doubt."""
+        return self.holds or self.verdict.verdict == "partly_explained"
+
 
 def certify(
     verdict: Verdict, clock: Clock = NO_LAMP, progress: Callable[[str], None] = lambda stage: None

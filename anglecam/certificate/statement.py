@@ -70,7 +70,7 @@ def statement(one: Certified, clock_shared: bool = False, certified: bool = True
 
 def aliases(one: Certified, certificate: Certificate) -> list[str]:
     """Return what could be mistaken for a quantity in these recordings, a sentence each."""
-    if not is_certified(certificate):
+    if not certificate.is_certified:
         return []
     notes = [NOT_NAMED] if one.state == "measured" and not one.accepted else []
     shared = certificate.clock.shared
@@ -89,11 +89,6 @@ def aliases(one: Certified, certificate: Certificate) -> list[str]:
     return notes
 
 
-def is_certified(certificate: Certificate) -> bool:
-    """Return whether the verdict explains enough of the motion for its intervals to be stated."""
-    return certificate.verdict.verdict != "unexplained"
-
-
 def doubt(certificate: Certificate) -> str | None:
     """Return why the intervals do not hold; ``None`` if they do."""
     verdict = certificate.verdict
@@ -102,7 +97,7 @@ def doubt(certificate: Certificate) -> str | None:
     error, noise = np.degrees(verdict.after_held_out.rmse), np.degrees(verdict.noise.sigma)
     size = f"its error on data that it was not fitted to is {error:.2g}°"
     size += f", the noise {noise:.2g}°" if verdict.noise.known else ""
-    if verdict.verdict == "unexplained":
+    if not certificate.is_certified:
         return (
             f"Nothing is certified. The model leaves structure that no effect explains ({size}). What is missing may "
             "have changed every value; the report shows its shape."

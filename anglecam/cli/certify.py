@@ -15,7 +15,7 @@ def certify(
     hold_out: HoldOut = None,
 ) -> None:
     """Certify a servo: all that `close` writes, and a page with 95 % intervals of its backlash, friction and limits."""
-    from anglecam.certificate.statement import doubt, is_certified
+    from anglecam.certificate.statement import doubt
     from anglecam.report.certificate_page import certificate_table
     from anglecam.workflow.certified import FILE, PAGE, write_certificate
 
@@ -25,7 +25,7 @@ def certify(
     report_file("certificate", out / FILE)
     if (why := doubt(certificate)) is not None:
         screen.print(why, soft_wrap=True, highlight=False)
-    if is_certified(certificate):
+    if certificate.is_certified:
         screen.print(certificate_table(certificate))
     screen.print(f"certificate: {out / PAGE}", soft_wrap=True)
     leave(measured.problems)

@@ -16,7 +16,6 @@ from rich.table import Table
 from anglecam import __version__
 from anglecam.certificate.certificate_json import certificate_as_dict
 from anglecam.certificate.certify import Certificate, Certified
-from anglecam.certificate.statement import is_certified
 from anglecam.data.rounding import with_uncertainty
 from anglecam.io.files import write_atomically
 from anglecam.loop.profile import THRESHOLD
@@ -55,7 +54,7 @@ def write_certificate_page(
     content = certificate_as_dict(certificate)
     rows = [_row(one, shown) for one, shown in zip(certificate.quantities, content["quantities"], strict=True)]
     drawn = [one for one in certificate.quantities if one.profile is not None and len(one.profile.values) > 2]
-    drawn = drawn if is_certified(certificate) else []
+    drawn = drawn if certificate.is_certified else []
     text = environment.get_template("certificate.html").render(
         title=title,
         version=__version__,
