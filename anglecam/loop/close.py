@@ -289,7 +289,9 @@ def _structure_remains(task: Task, first: Assessment, last: Assessment, before: 
 def _model_that_stands(task: Task, first: Assessment, last: Assessment) -> Assessment:
     """Return the model with the effects that stand although structure remains; the base model if it is wrong."""
     final = model_that_stands(task, first, last)
-    return first if _is_wrong(task, final, smallest_structure(task, first)) else final
+    # the base model may have been fitted in windows, which are not the recordings of this task
+    none_stands = not effects_of(final.fit)
+    return first if none_stands or _is_wrong(task, final, smallest_structure(task, first)) else final
 
 
 def _is_wrong(task: Task, last: Assessment, least: float) -> bool:

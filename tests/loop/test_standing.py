@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
+from anglecam.loop import close
 from anglecam.loop.close import close_records
 from support.motion import Plant
 from support.outside import outside_session
@@ -28,3 +31,12 @@ def test_an_effect_that_only_resembles_the_cause_does_not_stand():
     verdict = close_records(outside_session("magnet", 0), held_out=["random"])
     assert verdict.verdict == "unexplained"
     assert not verdict.accepted
+
+
+def test_a_base_model_that_was_fitted_in_windows_is_not_judged_by_whole_recordings(monkeypatch):
+    # the search may go on without windows, and nothing of what it finds may stand
+    first, last = SimpleNamespace(fit=()), SimpleNamespace(fit=(SimpleNamespace(id="gravity_geometry"),))
+    monkeypatch.setattr(close, "effects_of", lambda fit: fit)
+    monkeypatch.setattr(close, "model_that_stands", lambda task, first, last: first)
+    monkeypatch.setattr(close, "_is_wrong", lambda *_: pytest.fail("its windows are no recordings of the task"))
+    assert close._model_that_stands(None, first, last) is first
