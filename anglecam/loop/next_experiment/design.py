@@ -30,6 +30,7 @@ from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.identification.fit import Fit, whiten
+from anglecam.identification.joined import RUNAWAY
 from anglecam.identification.noise import Noise
 from anglecam.io.files import write_atomically
 from anglecam.loop.next_experiment.commands import (
@@ -210,7 +211,7 @@ def _foresee_all(
 ) -> list[_Foreseen]:
     """Predict one candidate with each model; return nothing if it moves the body beyond the recorded angles."""
     foreseen = [_foresee(candidate, fit, records) for fit in fits]
-    if not all(np.all(np.isfinite(f.record.angle)) and np.all(np.isfinite(f.slopes)) for f in foreseen):
+    if not all(np.all(np.abs(values) < RUNAWAY) for f in foreseen for values in (f.record.angle, f.slopes)):
         return []  # a model diverges
     if candidate.command is None:
         return foreseen
