@@ -90,13 +90,16 @@ def fit_shared(model: Model, joined: Joined, begin: Point, most: int) -> tuple[P
     Slopes
         The derivatives there.
     """
-    here, slopes, steps = _fit_by_trust_region(model, joined, begin, most)
+    here, slopes, steps = _fit_by_trust_region(model, joined, begin, _slopes_at(model, joined, begin), most)
     while steps < most:
         # with a kinked prediction a recording may have refused every whole step: let it go on alone
-        alone, slopes = fit_nuisance(model, joined, here, most, slopes)
-        if not here.cost - alone.cost > _settled_gain(joined) * alone.cost:
-            return _onto_bounds(model, joined, alone, slopes)
-        here, slopes, more = _fit_by_trust_region(model, joined, alone, most - steps)
+        alone, _ = fit_nuisance(model, joined, here, most, slopes)
+        if alone is here:
+            break
+        before, here, slopes = here, alone, _slopes_at(model, joined, alone)
+        if not before.cost - here.cost > _settled_gain(joined) * here.cost:
+            break
+        here, slopes, more = _fit_by_trust_region(model, joined, here, slopes, most - steps)
         steps += more
     return _onto_bounds(model, joined, here, slopes)
 
@@ -111,18 +114,17 @@ def fit_nuisance(
     model, joined, begin, most
         As in `fit_shared`.
     slopes : Slopes, optional
-        The derivatives at ``begin``; otherwise those with respect to the shared parameters are zeros.
+        The derivatives at ``begin``, if they are known.
 
     Returns
     -------
     Point
-        The best point found.
+        The best point found; ``begin`` itself if none is better.
     Slopes
-        The derivatives there.
+        The derivatives there. Those with respect to the shared parameters are zeros, unless none is better.
     """
-    fixed = slopes is None
     here = begin
-    slopes = slopes or joined.slopes(model, here.parameters, here.own, here.predicted, fixed=fixed)
+    slopes = slopes or _slopes_at(model, joined, here, fixed=True)
     for _ in range(most):
         before, step = here, slopes.own_change(here.white)
         expected = _costs(joined, here.white - slopes.without_own(here.white))
@@ -138,14 +140,15 @@ def fit_nuisance(
                 break
         if here.cost == before.cost:
             break
-        slopes = joined.slopes(model, here.parameters, here.own, here.predicted, fixed=fixed)
+        slopes = _slopes_at(model, joined, here, fixed=True)
     return here, slopes
 
 
-def _fit_by_trust_region(model: Model, joined: Joined, begin: Point, most: int) -> tuple[Point, Slopes, int]:
+def _fit_by_trust_region(
+    model: Model, joined: Joined, begin: Point, slopes: Slopes, most: int
+) -> tuple[Point, Slopes, int]:
     """Return the best point that whole steps reach, the derivatives there, and the number of steps tried."""
     here = latest = begin
-    slopes = joined.slopes(model, here.parameters, here.own, here.predicted)
     held = HELD / model.scales
     bent = model.penalty if isinstance(model, CurvedPlant) else np.empty((0, len(held)))
     costs = [here.cost + float(np.sum((bent @ here.parameters) ** 2))]
@@ -171,7 +174,7 @@ def _fit_by_trust_region(model: Model, joined: Joined, begin: Point, most: int) 
         if not np.array_equal(parameters, here.parameters):
             errors(parameters)
             here = latest
-            slopes = joined.slopes(model, here.parameters, here.own, here.predicted)
+            slopes = _slopes_at(model, joined, here)
         return np.concatenate([-slopes.projected, np.diag(held), bent])
 
     def settled(intermediate_result: OptimizeResult) -> None:
@@ -205,7 +208,12 @@ def _onto_bounds(model: Model, joined: Joined, here: Point, slopes: Slopes) -> t
     there = _follow(model, joined, here, slopes, moved)
     if there.cost > (1.0 + _settled_gain(joined)) * here.cost:
         return here, slopes
-    return there, joined.slopes(model, there.parameters, there.own, there.predicted)
+    return there, _slopes_at(model, joined, there)
+
+
+def _slopes_at(model: Model, joined: Joined, here: Point, *, fixed: bool = False) -> Slopes:
+    """Return the derivatives at a point; ``fixed`` as in `Joined.slopes`."""
+    return joined.slopes(model, here.parameters, here.own, here.predicted, fixed=fixed)
 
 
 def _follow(model: Model, joined: Joined, here: Point, slopes: Slopes, parameters: Floats) -> Point:
