@@ -39,7 +39,7 @@ class Command:
     slope: Floats | None = field(default=None, repr=False)
     """Slope from each row to the next, rad/s, zero after the last; ``None`` where the values are held."""
 
-    @property
+    @cached_property
     def knots(self) -> Floats:
         """(3, m) instants, levels and slopes."""
         return np.stack([self.time, self.angle, np.zeros(len(self.time)) if self.slope is None else self.slope])

@@ -28,7 +28,7 @@ SHUTTER_ITERATIONS = 3
 EXACT = 0.0
 """Value of the longest step that selects the exact series, for a plant that is linear between the command's knots."""
 _NOTHING_NEAR = np.empty((0, 2))
-_NO_COMMAND = Knots(np.zeros(1), np.zeros(1), np.zeros(1))
+_NO_COMMAND = np.zeros((3, 1))
 
 
 @dataclass(frozen=True)
@@ -233,8 +233,11 @@ class Plant:
 
 def _arrived(command: Command | None, pairs: Sequence[tuple[Effect, Floats]]) -> Floats:
     """Return the knots (3, m) of the command that arrives at the drive: instants, levels and slopes."""
-    knots = _NO_COMMAND if command is None else Knots(*command.knots)
-    for effect, values in pairs:
-        if effect.command is not None:
-            knots = effect.command(knots, values)
+    given = _NO_COMMAND if command is None else command.knots
+    shaping = [(effect, values) for effect, values in pairs if effect.command is not None]
+    if not shaping:
+        return given
+    knots = Knots(*given)
+    for effect, values in shaping:
+        knots = effect.command(knots, values)  # type: ignore[misc]  # not None
     return np.stack([knots.time, knots.level, knots.slope])
