@@ -2,7 +2,8 @@
 
     y = θ + d·(t − t_1)
 
-The paper's camera stands still.
+The paper's camera stands still. A torque that grows so slowly that the body follows it turns the body by as much, and
+the angles alone do not distinguish the two: only an object that is fixed to the ground does.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ def _observe(time: Floats, angle: Floats, parameters: Floats, view: View) -> Flo
 EFFECT = Effect(
     id="angle_drift",
     station="camera",
-    summary="The measured angle drifts at a steady rate that no torque explains.",
+    summary="The angle drifts at a steady rate: the camera turns, or a slowly growing torque turns the body.",
     equation="y = θ + d·t",
     relaxes="Fig. 7: the camera stands still",
     parameters=(Parameter("drift_deg_per_s", "d", 0.0, -0.1, 0.1, (0.002, -0.002), math.degrees(1.0), swing_power=1),),
