@@ -18,6 +18,7 @@ from anglecam.loop.verdict_json import verdict_as_dict
 from anglecam.models.plant import Plant
 from anglecam.report.wording import sentence
 from benchmarks.blind.sessions import session as drawn_session
+from support.closing import close_without_rivals
 from support.motion import Plant as TruePlant
 from support.series import session
 
@@ -50,7 +51,7 @@ def test_a_wrongly_predicted_breakaway_does_not_contradict_dry_friction(seed):
     # at each seed the fitted recordings do not determine the breakaway torque, or do not require it, although the
     # held-out one depends on it
     friction = {"coulomb_friction": {"torque": 1.83, "breakaway": 2.69}}
-    verdict = close_records(drawn_session(friction, seed=seed, sigma_deg=0.0005), held_out=HELD_OUT)
+    verdict = close_without_rivals(drawn_session(friction, seed=seed, sigma_deg=0.0005), held_out=HELD_OUT)
     assert [a.effect.id for a in verdict.accepted] == ["coulomb_friction"]
     assert abs(verdict.after.parameters[3] - 1.83) < 3.0 * verdict.after.sigma[3]
 
@@ -75,20 +76,23 @@ def test_friction_has_no_asymmetry_unless_the_zero_is_declared():
     (even,), (uneven,) = ([e for e in applicable(rs) if e.id == "coulomb_friction"] for rs in (free, known))
     assert "asymmetry_deg_per_s2" not in [p.name for p in even.parameters]
     assert len(uneven.parameters) == len(even.parameters) + 1
-    verdict = close_records(free, held_out=HELD_OUT)
+    verdict = close_without_rivals(free, held_out=HELD_OUT)
     assert [a.effect.id for a in verdict.accepted] == ["coulomb_friction"]
     assert abs(verdict.after.parameters[3] - 1.8) < 3.0 * verdict.after.sigma[3]  # the mean of both directions
 
 
 def test_two_hidden_effects_are_both_named():
-    result = verdict_as_dict(close_records(session(TruePlant(dead_time_s=0.03, coulomb=2.0), 12), held_out=HELD_OUT))
+    result = verdict_as_dict(
+        close_without_rivals(session(TruePlant(dead_time_s=0.03, coulomb=2.0), 12), held_out=HELD_OUT)
+    )
     assert {e["id"] for e in result["effects"]} == {"dead_time", "coulomb_friction"}
 
 
 def test_a_declared_centre_of_mass_is_not_fitted_and_makes_the_weight_more_certain():
     gravity = {"gravity_geometry": {"strength": 60.0, "gravity_deg": 20.0}}
     records = drawn_session(gravity, seed=4, sigma_deg=0.01)
-    verdict = close_records([replace(r, mass_from_upright=np.radians(20.0)) for r in records], held_out=HELD_OUT)
+    declaring = [replace(r, mass_from_upright=np.radians(20.0)) for r in records]
+    verdict = close_without_rivals(declaring, held_out=HELD_OUT)
     assert [a.effect.id for a in verdict.accepted] == ["gravity_geometry"]
     declared = verdict.after
     assert declared.model.names[3:] == ("gravity_deg_per_s2",)
@@ -138,7 +142,7 @@ def test_a_clock_offset_below_zero_is_found_as_a_dead_time_below_zero():
     def lagging(record):
         return replace(record, command=replace(record.command, time=record.command.time + 0.02))
 
-    verdict = close_records([lagging(r) for r in session(TruePlant(), 15)], held_out=HELD_OUT)
+    verdict = close_without_rivals([lagging(r) for r in session(TruePlant(), 15)], held_out=HELD_OUT)
     (found,) = verdict_as_dict(verdict)["effects"]
     assert found["id"] == "dead_time"
     assert found["parameters"]["tau_s"]["value"] == pytest.approx(-0.02, abs=0.001)
