@@ -26,9 +26,21 @@ def cluster(tmp_path):
         yield started.address, started.workers
 
 
-def test_a_worker_that_is_killed_loses_no_clip(cluster, tmp_path):
-    address, workers = cluster
-    lab, out = tiny_lab(tmp_path / "lab", [f"{k}.avi" for k in range(12)]), tmp_path / "out"
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    return tiny_lab(tmp_path_factory.mktemp("lab"), [f"{k}.avi" for k in range(6)])
+
+
+@pytest.fixture(scope="module")
+def without_dask(lab, tmp_path_factory, shared_processes):
+    """Return what a batch without Dask gives."""
+    out = tmp_path_factory.mktemp("here")
+    assert not run_batch([str(lab)], out, Options(jobs=2, quiet=True)).problems
+    return results(out)
+
+
+def test_a_worker_that_is_killed_loses_no_clip(cluster, lab, without_dask, tmp_path):
+    (address, workers), out = cluster, tmp_path / "out"
     killed = []
 
     def kill_one():
@@ -47,14 +59,12 @@ def test_a_worker_that_is_killed_loses_no_clip(cluster, tmp_path):
     assert killed
     assert not any(map(is_alive, killed))
     assert not result.problems
-    assert [row.status for row in result.rows] == ["ok"] * 12
-    run_batch([str(lab)], tmp_path / "here", Options(jobs=2, quiet=True))
-    assert results(out) == results(tmp_path / "here")
+    assert [row.status for row in result.rows] == ["ok"] * 6
+    assert results(out) == without_dask
 
 
-def test_what_workers_finish_while_the_batch_is_killed_is_not_measured_again(cluster, tmp_path):
-    address, _ = cluster
-    lab, out = tiny_lab(tmp_path / "lab", [f"{k}.avi" for k in range(4)]), tmp_path / "out"
+def test_what_workers_finish_while_the_batch_is_killed_is_not_measured_again(cluster, lab, without_dask, tmp_path):
+    (address, _), out = cluster, tmp_path / "out"
     batch = subprocess.Popen(batch_command(lab, "--out", out, "--dask", address, "--quiet"))
     until = time.monotonic() + 120.0
     unfinished = out / ".anglecam" / "unfinished"
@@ -70,8 +80,7 @@ def test_what_workers_finish_while_the_batch_is_killed_is_not_measured_again(clu
     made = {path.name: path.stat().st_mtime_ns for path in (left[0].parent / "out").iterdir()}
     assert not run_batch([str(lab)], out, Options(jobs=2, quiet=True)).problems
     assert made == {name: (out / name).stat().st_mtime_ns for name in made}
-    run_batch([str(lab)], tmp_path / "here", Options(jobs=2, quiet=True))
-    assert results(out) == results(tmp_path / "here")
+    assert results(out) == without_dask
 
 
 def test_an_invalid_scheduler_address_is_refused_at_once(tmp_path):

@@ -12,6 +12,7 @@ import pytest
 
 from anglecam.certificate.certificate_json import certificate_as_dict
 from anglecam.certificate.certify import Clock, certify
+from anglecam.certificate.quantity import QUANTITIES
 from anglecam.certificate.statement import NOT_NAMED, aliases, statement
 from anglecam.io.files import json_text
 from anglecam.loop.close import close_records
@@ -19,14 +20,23 @@ from support.motion import Plant, Recording
 from support.series import record
 
 KINDS = ("stairs", "chirp", "triangle")
+ALL = tuple(quantity.id for quantity in QUANTITIES)
+DELAYS = ("dead_time", "lag", "backlash")
 
 
 @lru_cache
-def certified(plant, seed=0):
-    """Return the certificate of three short recordings with noise of 0.05°."""
+def certified(plant, seed=0, only=ALL):
+    """Return the certificate of three short recordings with noise of 0.05°, of all quantities or ``only`` some."""
     rng = np.random.default_rng(seed)
     records = [record(plant, Recording(kind, kind, duration_s=5.0), rng, sigma_deg=0.05) for kind in KINDS]
-    return certify(close_records(records, seed=seed))
+    return certify_only(only, close_records(records, seed=seed))
+
+
+def certify_only(only, *arguments):
+    """Certify some quantities; the others take most of the time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("anglecam.certificate.certify.QUANTITIES", tuple(q for q in QUANTITIES if q.id in only))
+        return certify(*arguments)
 
 
 def entry(certificate, quantity):
@@ -60,7 +70,7 @@ def test_where_nothing_acts_every_quantity_is_bounded_usefully():
 
 
 def test_a_dead_time_is_measured_and_the_lag_is_bounded_with_it():
-    certificate = certified(LATE)
+    certificate = certified(LATE, only=DELAYS)
     low, high = interval(certificate, "dead_time")
     assert low < 0.03 < high
     assert high - low < 0.001
@@ -73,8 +83,9 @@ def test_a_dead_time_is_measured_and_the_lag_is_bounded_with_it():
 
 
 def test_sliding_and_breakaway_friction_are_measured():
-    certificate = certified(RUBBING)
-    for quantity, true in (("coulomb_friction", 2.0), ("breakaway_friction", 2.6)):
+    true_sizes = {"coulomb_friction": 2.0, "breakaway_friction": 2.6}
+    certificate = certified(RUBBING, only=tuple(true_sizes))
+    for quantity, true in true_sizes.items():
         low, high = interval(certificate, quantity)
         assert low < math.degrees(true) < high
         assert entry(certificate, quantity).state == "measured"
@@ -82,7 +93,7 @@ def test_sliding_and_breakaway_friction_are_measured():
 
 
 def test_a_size_whose_effect_the_verdict_does_not_name_may_be_chance():
-    certificate = certified(LATE)
+    certificate = certified(LATE, only=DELAYS)
     late = entry(certificate, "dead_time")
     assert NOT_NAMED not in aliases(late, certificate)
     assert NOT_NAMED in aliases(replace(late, accepted=False), certificate)
@@ -90,8 +101,8 @@ def test_a_size_whose_effect_the_verdict_does_not_name_may_be_chance():
 
 
 def test_with_a_lamp_the_dead_time_is_the_servos_and_includes_the_lamps_uncertainty():
-    verdict = certified(LATE).verdict
-    seen = certify(verdict, Clock(True, 0.004))
+    verdict = certified(LATE, only=DELAYS).verdict
+    seen = certify_only(("dead_time",), verdict, Clock(True, 0.004))
     low, high = interval(seen, "dead_time")
     assert high - low == pytest.approx(2.0 * 1.96 * 0.004, rel=0.1)
     assert low < 0.03 < high

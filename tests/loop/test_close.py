@@ -7,19 +7,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from anglecam.effects import effect
 from anglecam.errors import RigError
 from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.close import close_records
 from anglecam.loop.cross_validation import Prediction, predict_held_out, split_records
+from anglecam.loop.policy import Policy, StepwisePolicy
 from anglecam.loop.stepwise import applicable
 from anglecam.loop.verdict_json import verdict_as_dict
 from anglecam.models.plant import Plant
 from anglecam.report.wording import sentence
 from benchmarks.blind.sessions import session as drawn_session
+from support.closing import close_without_rivals
 from support.motion import Plant as TruePlant
 from support.series import session
 
 HELD_OUT = ["random"]
+ONE_EFFECT = Policy(stepwise=StepwisePolicy(most_effects=1))
 
 
 @pytest.mark.parametrize(
@@ -47,7 +51,7 @@ def test_a_wrongly_predicted_breakaway_does_not_contradict_dry_friction(seed):
     # at each seed the fitted recordings do not determine the breakaway torque, or do not require it, although the
     # held-out one depends on it
     friction = {"coulomb_friction": {"torque": 1.83, "breakaway": 2.69}}
-    verdict = close_records(drawn_session(friction, seed=seed, sigma_deg=0.0005), held_out=HELD_OUT)
+    verdict = close_without_rivals(drawn_session(friction, seed=seed, sigma_deg=0.0005), held_out=HELD_OUT)
     assert [a.effect.id for a in verdict.accepted] == ["coulomb_friction"]
     assert abs(verdict.after.parameters[3] - 1.83) < 3.0 * verdict.after.sigma[3]
 
@@ -72,28 +76,31 @@ def test_friction_has_no_asymmetry_unless_the_zero_is_declared():
     (even,), (uneven,) = ([e for e in applicable(rs) if e.id == "coulomb_friction"] for rs in (free, known))
     assert "asymmetry_deg_per_s2" not in [p.name for p in even.parameters]
     assert len(uneven.parameters) == len(even.parameters) + 1
-    verdict = close_records(free, held_out=HELD_OUT)
+    verdict = close_without_rivals(free, held_out=HELD_OUT)
     assert [a.effect.id for a in verdict.accepted] == ["coulomb_friction"]
     assert abs(verdict.after.parameters[3] - 1.8) < 3.0 * verdict.after.sigma[3]  # the mean of both directions
 
 
 def test_two_hidden_effects_are_both_named():
-    result = verdict_as_dict(close_records(session(TruePlant(dead_time_s=0.03, coulomb=2.0), 12), held_out=HELD_OUT))
+    result = verdict_as_dict(
+        close_without_rivals(session(TruePlant(dead_time_s=0.03, coulomb=2.0), 12), held_out=HELD_OUT)
+    )
     assert {e["id"] for e in result["effects"]} == {"dead_time", "coulomb_friction"}
 
 
 def test_a_declared_centre_of_mass_is_not_fitted_and_makes_the_weight_more_certain():
     gravity = {"gravity_geometry": {"strength": 60.0, "gravity_deg": 20.0}}
     records = drawn_session(gravity, seed=4, sigma_deg=0.01)
-    found = []
-    for upright in (None, np.radians(20.0)):
-        verdict = close_records([replace(r, mass_from_upright=upright) for r in records], held_out=HELD_OUT)
-        assert [a.effect.id for a in verdict.accepted] == ["gravity_geometry"]
-        assert abs(verdict.after.parameters[3] - 60.0) < 3.0 * verdict.after.sigma[3]
-        found.append(verdict.after)
-    fitted, declared = found
+    declaring = [replace(r, mass_from_upright=np.radians(20.0)) for r in records]
+    verdict = close_without_rivals(declaring, held_out=HELD_OUT)
+    assert [a.effect.id for a in verdict.accepted] == ["gravity_geometry"]
+    declared = verdict.after
     assert declared.model.names[3:] == ("gravity_deg_per_s2",)
-    assert declared.sigma[3] < 0.25 * fitted.sigma[3]
+    start = np.array([26.0, 524.0, 508.0, 60.0, np.radians(20.0)])
+    free = fit_output_error(Plant((effect("gravity_geometry"),)), split_records(records, HELD_OUT)[0], [start])
+    for fit in (declared, free):
+        assert abs(fit.parameters[3] - 60.0) < 3.0 * fit.sigma[3]
+    assert declared.sigma[3] < 0.25 * free.sigma[3]
 
 
 @pytest.fixture(scope="module")
@@ -114,8 +121,9 @@ def test_no_effect_is_named_if_none_is_hidden(clean):
 
 
 def test_an_effect_outside_the_ledger_is_called_unexplained():
+    # one effect takes away a part of it and does not stand; test_possible_effects.py has a search to its end
     records = drawn_session({"wind_gusts": {"rms": 1.0, "number": 3}}, seed=8)
-    verdict = close_records(records, held_out=HELD_OUT, seed=8)
+    verdict = close_records(records, held_out=HELD_OUT, seed=8, policy=ONE_EFFECT)
     assert verdict.verdict == "unexplained"
     assert verdict_as_dict(verdict)["effects"] == []
     assert "none" in sentence(verdict)
@@ -134,7 +142,7 @@ def test_a_clock_offset_below_zero_is_found_as_a_dead_time_below_zero():
     def lagging(record):
         return replace(record, command=replace(record.command, time=record.command.time + 0.02))
 
-    verdict = close_records([lagging(r) for r in session(TruePlant(), 15)], held_out=HELD_OUT)
+    verdict = close_without_rivals([lagging(r) for r in session(TruePlant(), 15)], held_out=HELD_OUT)
     (found,) = verdict_as_dict(verdict)["effects"]
     assert found["id"] == "dead_time"
     assert found["parameters"]["tau_s"]["value"] == pytest.approx(-0.02, abs=0.001)
@@ -185,9 +193,3 @@ def test_holding_out_everything_is_refused():
     records = session(TruePlant(), 19)
     with pytest.raises(RigError, match="nothing is left"):
         split_records(records, [r.name for r in records])
-
-
-def test_a_model_that_fails_on_held_out_data_is_not_called_complete():
-    *quiet, loud = session(TruePlant(), 17, sigma_deg=0.01)
-    shaken = replace(loud, angle=loud.angle + np.radians(0.5) * np.sin(9.0 * loud.time))
-    assert close_records([*quiet, shaken], held_out=HELD_OUT).verdict == "unexplained"

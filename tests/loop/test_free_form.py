@@ -27,10 +27,10 @@ def _found(records):
 
 @pytest.mark.parametrize("name", ["magnet", "chatter", "amplifier_step", "cam", "touch", "van_der_pol"])
 def test_a_cause_outside_the_ledger_is_found_over_what_it_depends_on(name):
-    records, exact = (outside_session(name, 0, sigma_deg=s)[-1] for s in (0.05, 0.0))
-    found = _found(outside_session(name, 0))
+    records, exact = (outside_session(name, 0, sigma_deg=s) for s in (0.05, 0.0))
+    found = _found(records)
     assert found.band.over == CAUSES[name].over
-    noise = records.angle - exact.angle
+    noise = records[-1].angle - exact[-1].angle
     before, after = (np.sqrt(np.mean((p.residuals[0] - noise) ** 2)) for p in (found.before, found.after))
     assert after < 0.3 * before
     written = free_form_as_dict(found)

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anglecam.loop.close import close_records
 from anglecam.loop.verdict_json import verdict_as_dict
+from support.closing import close_without_rivals
 from support.motion import Plant, Recording, move
 from support.series import record
 
@@ -49,7 +49,7 @@ def test_the_head_steps_as_the_paper_measured():
 
 
 def test_the_loop_says_that_sys1_starts_too_early_and_lacks_a_steady_torque():
-    verdict = verdict_as_dict(close_records(list(filmed(3)), held_out=["random"], starts=[SYS1]))
+    verdict = verdict_as_dict(close_without_rivals(list(filmed(3)), held_out=["random"], starts=[SYS1]))
     assert verdict["verdict"] == "attributed"
     found = {e["id"]: e["parameters"] for e in verdict["effects"]}
     assert set(found) == {"dead_time", "constant_torque"}

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from anglecam.identification.noise import QUANTISED
-from anglecam.loop.close import close_records
 from anglecam.loop.verdict_json import verdict_as_dict
+from support.closing import close_without_rivals
 from support.motion import Plant
 from support.series import session
 
@@ -18,7 +18,7 @@ STEP = np.radians(0.088)
 
 def closed(plant, seed):
     records = [replace(r, angle=STEP * np.round(r.angle / STEP)) for r in session(plant, seed, sigma_deg=0.0)]
-    return close_records(records, held_out=["random"], seed=seed)
+    return close_without_rivals(records, held_out=["random"], seed=seed)
 
 
 def test_friction_is_named_with_its_size_and_nothing_beside_it():
@@ -37,6 +37,6 @@ def test_rounding_alone_is_nothing_missing():
 
 def test_unknown_noise_is_reported_as_such():
     records = [r.between(1.0, np.inf) for r in session(Plant(coulomb=2.0), 1)]
-    result = verdict_as_dict(close_records(records, held_out=["random"]))
+    result = verdict_as_dict(close_without_rivals(records, held_out=["random"]))
     assert result["verdict"] == "attributed"
     assert not result["noise"]["known"]

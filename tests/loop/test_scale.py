@@ -12,6 +12,7 @@ from anglecam.data.command import Command
 from anglecam.data.record import Record
 from anglecam.effects import effect
 from anglecam.loop.close import close_records
+from support.closing import close_without_rivals
 
 A, B, C, K3 = 40.0, 1.8e5, 1.9e5, 2.3e5
 """A circuit of 68 Hz with a cubic spring, similar to the Silverbox; 1 rad for a volt."""
@@ -48,7 +49,7 @@ def scaled(record: Record, factor: float) -> Record:
 @pytest.mark.parametrize("factor", [1.0, 0.05])
 def test_a_cubic_spring_of_a_fast_oscillator_is_named_in_any_unit_of_the_angle(factor):
     records = [scaled(oscillation(name, seed), factor) for name, seed in (("one", 0), ("other", 1))]
-    verdict = close_records(records, held_out=["other"])
+    verdict = close_without_rivals(records, held_out=["other"])
     assert verdict.verdict == "attributed"
     assert [accepted.effect.id for accepted in verdict.accepted] == ["stiffening_spring"]
     place = verdict.after.model.names.index("k3_per_s2")

@@ -55,16 +55,23 @@ def _first(film):
     return film_of_rows(path, container, rows[:FIRST])
 
 
-def _measured(film, first, rig):
-    model = live_model(measure_clip(first, rig), rig)
+def _measured(film, first, measurement, rig):
+    model = live_model(measurement, rig)
     assert not isinstance(model, str), model
     meter = LiveMeter(model, first)
     return model, {k: meter.measure(k, film[2][k]) for k in range(FIRST, N)}
 
 
 @pytest.fixture(scope="module")
-def by_body(film):
-    return _measured(film, _first(film), _rig())
+def first_frames(film):
+    """Return the first frames and what is measured in them."""
+    first = _first(film)
+    return first, measure_clip(first, _rig())
+
+
+@pytest.fixture(scope="module")
+def by_body(film, first_frames):
+    return _measured(film, *first_frames, _rig())
 
 
 def _off(measured, frames):
@@ -115,7 +122,8 @@ def test_beyond_the_angles_of_the_first_frames_the_mark_alone_is_measured(by_bod
 
 
 def test_a_mark_alone_is_measured_within_the_stated_uncertainty(film):
-    model, measured = _measured(film, _first(film), _rig(row_time_s=1e-5))
+    first, rig = _first(film), _rig(row_time_s=1e-5)
+    model, measured = _measured(film, first, measure_clip(first, rig), rig)
     assert model.body is None  # with a rolling shutter the rotation in a frame depends on the frames around it
     off, sigma = _off(measured, PLAIN)
     assert np.sqrt(np.mean(((off - np.median(off)) / sigma) ** 2)) < 1.5
@@ -128,9 +136,8 @@ def test_whole_turns_are_counted_from_the_last_frame_that_was_measured(film, by_
     assert abs(np.degrees(line) - 720.0 - LOOK.neutral_deg - SWING[FIRST]) < 0.5
 
 
-def test_what_cannot_be_measured_at_once_is_said(film):
-    rig = _rig()
-    measured = measure_clip(_first(film), rig)
+def test_what_cannot_be_measured_at_once_is_said(first_frames):
+    rig, (_, measured) = _rig(), first_frames
     unknown = replace(measured, detections=replace(measured.detections, found=None))
     assert live_model(unknown, rig) == "only a mark that moves is measured at once"
     shaken = replace(measured, detections=replace(measured.detections, camera_moves=np.zeros((FIRST, 2))))

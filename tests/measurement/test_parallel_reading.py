@@ -17,7 +17,7 @@ from anglecam.video.from_key import IrregularFilmError
 from anglecam.video.open_film import open_film
 from support.drawn import Look, draw_frames, write_clip
 
-N = 160
+N = 96
 TIME = np.arange(N) / 30
 SWING = 14.0 * np.sin(2 * np.pi * 0.7 * TIME) * np.cos(0.4 * TIME)
 
@@ -26,8 +26,8 @@ SWING = 14.0 * np.sin(2 * np.pi * 0.7 * TIME) * np.cos(0.4 * TIME)
 def patched():
     """Let the film be too long to be kept, and two processes share its parts."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(film_rows, "MOST_BYTES", 100 * 640 * 480)
-        patch.setattr(film_parts, "LENGTH", 32)
+        patch.setattr(film_rows, "MOST_BYTES", 60 * 640 * 480)
+        patch.setattr(film_parts, "LENGTH", 16)
         patch.setattr(parallel_reading, "FEWEST", 4)
         patch.setattr(parallel_reading, "PARTS_EACH", 2)
         patch.setattr(parallel_reading, "native_threads", lambda: 2)

@@ -77,7 +77,7 @@ def test_a_flat_body_keeps_the_common_centre(seed):
 TOO_FEW = pytest.mark.xfail(strict=True, reason="a quarter of the tiles at another depth is not evidence enough")
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=TOO_FEW), 3])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=TOO_FEW)])
 def test_halves_at_different_depths_turn_about_centres_of_their_own(seed):
     arm = PIVOT - (np.array(SIZE) - 1.0) / 2.0
     apart = 3.0 * arm / np.hypot(*arm)

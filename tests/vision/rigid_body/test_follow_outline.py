@@ -21,7 +21,8 @@ def _shadowed(draw):
     def drawn(scene, angle):
         shadow = np.zeros(scene.shape, np.uint8)
         draw(shadow, angle)
-        soft = cv2.GaussianBlur((shadow.max(axis=2) > 0).astype(np.float32), (0, 0), 40)
+        cover = cv2.resize((shadow.max(axis=2) > 0).astype(np.float32), None, fx=0.25, fy=0.25)
+        soft = cv2.resize(cv2.GaussianBlur(cover, (0, 0), 10), shadow.shape[1::-1])  # as soft as 40 px of the scene
         soft = np.roll(soft, (40, 60), axis=(0, 1))[..., None]
         scene[:] = (scene * (1.0 - 0.2 * soft)).astype(np.uint8)
         draw(scene, angle)
