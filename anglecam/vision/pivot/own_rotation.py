@@ -1,10 +1,10 @@
 """The centre of a mark's path, where the mark's own rotation contradicts it.
 
 The circle through the centroids of a large mark, such as a hand or a whole body, is uncertain by more than its scatter
-shows. Light that varies over the picture, or a background of the mark's colour, displaces the centroid smoothly along
-the path, and the circle absorbs that: it becomes too small or too large. The mark's own rotation does not depend on the
-circle. If the line from the centre to the mark turns by 1 + e times as much, either may be right, and the radius is
-uncertain by the share e.
+shows. Light that varies over the picture, or a background of the mark's colour, displaces the centroid along the mark
+as it turns, and the circle absorbs that: it becomes too small or too large. The mark's own rotation does not depend on the
+circle. If the mark turns by 1 + e times as much as the line to it, either may be right. Where e is larger than the
+circle's uncertainty explains, the radius is uncertain by the share e.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from anglecam.vision.mark.outline_turn import outline_turn
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle
 
+_AGREE = 2.0
+"""Standard uncertainties by which the two rotations may differ."""
 _BAR = 12.0
 """Square of the length of a homogeneous bar, over the variance along it."""
 
@@ -38,8 +40,8 @@ def widened_by_own_rotation(circle: Circle, regions: Sequence[Region]) -> Circle
     Returns
     -------
     Circle
-        With a larger covariance of centre and radius where the mark is longer than the radius, and the mark's own
-        rotation is seen and differs from the line's by more than its uncertainty.
+        With a larger covariance of centre and radius where the mark is longer than the radius, and its own rotation is
+        seen and differs from the line's by more than the uncertainties of both explain.
     """
     if not regions:
         return circle
@@ -50,9 +52,10 @@ def widened_by_own_rotation(circle: Circle, regions: Sequence[Region]) -> Circle
     found = outline_turn(regions, np.unwrap(np.arctan2(arm[:, 1], arm[:, 0])))
     if found is None:
         return circle
-    excess, sigma = found
-    variance = max(excess**2 - sigma**2, 0.0) * circle.radius_px**2
+    off, sigma = circle.radius_px * found[0], circle.radius_px * found[1]
+    if off**2 <= _AGREE**2 * (circle.covariance_px2[2, 2] + sigma**2):
+        return circle
     towards = arm.mean(axis=0) / max(float(np.hypot(*arm.mean(axis=0))), 1e-9)
     # a larger radius puts the centre farther from the path
     direction = np.append(-towards, 1.0)
-    return replace(circle, covariance_px2=circle.covariance_px2 + variance * np.outer(direction, direction))
+    return replace(circle, covariance_px2=circle.covariance_px2 + off**2 * np.outer(direction, direction))
