@@ -30,12 +30,12 @@ from anglecam.measurement.trust import shows_its_centre, travel
 from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.mark.found_mark import FoundMark, Samples, region_in_plane
+from anglecam.vision.mark.own_rotation import widened_by_own_rotation
 from anglecam.vision.mark.search import find_mark
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.mark.track import MarkTrack, follow_mark
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.pivot.marker import RoundMarker
-from anglecam.vision.pivot.own_rotation import widened_by_own_rotation
 from anglecam.vision.stabilise.background_motion import BackgroundMotion, CameraMove
 
 _CLEAR = 2.0

@@ -312,8 +312,8 @@ def why_unproven(detections: Detections, *, hand_held: bool) -> str | None:
     )
     if detections.clear:
         return (
-            f"{travelled}, and before a camera in the hand all things out of the plane that is held still seem to move; "
-            "film it with a camera at rest"
+            f"{travelled}, and before a camera in the hand all things out of the plane that is held still seem to "
+            "move; film it with a camera at rest"
         )
     return (
         f"{travelled}, and another thing moves nearly as much: nothing shows that it is the mark; declare it: "

@@ -1,11 +1,11 @@
-"""The circle of a large mark is as uncertain as the mark's own rotation says; a small mark's circle is left as it is."""
+"""The circle of a large mark is as uncertain as the mark's own rotation says; a small mark's is left as it is."""
 
 import numpy as np
 import pytest
 
+from anglecam.vision.mark.own_rotation import widened_by_own_rotation
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import fit_circle
-from anglecam.vision.pivot.own_rotation import widened_by_own_rotation
 
 PIVOT, LEVER = np.array([200.0, 60.0]), 80.0
 TURN = np.radians(np.linspace(-40.0, 40.0, 90))

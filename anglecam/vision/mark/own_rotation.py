@@ -2,8 +2,8 @@
 
 The circle through the centroids of a large mark, such as a hand or a whole body, is uncertain by more than its scatter
 shows. Light that varies over the picture, or a background of the mark's colour, displaces the centroid along the mark
-as it turns, and the circle absorbs that: it becomes too small or too large. The mark's own rotation does not depend on the
-circle. If the mark turns by 1 + e times as much as the line to it, either may be right. Where e is larger than the
+as it turns, and the circle absorbs that: it becomes too small or too large. The mark's own rotation does not depend on
+the circle. If the mark turns by 1 + e times as much as the line to it, either may be right. Where e is larger than the
 circle's uncertainty explains, the radius is uncertain by the share e.
 """
 
