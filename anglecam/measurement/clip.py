@@ -146,7 +146,7 @@ def measure_clip(
         other = (
             why_elsewhere(followed.detections, rig)
             or why_not_rigid(followed.detections, followed.ok)
-            or why_unproven(followed.detections)
+            or why_unproven(followed.detections, hand_held=isinstance(held, FilmAtRest))
         )
     interlaced = _interlaced(film)
     return Measurement(

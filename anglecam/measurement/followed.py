@@ -94,8 +94,8 @@ def follow_mark_or_body(
         return _hinted(followed, film, rig, command) if _is_hinted(camera, rig) else followed
     except MarkNotFoundError as problem:
         causes, ways = [str(problem)], _without_mark(camera, rig)
-    except InputError as problem:  # the mark moves otherwise; what turns about a hinted pivot may be another thing
-        causes, ways = [str(problem)], [detect_layer] if _is_hinted(camera, rig) else []
+    except InputError as problem:  # the mark moves otherwise; what turns may be another thing, or more than the mark
+        causes, ways = [str(problem)], _besides_mark(camera, rig)
     for follow in ways if known is None else ():
         try:
             body = follow(film, rig)
@@ -114,6 +114,17 @@ def _without_mark(camera: HeldCamera, rig: Rig) -> list[Callable[[Film, Rig], De
         return []
     by_outline = [detect_outline] if camera.steady is None and rig.pointed_mark is None else []
     return [detect_rigid_body, *by_outline, *([detect_layer] if _is_hinted(camera, rig) else [])]
+
+
+def _besides_mark(camera: HeldCamera, rig: Rig) -> list[Callable[[Film, Rig], Detections | str]]:
+    """Return the ways in which a body may be followed where what was taken for the mark does not turn.
+
+    Where somebody declared the mark or the pivot, no other thing may take its place but one that turns about the hint.
+    """
+    if _is_hinted(camera, rig):
+        return [detect_layer]
+    declared = rig.pointed_mark is not None or rig.pivot.expected is not None
+    return [] if declared or camera.unknown is not None else _without_mark(camera, rig)
 
 
 def _hinted(mark: Followed, film: Film, rig: Rig, command: Command | None) -> Followed:

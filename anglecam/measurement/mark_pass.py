@@ -30,6 +30,7 @@ from anglecam.measurement.trust import shows_its_centre, travel
 from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.mark.found_mark import FoundMark, Samples, region_in_plane
+from anglecam.vision.mark.own_rotation import widened_by_own_rotation
 from anglecam.vision.mark.search import find_mark
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.mark.track import MarkTrack, follow_mark
@@ -222,7 +223,7 @@ def _follow(
     """Follow the mark in the plane of motion; in a tilted perspective, repeat it with the lens centred on the pivot."""
     for again in (lens.tilt != 0.0 and lens.focal_px is not None, False):
         placed = [[region_in_plane(region, lens) for region in regions] for regions in candidates]
-        track = follow_mark(placed, time, found)
+        track = _widened(follow_mark(placed, time, found))
         marker, pivot, disagreement = find_pivot(images, rig, track.circle, lens)
         if not again or pivot is None:
             break
@@ -234,6 +235,12 @@ def _follow(
         found = replace(found, place_px=centred.rectify(lens.distort(found.place_px)))
         lens = centred
     return lens, track, marker, pivot, disagreement
+
+
+def _widened(track: MarkTrack) -> MarkTrack:
+    """Return a track whose circle is as uncertain as the mark's own rotation says."""
+    whole = [r for r, s in zip(track.regions, track.status, strict=True) if s == OK and r is not None]
+    return track if track.circle is None else replace(track, circle=widened_by_own_rotation(track.circle, whole))
 
 
 def _choice(found: FoundMark, track: MarkTrack) -> str | None:

@@ -37,7 +37,7 @@ _PIVOT_SIGMAS = 3.0
 """Standard uncertainties of the pivot that may add to the variation."""
 _MAX_SCALE_SIGMA = 0.2
 """Relative standard uncertainty of the path's radius from which on the path does not show its centre, as for a pivot
-(`anglecam.vision.pivot.estimate`)."""
+(`anglecam.vision.pivot.estimate`), and of a body's rotation from which on it is not seen."""
 _HINT_SIGMAS = 3.0
 """Standard uncertainties by which a hint at the pivot may be off the centre of rotation."""
 _SHORTEST = 0.05
@@ -120,6 +120,8 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
     otherwise = None if at_rest else why_off_circle(detections, angles)
     if otherwise is None and not seen_to_turn:
         otherwise = _why_not_its_line(detections, ok, angles)
+    if otherwise is None and detections.body is not None:
+        otherwise = _why_not_seen_to_turn(angles)
     if otherwise is not None:
         return otherwise
     if not declared and not seen_to_turn and not shows_its_centre(detections.circle):
@@ -127,6 +129,14 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
             f"the mark's path is too short or too straight to show about which point it turns; declare it: {_DECLARE}"
         )
     return None
+
+
+def _why_not_seen_to_turn(angles: Angles) -> str | None:
+    """Return a message where a body's rotation is not seen beyond its uncertainty: its views contradict each other."""
+    turned, sigma = np.degrees(float(np.std(angles.line))), np.degrees(float(np.median(angles.sigma)))
+    if sigma <= _MAX_SCALE_SIGMA * turned:
+        return None
+    return f"the body's rotation is not seen: it is {turned:.2g}° RMS with a standard uncertainty of {sigma:.2g}°"
 
 
 def why_off_circle(detections: Detections, angles: Angles) -> str | None:
@@ -273,29 +283,40 @@ def why_elsewhere(detections: Detections, rig: Rig) -> str | None:
     )
 
 
-def why_unproven(detections: Detections) -> str | None:
+def why_unproven(detections: Detections, *, hand_held: bool) -> str | None:
     """Return a message where nothing shows that what is followed is the mark.
 
-    It was not declared, another thing in the picture moves nearly as convincingly, and its path is too short to show
-    about which point it turns. A wire that trembles beside a servo is such a thing.
+    Its path is too short to show about which point it turns. It was not declared, and another thing in the picture
+    moves nearly as convincingly: a wire that trembles beside a servo is such a thing. Or the camera is held in the
+    hand: what stands out of the plane that is held still moves before it, and so does a mark at rest.
 
     Parameters
     ----------
     detections : Detections
         The coarse pass.
+    hand_held : bool
+        Whether the camera is held in the hand.
 
     Returns
     -------
     str or None
         With place and travel.
     """
-    if detections.clear or shows_its_centre(detections.circle):
+    if detections.body is not None or shows_its_centre(detections.circle) or (detections.clear and not hand_held):
         return None
     places = np.array([r.centre_px for r in detections.regions if r is not None])
     x, y = detections.lens.distort(np.median(places, axis=0))
-    return (
+    travelled = (
         f"what is followed, around {x:.0f},{y:.0f}, travels {travel(places):.2g} px RMS, too little to show that it "
-        "turns about the pivot, and another thing moves nearly as much: nothing shows that it is the mark; declare it: "
+        "turns about the pivot"
+    )
+    if detections.clear:
+        return (
+            f"{travelled}, and before a camera in the hand all things out of the plane that is held still seem to "
+            "move; film it with a camera at rest"
+        )
+    return (
+        f"{travelled}, and another thing moves nearly as much: nothing shows that it is the mark; declare it: "
         "mark: {at: [x, y], frame: k} in rig.yaml"
     )
 

@@ -80,16 +80,10 @@ def check_clip(
         declared = rig_beside(path) if rig is None else rig
         part, film, frames = _part_of(path, declared, first)
         filmed_with = command_beside(path, declared)
-        try:
-            measured = measure_source(open_recording(path, part, filmed_with), progress=progress)
-        except InputError as problem:
-            if isinstance(problem.__cause__, OSError):  # the file is at fault, and not what it shows
-                raise
-            raise InputError(f"{problem}{_what_would_mend(str(problem))}") from problem
+        measured = measure_source(open_recording(path, part, filmed_with), progress=progress)
         assert isinstance(measured, Measurement)  # a film is no file of tracks
         if measured.few or measured.other_thing:
-            cause = f"{path}: {measured.few or measured.other_thing}"
-            raise InputError(cause + _what_would_mend(cause))
+            raise InputError(f"{path}: {measured.few or measured.other_thing}")
         return _predict(measured, part, film, frames, filmed_with, command)
 
 
@@ -108,18 +102,6 @@ def _part_of(path: Path, rig: Rig, first: int | None) -> tuple[Rig, Film, int]:
 
 def _range(first: int, last: int, rate_hz: float | None) -> RigFrames:
     return RigFrames.model_validate({"from": first, "to": last, "rate_hz": rate_hz})
-
-
-def _what_would_mend(cause: str) -> str:
-    """Return what would mend a clip that cannot be measured, where its message does not say so."""
-    if "rig.yaml" in cause or "--from" in cause:
-        return ""
-    if "cannot be" in cause or "no frames" in cause or "no such" in cause or "truncated" in cause:
-        return ""
-    return (
-        "; film it with a mark in a colour that nothing else has, from a fixed camera, and check frames in which it"
-        " moves (--from K)"
-    )
 
 
 def _predict(

@@ -132,11 +132,24 @@ def test_a_clip_in_which_nothing_turns_is_one_line_that_says_what_would_mend_it(
     assert "rig.yaml" in err or "--from" in err
 
 
+def test_measure_refuses_a_clip_in_the_words_of_check(tmp_path, status):
+    places = np.linspace(-60.0, 60.0, 70)
+
+    def on_a_rail(scene, angle):
+        things.disc(scene, (160.0 + np.degrees(angle), 120.0), 10.0, (40, 60, 160))
+
+    cart = things.film(tmp_path / "cart.avi", on_a_rail, places)
+    (code, _, checked), (other, _, measured) = status("check", cart), status("measure", cart, "--out", tmp_path / "out")
+    assert code == other == 1
+    assert checked == measured
+    assert "rig.yaml" in checked or "--from" in checked
+
+
 def test_no_advice_on_filming_is_given_for_a_file_that_cannot_be_read(films, monkeypatch):
-    def lost(source, progress):
+    def lost(film, rig, command, progress):
         raise InputError("large.avi: Input/output error") from OSError(5, "Input/output error")
 
-    monkeypatch.setattr("anglecam.workflow.check.measure_source", lost)
+    monkeypatch.setattr("anglecam.workflow.clip.measure_clip", lost)
     with pytest.raises(InputError, match=r"^large\.avi: Input/output error$"):
         check_clip(films["large"])
 

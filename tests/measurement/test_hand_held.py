@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from anglecam.errors import InputError
-from anglecam.io.rig import Rig
+from anglecam.io.rig import Rig, RigMark, RigPivot
 from anglecam.measurement.clip import measure_clip
 from anglecam.video.open_film import open_film
 from support import things
@@ -72,3 +72,14 @@ def test_a_camera_that_comes_nearer_to_a_still_desk_turns_nothing(tmp_path):
     moves = [_in_hand(i) for i in range(0, len(SWING), 2)]
     with pytest.raises(InputError):
         measure_clip(open_film(_film(tmp_path / "clip.mkv", moves, np.zeros(len(moves)))), Rig())
+
+
+def test_a_thing_that_hardly_moves_before_a_camera_in_the_hand_is_no_success(tmp_path):
+    moves = [_in_hand(i) for i in range(len(SWING))]
+    rig = Rig(mark=RigMark(rgb=(200, 30, 40)), pivot=RigPivot(near=(PIVOT[0], PIVOT[1])))
+    few, far = (
+        measure_clip(open_film(_film(tmp_path / f"{share}.mkv", moves, share * SWING)), rig) for share in (0.05, 1.0)
+    )
+    assert few.doubt is not None
+    assert "before a camera in the hand" in few.doubt
+    assert far.doubt is None

@@ -140,7 +140,7 @@ def test_what_is_not_clearly_the_mark_has_to_show_that_it_turns_about_the_pivot(
     rig = Rig(pivot=RigPivot(near=(120.0, 30.0)))
     found = measure_clip(_film(tmp_path, _swing(amplitude_deg, lever=100.0)), rig)
     assert found.doubt is None
-    message = why_unproven(replace(found.detections, clear=False))
+    message = why_unproven(replace(found.detections, clear=False), hand_held=False)
     assert (message is not None) == doubted
 
 

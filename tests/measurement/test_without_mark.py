@@ -42,3 +42,19 @@ def test_a_body_without_a_mark_is_measured(tmp_path, monkeypatch, draw, by, rms_
     error -= np.median(error)
     assert np.sqrt((error**2).mean()) < rms_deg
     assert np.sqrt(((error / np.degrees(measured.series.sigma)) ** 2).mean()) < 1.5
+
+
+def test_a_stick_is_measured_where_its_mark_comes_and_goes(tmp_path):
+    seen = iter(np.arange(len(SWING)) % 12 < 5)
+
+    def blinking(scene, angle):
+        things.stick((120, 90, 60), 16.0, PIVOT, 130.0)(scene, angle)
+        if next(seen):
+            things.disc(scene, things.hanging(PIVOT, 115.0, angle), 9.0, (40, 160, 60))
+
+    measured = measure_clip(open_film(things.film(tmp_path / "clip.mkv", blinking, SWING)), Rig())
+    assert measured.doubt is None
+    error = np.degrees(measured.series.angle) - SWING
+    error -= np.nanmedian(error)
+    assert measured.series.ok.mean() > 0.9
+    assert np.sqrt(np.nanmean(error**2)) < 0.1

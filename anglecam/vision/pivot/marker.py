@@ -147,6 +147,8 @@ def _refine(gx: Floats, gy: Floats, centre: Floats, radius: float) -> tuple[Floa
     for _ in range(10):
         distance = np.hypot(xx - centre[0], yy - centre[1])
         pick = (distance <= radius + 3.0) & (distance >= 1.5)
+        if pick.sum() < 12:  # the lines meet outside the part that is searched
+            return None
         # The marker's edges are the steepest here; the slopes of the background would bias the centre.
         pick &= steepness > _EDGE_SHARE * np.quantile(steepness[pick], 0.95)
         p = np.column_stack([xx[pick], yy[pick]]).astype(float)

@@ -57,6 +57,11 @@ _PLACE_PX = 0.1
 """Standard uncertainty of an outline's place that varies with its angle, px: light, shade and stains behind it."""
 _KNOWN = 24
 """Known poses that are tried where the outline was not seen in the frame before."""
+_ALIKE = 0.95
+"""Share of the best match's points that another pose has if the outline repeats itself. A tooth of a gear is as good as
+the next, and so is either blade of a propeller; a mark with 5 % of the edges distinguishes them."""
+_SAME_TURN = 0.05
+"""Difference of two matches of one pose, rad: less than half the pitch of sixty teeth."""
 
 
 @dataclass(frozen=True)
@@ -138,15 +143,21 @@ def follow_outline(frames: Iterator[Frame], moving: MovingOutline) -> RigidMotio
     """
     poses: list[FramePose] = []
     recent: list[Floats] = []
+    last, since, fastest = None, 0, 0.0
     for frame in frames:
+        since += 1
         if frame.image is None:
             poses.append(FramePose(UNDECODABLE))
             continue
         seen = slopes(frame.image, moving.background)
-        match = _found(moving, seen, [_going_on(recent)] if recent else [])
+        match = max(_matches(moving, seen, [_going_on(recent)] if recent else []), key=_followers, default=None)
         if match is None and (seen.steepness > moving.level).sum() >= MIN_OUTLINE_POINTS:
-            match = _found(moving, seen, moving.known)
+            match = _found_again(_matches(moving, seen, moving.known), last, since, fastest)
         recent = [] if match is None else [*recent[-1:], match.pose]
+        if match is not None:
+            if last is not None and since == 1:
+                fastest = max(fastest, abs(turn_of(match.pose @ inverse_motion(last))))
+            last, since = match.pose, 0
         poses.append(FramePose(NO_MARK) if match is None else _as_frame_pose(match))
     return fit_common_centre(poses, moving.outline.middle, 0.0, _PLACE_PX)
 
@@ -197,12 +208,47 @@ def _going_on(recent: Sequence[Floats]) -> Floats:
     return damped @ recent[-1]
 
 
-def _found(moving: MovingOutline, seen: Slopes, guesses: Sequence[Floats]) -> OutlineMatch | None:
-    """Return the match of most points from several guesses, if enough of the outline is seen."""
+def _matches(moving: MovingOutline, seen: Slopes, guesses: Sequence[Floats]) -> list[OutlineMatch]:
+    """Return the matches from several guesses in which enough of the outline is seen."""
     tried = (match_outline(moving.outline, seen, guess, moving.centre) for guess in guesses)
-    matches = [match for match in tried if match is not None]
-    best = max(matches, key=lambda match: match.follows.sum(), default=None)
-    return best if best is not None and best.follows.mean() >= _SEEN_SHARE else None
+    return [match for match in tried if match is not None and match.follows.mean() >= _SEEN_SHARE]
+
+
+def _followers(match: OutlineMatch) -> int:
+    return int(match.follows.sum())
+
+
+def _found_again(
+    matches: Sequence[OutlineMatch], last: Floats | None, since: int, fastest: float
+) -> OutlineMatch | None:
+    """Return which of several matches goes on from the last pose; ``None`` where that cannot be known.
+
+    An outline that repeats itself, as a gear's does from tooth to tooth, is seen in several poses alike. The nearest to
+    the last one is the right one if the body cannot have turned by half the repetition since: it turns no faster than
+    before, and from a frame to the next one by less than that half.
+
+    Parameters
+    ----------
+    matches : sequence of OutlineMatch
+        From all known poses.
+    last : ndarray, optional
+        (3, 3) the pose when the outline was last seen; the first pose may be any of those alike.
+    since : int
+        Frames since then.
+    fastest : float
+        Largest rotation from one frame to the next one so far, rad.
+    """
+    best = max(matches, key=_followers, default=None)
+    if best is None or last is None:
+        return best
+    alike = [match for match in matches if _followers(match) >= _ALIKE * _followers(best)]
+    turned = np.array([turn_of(match.pose @ inverse_motion(last)) for match in alike])
+    nearest = int(np.argmin(np.abs(turned)))
+    apart = np.abs((turned - turned[nearest] + np.pi) % (2.0 * np.pi) - np.pi)
+    others = apart[apart > _SAME_TURN]
+    if not len(others):
+        return best
+    return alike[nearest] if since == 1 or since * fastest < others.min() / 2.0 else None
 
 
 def _as_frame_pose(match: OutlineMatch) -> FramePose:

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from anglecam.vision.pivot.marker import find_marker
+from anglecam.vision.pivot.marker import _refine, find_marker
 
 DARK_DISC, BRIGHT_DISC = [(7, 20)], [(12, 240)]
 BLACK_RING, WHITE_RING = [(12, 245), (8, 20), (4, 245)], [(13, 15), (9, 240), (5, 15)]
@@ -54,3 +54,8 @@ def test_the_centre_is_accurate_to_a_tenth_of_a_pixel_with_a_hint_12_px_off(ring
 
 def test_no_marker_is_found_where_there_is_none():
     assert find_marker(_scene((80, 60), []), np.array([80.0, 60.0]), 100.0 * np.eye(2)) is None
+
+
+def test_gradients_that_point_out_of_the_picture_show_no_marker():
+    y, x = np.mgrid[0:40, 0:40].astype(float)
+    assert _refine(x - 200.0, y - 20.0, np.array([36.0, 20.0]), 8.0) is None
