@@ -117,3 +117,29 @@ def test_of_two_hinged_links_one_is_measured_or_none(tmp_path, lengths, ratio):
         apart = np.degrees(motion.turn) - np.outer([1.0, ratio], swing)
         off = np.abs(apart - np.median(apart, axis=1)[:, None]) / np.degrees(motion.sigma)
         assert np.median(off, axis=1).min() < 1.0
+
+
+def _gear(scene, angle):
+    """Draw a gear of twelve teeth, all alike."""
+    for tooth in angle + np.arange(12) * np.pi / 6.0:
+        end = 160.0 + 80.0 * np.cos(tooth), 120.0 - 80.0 * np.sin(tooth)
+        things.bar(scene, (160.0, 120.0), end, 18.0, GREY)
+    things.disc(scene, (160.0, 120.0), 64.0, GREY)
+
+
+@pytest.mark.parametrize(("covered", "goes_on"), [(1, True), (6, False)])
+def test_a_gear_is_not_found_again_at_another_tooth(tmp_path, covered, goes_on):
+    turned = 4.0 * np.arange(60)
+    frames = iter(range(len(turned)))
+
+    def behind_a_board(scene, angle):
+        _gear(scene, angle)
+        if 44 <= next(frames) < 44 + covered:
+            things.bar(scene, (20.0, 120.0), (300.0, 120.0), 220.0, (150, 150, 140))
+
+    motion = _followed(tmp_path, behind_a_board, turned)
+    assert not isinstance(motion, str), motion
+    error = np.degrees(motion.turn) - turned
+    error -= np.nanmedian(error)
+    assert np.nanmax(np.abs(error)) < 1.0
+    assert np.isfinite(error[44 + covered :]).all() == goes_on
