@@ -216,7 +216,7 @@ def one_round(
 
     appearance = _learn_all(data, kept, state, [t.gains[0] for t in appearance])
     all_fits = compare_all(appearance, views, state.turns, centres)
-    fits = all_fits.without(out)
+    fits = all_fits.without(out | all_fits.without_information)
     variance = fits.squares.sum(axis=1) / np.maximum(fits.count.sum(axis=1), 1)
     variance = np.maximum(variance, max(_MIN_VARIANCE * np.median(variance), _EXACT))
     by_unknown = data.by_unknown(state)

@@ -156,6 +156,15 @@ class TileFit:
     """(views, planes, 3) gain and offset of brightness, and variance of blur along the path (px²), of the view relative
     to the tile's appearance."""
 
+    @property
+    def without_information(self) -> NDArray[np.bool_]:
+        """Views that show nothing of the angle.
+
+        In a view of few pixels the light, which is fitted with the angle, may explain all. What is left is then zero,
+        or less by rounding.
+        """
+        return self.normal[..., 0, 0] <= 0.0
+
     def without(self, out: NDArray[np.bool_]) -> TileFit:
         """Return a copy in which the views marked in ``out`` count as if they had no pixels."""
         kept = ~out

@@ -124,7 +124,7 @@ def _first_state(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, 
 def _at_the_end(data: Data, last: Round) -> tuple[Floats, Floats]:
     """Return normal matrices and gradients, divided by the variances, in the state that the last round found."""
     fits = compare_all(last.appearance, data.seen(last.state), last.state.turns, data.centres(last.state))
-    return fits.without(last.hidden).weighted(last.variance * last.excess)
+    return fits.without(last.hidden | fits.without_information).weighted(last.variance * last.excess)
 
 
 def _body(data: Data, last: Round, end: tuple[Floats, Floats], plane: MotionPlane, moving: bool) -> BodyAppearance:
