@@ -24,6 +24,7 @@ from anglecam.measurement.pivot import HINT_PX
 from anglecam.vision.mark.outline_turn import outline_turn
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle
+from anglecam.vision.status import AMBIGUOUS
 
 _MAX_OFF_CIRCLE = 0.02
 """Largest systematic variation of the distance from the pivot, as a share of the mark's travel. An error along the
@@ -48,6 +49,9 @@ lengthens a mark, and noise changes a small one."""
 _OTHER_TURN = 0.25
 """Excess of the mark's own rotation over that of the line to it, as a share, from which on the line is not its own. A
 view from 37° aside has as much."""
+_WITH_ANOTHER = 0.2
+"""Share of the frames in which another thing may be the mark, from which on it turns with the mark. A thing that the
+mark passes, or that crosses its path, is taken for it in fewer."""
 _DECLARE = "pivot: {at: [x, y], sigma_px: s} in rig.yaml"
 _TRAVEL_PX = 0.5
 """Least RMS travel of a mark that moves, px. Noise, rain and flicker shift the centroid of a thing at rest by 0.2."""
@@ -280,6 +284,30 @@ def why_elsewhere(detections: Detections, rig: Rig) -> str | None:
     return (
         f"what moves turns about {x:.0f},{y:.0f}, {np.hypot(*off):.0f} px from the hint pivot: {{near: [{expected}]}};"
         " is another thing meant? Declare it: mark: {at: [x, y], frame: k} in rig.yaml"
+    )
+
+
+def why_two_alike(detections: Detections) -> str | None:
+    """Return a message where two things that are alike turn together, so that either may be the measured one.
+
+    The two blades of a propeller are such things: after frames in which both are seen, the other one may be followed.
+
+    Parameters
+    ----------
+    detections : Detections
+        The coarse pass.
+
+    Returns
+    -------
+    str or None
+        With the number of frames in which both are seen.
+    """
+    count, both = len(detections.status), detections.status.count(AMBIGUOUS)
+    if both < _WITH_ANOTHER * count:
+        return None
+    return (
+        f"in {both} of {count} frames two things may be the mark, and after them either may be followed; mark one of"
+        " them, or declare it: mark: {at: [x, y], frame: k} in rig.yaml"
     )
 
 

@@ -13,7 +13,7 @@ from anglecam.errors import InputError
 from anglecam.io.rig import Rig, RigMark, RigPivot
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.rigid_body_pass import detect_rigid_body
-from anglecam.measurement.trust import why_few, why_not_rigid, why_unproven
+from anglecam.measurement.trust import why_few, why_not_rigid, why_two_alike, why_unproven
 from anglecam.video.open_film import open_film
 
 SIZE = (240, 180)
@@ -21,8 +21,8 @@ TIME = np.arange(45) / 30.0
 MIDDLE = np.array([120.0, 90.0])
 
 
-def _film(folder, places, marker=None):
-    """Draw a red ball at (n, 2) places before a wall with boxes; write it without loss."""
+def _film(folder, places, marker=None, other=None):
+    """Draw a red ball at (n, 2) places, or two, before a wall with boxes; write it without loss."""
     rng = np.random.default_rng(1)
     wall = np.full((SIZE[1], SIZE[0], 3), (160, 170, 175), np.uint8)
     for x, y in rng.uniform((0, 0), SIZE, (9, 2)).astype(int):
@@ -32,8 +32,8 @@ def _film(folder, places, marker=None):
     path = folder / "clip.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"FFV1"), 30, SIZE)
     y, x = np.indices(wall.shape[:2])
-    for px, py in places:
-        cover = np.clip(9.5 - np.hypot(x - px, y - py), 0.0, 1.0)[..., None]
+    for balls in zip(*([places] if other is None else [places, other]), strict=True):
+        cover = np.max([np.clip(9.5 - np.hypot(x - px, y - py), 0.0, 1.0) for px, py in balls], axis=0)[..., None]
         picture = wall + cover * (np.array((35, 30, 190)) - wall) + rng.normal(0.0, 2.0, wall.shape)
         writer.write(np.clip(picture.round(), 0, 255).astype(np.uint8))
     writer.release()
@@ -159,3 +159,17 @@ def test_a_mark_that_is_pointed_at_in_the_first_frame_is_looked_at_once(tmp_path
         found = measure_clip(_film(tmp_path, _swing(30.0)), rig)
     assert found.doubt is None
     assert len(found.series.ok) == len(TIME)
+
+
+def test_two_marks_that_are_alike_and_turn_together_are_refused(tmp_path):
+    arm = 50.0 * np.column_stack([np.cos(TURN), np.sin(TURN)])
+    with pytest.raises(InputError, match="no mark found"):
+        measure_clip(_film(tmp_path, MIDDLE + arm, other=MIDDLE - arm), Rig())
+
+
+def test_frames_that_show_two_things_alike_are_a_doubt_if_they_are_many(tmp_path):
+    seen = measure_clip(_film(tmp_path, _swing(20.0)), Rig()).detections
+    assert why_two_alike(seen) is None
+    few, many = (replace(seen, status=("ambiguous",) * k + seen.status[k:]) for k in (5, 15))
+    assert why_two_alike(few) is None
+    assert "in 15 of 45 frames two things may be the mark" in why_two_alike(many)
