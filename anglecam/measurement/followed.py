@@ -104,8 +104,9 @@ def follow_mark_or_body(
             causes.append(body)
         except InputError as problem:
             causes.append(str(problem).removeprefix(f"{film.path}: "))
-    besides = f"; nor can a body be followed without a mark: {', and '.join(causes[1:])}" if causes[1:] else ""
-    raise InputError(causes[0] + besides)
+    found, *others = dict.fromkeys(causes)  # body and outline may fail for the same cause
+    besides = f"; nor can a body be followed without a mark: {', and '.join(others)}" if others else ""
+    raise InputError(found + besides)
 
 
 def _without_mark(camera: HeldCamera, rig: Rig) -> list[Callable[[Film, Rig], Detections | str]]:

@@ -234,10 +234,10 @@ class Plant:
 def _arrived(command: Command | None, pairs: Sequence[tuple[Effect, Floats]]) -> Floats:
     """Return the knots (3, m) of the command that arrives at the drive: instants, levels and slopes."""
     given = _NO_COMMAND if command is None else command.knots
-    shaping = [(effect, values) for effect, values in pairs if effect.command is not None]
+    shaping = [(effect.command, values) for effect, values in pairs if effect.command is not None]
     if not shaping:
         return given
     knots = Knots(*given)
-    for effect, values in shaping:
-        knots = effect.command(knots, values)  # type: ignore[misc]  # not None
+    for shape, values in shaping:
+        knots = shape(knots, values)
     return np.stack([knots.time, knots.level, knots.slope])

@@ -12,7 +12,6 @@ from anglecam.errors import RigError
 from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.close import close_records
 from anglecam.loop.cross_validation import Prediction, predict_held_out, split_records
-from anglecam.loop.policy import Policy, StepwisePolicy
 from anglecam.loop.stepwise import applicable
 from anglecam.loop.verdict_json import verdict_as_dict
 from anglecam.models.plant import Plant
@@ -23,7 +22,6 @@ from support.motion import Plant as TruePlant
 from support.series import session
 
 HELD_OUT = ["random"]
-ONE_EFFECT = Policy(stepwise=StepwisePolicy(most_effects=1))
 
 
 @pytest.mark.parametrize(
@@ -121,9 +119,8 @@ def test_no_effect_is_named_if_none_is_hidden(clean):
 
 
 def test_an_effect_outside_the_ledger_is_called_unexplained():
-    # one effect takes away a part of it and does not stand; test_possible_effects.py has a search to its end
     records = drawn_session({"wind_gusts": {"rms": 1.0, "number": 3}}, seed=8)
-    verdict = close_records(records, held_out=HELD_OUT, seed=8, policy=ONE_EFFECT)
+    verdict = close_records(records, held_out=HELD_OUT, seed=8)
     assert verdict.verdict == "unexplained"
     assert verdict_as_dict(verdict)["effects"] == []
     assert "none" in sentence(verdict)

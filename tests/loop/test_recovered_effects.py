@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from anglecam.effects import effect
 from anglecam.identification.systematic import full_sigma
-from anglecam.loop.candidates import fit_with
-from anglecam.loop.close import begin, close_records
-from anglecam.loop.cross_validation import split_records
-from anglecam.loop.policy import DEFAULT
-from anglecam.loop.residual_test import run_residual_test
-from anglecam.loop.screen import changes, directions, forecasts
+from anglecam.loop.close import close_records
 from benchmarks.blind.judged import true_values
 from benchmarks.blind.sessions import HELD_OUT, session, spec_of
 
 SEED = 1
-SIGMA_DEG = 0.05
-"""Of the sessions' noise."""
 TRUTHS = {
     "load_dependent_friction": {"share": 0.064, "spring_share": 0.38},
     "speed_dependent_torque": {"stall": 253.0, "no_load_deg_per_s": 436.0},
@@ -34,11 +26,7 @@ TRUTHS = {
 """Sizes that leave a residual of about twice the noise."""
 
 
-NAMED = ("speed_dependent_torque", "elastic_coupling", "periodic_disturbance", "time_varying_parameter")
-"""Those on which the loop is closed here; `benchmarks.blind.attribution` closes it on every effect of the ledger."""
-
-
-@pytest.mark.parametrize("name", NAMED)
+@pytest.mark.parametrize("name", TRUTHS)
 def test_the_acting_effect_is_named_or_an_alias_and_its_size_agrees(name):
     effects = {name: TRUTHS[name]}
     verdict = close_records(session(effects, seed=SEED), held_out=HELD_OUT, seed=SEED)
@@ -46,26 +34,8 @@ def test_the_acting_effect_is_named_or_an_alias_and_its_size_agrees(name):
     (accepted,) = verdict.accepted
     assert name in accepted.alias_set
     fit = verdict.after if accepted.effect.id == name else accepted.rivals[name]
-    assert_size_agrees(fit, name, verdict.fitted, verdict.noise)
-
-
-@pytest.mark.parametrize("name", [name for name in TRUTHS if name not in NAMED])
-def test_the_acting_effect_is_found_in_the_residual_and_explains_it_with_a_size_that_agrees(name):
-    records, _ = split_records(session({name: TRUTHS[name]}, seed=SEED), HELD_OUT)
-    task, base = begin(records, (), (), np.random.default_rng(SEED), lambda stage: None, DEFAULT)
-    acting = [one for one in task.ledger if one.id == name]
-    chosen = directions(base, task.fitted, changes(base, task.fitted, acting))
-    assert not run_residual_test(base, task.fitted, chosen, task.rng, 0.0, phi_estimated=False).passed
-    (forecast,) = forecasts(base, chosen)
-    fit = fit_with(base, task.fitted, forecast)
-    assert np.degrees(fit.rmse) < 1.05 * SIGMA_DEG
-    assert_size_agrees(fit, name, task.fitted, task.noise_within(fit))
-
-
-def assert_size_agrees(fit, name, records, noise):
-    """Compare the first parameter of an effect with the truth of a session in which it acts alone."""
     first = effect(name).parameters[0]
     at = fit.model.names.index(first.name)
-    truth = true_values(spec_of({name: TRUTHS[name]}, seed=SEED), {name: TRUTHS[name]})[name]
+    truth = true_values(spec_of(effects, seed=SEED), effects)[name]
     truth = first.to_file / truth if first.inverse else truth / first.to_file
-    assert abs(fit.parameters[at] - truth) < 3.0 * full_sigma(fit, records, noise)[at]
+    assert abs(fit.parameters[at] - truth) < 3.0 * full_sigma(fit, verdict.fitted, verdict.noise)[at]

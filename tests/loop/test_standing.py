@@ -10,7 +10,6 @@ import pytest
 
 from anglecam.loop import close
 from anglecam.loop.close import close_records
-from anglecam.loop.policy import Policy, StepwisePolicy
 from support.closing import close_without_rivals
 from support.motion import Plant
 from support.outside import outside_session
@@ -30,8 +29,7 @@ def test_an_effect_that_takes_away_nearly_all_of_its_error_stands_beside_an_unkn
 
 
 def test_an_effect_that_only_resembles_the_cause_does_not_stand():
-    one = Policy(stepwise=StepwisePolicy(most_effects=1))
-    verdict = close_records(outside_session("magnet", 0), held_out=["random"], policy=one)
+    verdict = close_records(outside_session("magnet", 0), held_out=["random"])
     assert verdict.verdict == "unexplained"
     assert not verdict.accepted
 

@@ -8,7 +8,7 @@ the pivot at 0, forward positive, up imaginary.
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -59,19 +59,10 @@ class Head:
         self.front = float(np.abs(_smooth(FACE)[_smooth(FACE).real > 0.5] * self._unit).max())
         self._half = int(np.ceil(self.reach * FINE))
 
-    @property
+    @cached_property
     def layer(self) -> np.ndarray:
         """Return premultiplied BGR and alpha at 4×."""
-        look = self.look
-        return _layer(
-            Look(
-                lever_px=look.lever_px,
-                neutral_deg=look.neutral_deg,
-                lips_rgb=look.lips_rgb,
-                skin=look.skin,
-                texture_seed=look.texture_seed,
-            )
-        )
+        return self._blurred(self._draw())
 
     def lips_layer(self) -> np.ndarray:
         """Return the lips alone, one channel of alpha, drawn with the same steps as the head, for checks."""
@@ -145,10 +136,3 @@ class Head:
             rgb[box] += cover[box][..., None] * (np.broadcast_to(colour, rgb.shape)[box] - rgb[box])
             alpha[box] += cover[box] * (1 - alpha[box])
         return np.dstack([rgb[..., ::-1], alpha])
-
-
-@lru_cache(maxsize=3)
-def _layer(look: Look) -> np.ndarray:
-    """Return the layer of a look, which takes a second; the rest of a film's look does not change it."""
-    head = Head(look)
-    return head._blurred(head._draw())

@@ -19,6 +19,8 @@ from anglecam.data.typing import Floats, Image
 _RADII_PX = np.arange(3, 25)
 _MIN_COVERAGE = 0.6
 """Share of a circle's circumference that must point at its centre."""
+_FEWEST = 12
+"""Gradients that determine a centre."""
 _LINE_PX = 1.5
 """A gradient line that passes the centre at a greater distance belongs to something else, px."""
 _EDGE_SHARE = 0.4
@@ -138,7 +140,7 @@ def _refine(gx: Floats, gy: Floats, centre: Floats, radius: float) -> tuple[Floa
     Returns
     -------
     tuple of ndarray or None
-        The centre (2,), px, and its covariance (2, 2), px²; ``None`` where fewer than 12 gradients point at it.
+        The centre (2,), px, and its covariance (2, 2), px²; ``None`` where fewer than `_FEWEST` gradients point at it.
     """
     height, width = gx.shape
     yy, xx = np.mgrid[0:height, 0:width]
@@ -147,7 +149,7 @@ def _refine(gx: Floats, gy: Floats, centre: Floats, radius: float) -> tuple[Floa
     for _ in range(10):
         distance = np.hypot(xx - centre[0], yy - centre[1])
         pick = (distance <= radius + 3.0) & (distance >= 1.5)
-        if pick.sum() < 12:  # the lines meet outside the part that is searched
+        if pick.sum() < _FEWEST:  # the lines meet outside the part that is searched
             return None
         # The marker's edges are the steepest here; the slopes of the background would bias the centre.
         pick &= steepness > _EDGE_SHARE * np.quantile(steepness[pick], 0.95)
@@ -156,7 +158,7 @@ def _refine(gx: Floats, gy: Floats, centre: Floats, radius: float) -> tuple[Floa
         normal = np.column_stack([-gy[pick], gx[pick]]) / size[:, None]
         miss = ((centre - p) * normal).sum(axis=1)
         keep = np.abs(miss) < _LINE_PX
-        if keep.sum() < 12:
+        if keep.sum() < _FEWEST:
             return None
         p, normal, weight = p[keep], normal[keep], size[keep] ** 2
         N = (normal * weight[:, None]).T @ normal
