@@ -23,7 +23,7 @@ from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.duplicates import duplicate_frames
 from anglecam.measurement.followed import Followed, follow_mark_or_body
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
-from anglecam.measurement.trust import why_elsewhere, why_few, why_not_rigid, why_two_alike, why_unproven
+from anglecam.measurement.trust import why_elsewhere, why_few, why_not_rigid, why_unproven
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.mark.outline_turn import outline_turn
@@ -145,7 +145,6 @@ def measure_clip(
     if followed.angles.registered is None:
         other = (
             why_elsewhere(followed.detections, rig)
-            or why_two_alike(followed.detections)
             or why_not_rigid(followed.detections, followed.ok)
             or why_unproven(followed.detections, hand_held=isinstance(held, FilmAtRest))
         )

@@ -108,6 +108,30 @@ def why_few(status: Sequence[str], least: float) -> str | None:
     )
 
 
+def why_two_alike(status: Sequence[str]) -> str | None:
+    """Return a message where two things that are alike turn together, so that either may be the measured one.
+
+    The two blades of a propeller are such things: after frames in which both are seen, the other one may be followed.
+
+    Parameters
+    ----------
+    status : sequence of str
+        Of every frame.
+
+    Returns
+    -------
+    str or None
+        With the number of frames in which both are seen.
+    """
+    both = sum(s == AMBIGUOUS for s in status)
+    if both < _WITH_ANOTHER * len(status):
+        return None
+    return (
+        f"in {both} of {len(status)} frames two things may be the mark, and after them either may be followed; mark one"
+        " of them, or declare it: mark: {at: [x, y], frame: k} in rig.yaml"
+    )
+
+
 def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig) -> str | None:
     declared = rig.pivot.expected is not None
     seen_to_turn = detections.body is not None or angles.registered is not None
@@ -123,7 +147,7 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
         return f"nothing is seen to turn; to measure a mechanism at rest, declare {_DECLARE}"
     otherwise = None if at_rest else why_off_circle(detections, angles)
     if otherwise is None and not seen_to_turn:
-        otherwise = _why_not_its_line(detections, ok, angles)
+        otherwise = why_two_alike(detections.status) or _why_not_its_line(detections, ok, angles)
     if otherwise is None and detections.body is not None:
         otherwise = _why_not_seen_to_turn(angles)
     if otherwise is not None:
@@ -284,30 +308,6 @@ def why_elsewhere(detections: Detections, rig: Rig) -> str | None:
     return (
         f"what moves turns about {x:.0f},{y:.0f}, {np.hypot(*off):.0f} px from the hint pivot: {{near: [{expected}]}};"
         " is another thing meant? Declare it: mark: {at: [x, y], frame: k} in rig.yaml"
-    )
-
-
-def why_two_alike(detections: Detections) -> str | None:
-    """Return a message where two things that are alike turn together, so that either may be the measured one.
-
-    The two blades of a propeller are such things: after frames in which both are seen, the other one may be followed.
-
-    Parameters
-    ----------
-    detections : Detections
-        The coarse pass.
-
-    Returns
-    -------
-    str or None
-        With the number of frames in which both are seen.
-    """
-    count, both = len(detections.status), detections.status.count(AMBIGUOUS)
-    if both < _WITH_ANOTHER * count:
-        return None
-    return (
-        f"in {both} of {count} frames two things may be the mark, and after them either may be followed; mark one of"
-        " them, or declare it: mark: {at: [x, y], frame: k} in rig.yaml"
     )
 
 
