@@ -142,7 +142,8 @@ def to_colours(picture: av.VideoFrame) -> Image:
     """Convert a picture to (height, width, 3) bytes: blue, green, red."""
     if _is_jpeg(picture):
         return _jpeg_part(picture, (slice(0, picture.height), slice(0, picture.width)))
-    return picture.to_ndarray(format="bgr24", threads=1)  # starting threads takes longer than they save
+    # starting threads takes longer than they save; lines that FFmpeg pads are packed, as the kernels expect
+    return np.ascontiguousarray(picture.to_ndarray(format="bgr24", threads=1))
 
 
 def to_brightness(picture: av.VideoFrame) -> Image:
@@ -152,7 +153,7 @@ def to_brightness(picture: av.VideoFrame) -> Image:
     """
     bits = picture.format.components[0].bits
     if not picture.format.name.startswith(("yuv4", "yuvj4", "yuva4", "nv", "gray")) or not 8 <= bits <= 16:
-        return picture.to_ndarray(format="gray")[..., None]
+        return np.ascontiguousarray(picture.to_ndarray(format="gray"))[..., None]
     if bits == 8:
         return _plane(picture, 0)[..., None].copy()
     plane = picture.planes[0]

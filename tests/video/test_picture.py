@@ -34,6 +34,14 @@ def test_a_part_has_the_colours_of_the_whole(form):
         np.testing.assert_array_equal(_picture(stored).colours_in((rows, columns)), whole[rows, columns])
 
 
+@pytest.mark.parametrize("form", ["yuv420p", "yuvj444p", "yuv420p10le", "bgr0", "bgr24", "gbrp", "gray"])
+def test_lines_follow_each_other_in_memory_whatever_ffmpeg_pads_them_with(form):
+    picture = _picture(_stored(form))
+    for image in (picture.colours, picture.brightness):
+        assert image.shape[:2] == SIZE[::-1]
+        assert image.flags.c_contiguous
+
+
 @pytest.mark.parametrize("form", ["yuvj420p", "yuvj444p", "bgr0"])
 def test_colours_within_a_part_are_those_of_the_whole_and_the_rest_need_not_be(form):
     stored, part = _stored(form), (slice(33, 70), slice(41, 90))
