@@ -37,7 +37,7 @@ _AGREE = 2.0
 _AS_OFTEN = 0.9
 """Least share of the frames in which another thing is measured, for a mark to count as seen as often."""
 _LARGER = 2.0
-"""Least size of a body, relative to the mark's radius, from which on it is not the mark."""
+"""Least size of a body, relative to the mark's radius or to a registered part, from which on it is another one."""
 
 
 @dataclass(frozen=True)
@@ -136,22 +136,27 @@ def _hinted(mark: Followed, film: Film, rig: Rig, command: Command | None) -> Fo
     InputError
         Where the mark and what turns about the hint move otherwise, and the mark is seen as often.
     """
-    alone = mark.detections.by == "mark" and mark.angles.registered is None and mark.detections.lens.is_identity
-    if not alone or (mark.detections.clear and not reaches_over_pivot(mark.detections, mark.ok, mark.angles)):
+    replaceable = mark.detections.by == "mark" and mark.detections.lens.is_identity
+    reaches_over = replaceable and reaches_over_pivot(mark.detections, mark.ok, mark.angles)
+    registered = mark.angles.registered
+    if not replaceable or not (reaches_over or (registered is None and not mark.detections.clear)):
         return mark
     try:
         layer = detect_layer(film, rig)
         other = None if isinstance(layer, str) else _measured(film, rig, command, layer, None)
     except InputError:
         other = None
-    if other is None:
+    if other is None or other.detections.body is None:
+        return mark
+    part = None if registered is None else registered.appearance.extent_px
+    if part is not None and other.detections.body.extent_px < _LARGER * part:
         return mark
     if mark.ok.sum() < _AS_OFTEN * other.ok.sum():
         return other
-    if _shows_it_better(mark.angles, mark.ok, other.angles, other.ok, rig):
-        return other
     if _agree(mark.angles, mark.ok, other.angles, other.ok, rig):
-        return mark
+        # a registered part that is small beside the whole is of few tiles, whose errors its uncertainty leaves out
+        surer = part is not None or _shows_it_better(mark.angles, mark.ok, other.angles, other.ok, rig)
+        return other if surer else mark
     raise InputError(
         f"{film.path}: two things turn differently about the hinted pivot; declare one: mark: {{at: [x, y], frame: k}}"
         " in rig.yaml"

@@ -76,10 +76,10 @@ def _error(series, turns):
 def films(tmp_path_factory):
     """Film the horn before two desks, each with noise of its own."""
     folder = tmp_path_factory.mktemp("horn")
-    return {seed: _film(folder / f"{seed}.mkv", TURNS, seed=seed) for seed in (4, 5)}
+    return {seed: _film(folder / f"{seed}.mkv", TURNS, seed=seed) for seed in (4, 5, 10)}
 
 
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", [4, 5, 10])  # with 10, a few tiles near the pivot can be registered as well
 def test_a_horn_is_followed_about_a_hinted_pivot(films, seed):
     measured = measure_clip(open_film(films[seed]), NEAR)
     series = measured.series
