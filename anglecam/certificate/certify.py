@@ -19,7 +19,7 @@ from anglecam.certificate.quantity import QUANTITIES, Quantity, with_breakaway
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.output_error import fit_best_start, fit_output_error, output_error
-from anglecam.loop.candidates import fit_with
+from anglecam.loop.fit_effect import fit_with
 from anglecam.loop.next_experiment.design import Experiment, separating_experiment
 from anglecam.loop.profile import Profile, profile
 from anglecam.loop.refit import effects_of, fit_at, plant_of

@@ -1,37 +1,26 @@
-"""Attribution: fit every promising effect, and find the effects that the recordings cannot distinguish."""
+"""Attribution: fit every promising effect in addition to those of the model, and predict with each."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import chain
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from scipy import special
 
 from anglecam.data.record import Record
-from anglecam.data.typing import Floats
 from anglecam.effects import Effect
-from anglecam.effects.seen import Motion, usual_range
 from anglecam.identification.fit import Fit
-from anglecam.identification.output_error import first_state, fit_best_start, fit_output_error, output_error
+from anglecam.identification.output_error import fit_output_error, output_error
 from anglecam.loop.cross_validation import Prediction, predict_held_out
+from anglecam.loop.fit_effect import fit_with
+from anglecam.loop.likelihood import log_likelihood_gain
 from anglecam.loop.policy import DEFAULT, Policy
-from anglecam.loop.refit import effects_of, fit_at, plant_of, refit_without
+from anglecam.loop.refit import effects_of
+from anglecam.loop.rivals import is_possible
 from anglecam.loop.screen import Forecast
 from anglecam.threads import map_in_threads
-
-STAGED_STARTS = 8
-"""Start values of a staged parameter from which a fit is made: those with the smallest cost before fitting."""
-
-FLAT_FACTORS = tuple(np.geomspace(0.5, 2.0, 13).tolist())
-"""Multiples of a fitted staged parameter that are tried, 12 % apart."""
-FLAT_ROUNDS = 4
-"""Most fits from such multiples."""
-LARGER = (2.0, 4.0, 8.0)
-"""Multiples of a fitted size that are tried where it does not describe its effect."""
 
 
 @dataclass(frozen=True)
@@ -134,64 +123,6 @@ def fit_candidates(
     return sorted(candidates, key=lambda c: (c.cross_validated is None, -c.evidence))
 
 
-def fit_with(
-    base: Fit,
-    records: Sequence[Record],
-    forecast: Forecast,
-    *,
-    staged: bool = True,
-    camera: float = 0.0,
-    policy: Policy = DEFAULT,
-) -> Fit:
-    """Fit the plant of ``base`` with one more effect.
-
-    Parameters
-    ----------
-    base : Fit
-        Of the plant so far, on ``records``.
-    records : sequence of Record
-        Recordings to fit.
-    forecast : Forecast
-        The effect, with its start values.
-    staged : bool
-        Whether to add the staged parameters that the data require; they take most of the time.
-    camera : float
-        Stated standard uncertainty of a film's angle, rad; 0 for angle series from elsewhere.
-    policy : Policy
-        Thresholds.
-
-    Returns
-    -------
-    Fit
-        The best of several starts: the forecast's, and where its gain falls short, others.
-    """
-    effect = forecast.effect
-    unstaged = [p for p in effect.parameters if not p.staged]
-    plant = plant_of(base).with_effect(replace(effect, parameters=tuple(unstaged)))
-    nuisance = _nuisance_at_rest(base, records)
-
-    def fit_from(*starts: Floats) -> Fit:
-        values = [np.append(base.parameters, start[: len(unstaged)]) for start in starts]
-        return fit_best_start(plant, records, values, nuisance, base.phi)
-
-    near = [effect.null + share * (forecast.start - effect.null) for share in (0.5, 2.0)]
-    # several parameters may give several local minima; dry friction does wherever the body sticks or breaks away
-    several = len(unstaged) > 1 or effect.friction is not None
-    incomplete, failed = policy.candidates.incomplete_fit_share, policy.candidates.failed_fit_share
-    further = [(near, failed)] if several else [([forecast.tried, forecast.likeliest], incomplete), (near, failed)]
-    best = fit_from(forecast.start, forecast.tried, forecast.likeliest) if several else fit_from(forecast.start)
-    # the change by a limit is not proportional: scaled down, it may be zero and have no gradient
-    for starts, share in further if forecast.share >= policy.screen.smallest_forecast_share else ():
-        if log_likelihood_gain(base.cost, best.cost, len(base.white)) < share * forecast.gain:
-            fit = fit_from(*starts)
-            best = fit if fit.cost < best.cost else best
-    if plant.kinked:
-        # the initial states may have ended in a local minimum on the way
-        again = fit_output_error(plant, records, [best.parameters], nuisance=nuisance, phi=base.phi)
-        best = again if again.cost < best.cost else best
-    return with_staged(base, effect, best, records, camera, policy) if staged else best
-
-
 def fit_from_candidates(base: Fit, candidates: Sequence[Candidate], records: Sequence[Record]) -> Fit:
     """Fit a plant again from its parameters in a candidate, if they lower its cost even without the added effect.
 
@@ -204,187 +135,3 @@ def fit_from_candidates(base: Fit, candidates: Sequence[Candidate], records: Seq
         return base
     values, nuisance = starts[int(np.argmin(costs))]
     return fit_output_error(base.model, records, [values], nuisance=nuisance, phi=base.phi)
-
-
-def _nuisance_at_rest(base: Fit, records: Sequence[Record]) -> list[Floats]:
-    """Return the nuisance parameters of each recording, with zero rates if no command has moved the body yet.
-
-    An effect that holds or delays the body has kinks. Dry friction, for instance, stops a small initial rate within a
-    frame, so that the data hardly distinguish rate and angle there, and a fit that starts with the base model's rate
-    keeps it.
-    """
-    first, states = [first_state(base.model, record) for record in records], base.model.states
-    at_rest = [np.concatenate([fitted[:1], np.zeros(states - 1), fitted[states:]]) for fitted in base.nuisance]
-    return [
-        rest if state[1] == 0.0 else fitted for fitted, rest, state in zip(base.nuisance, at_rest, first, strict=True)
-    ]
-
-
-def fit_to_more(
-    fit: Fit,
-    records: Sequence[Record],
-    nuisance: Sequence[Floats],
-    ledger: Sequence[Effect],
-    policy: Policy = DEFAULT,
-) -> Fit:
-    """Fit a plant to more recordings, with staged parameters of its effects that the first ones did not require."""
-    best = fit_output_error(fit.model, records, [fit.parameters], nuisance=nuisance, phi=fit.phi)
-    for effect in effects_of(fit):
-        whole = next(e for e in ledger if e.id == effect.id)
-        if any(p.staged for p in whole.parameters):
-            unstaged = tuple(p for p in whole.parameters if not p.staged)
-            base = refit_without(best, effect, records)
-            size = [best.parameters[best.model.names.index(p.name)] for p in unstaged]
-            plant = plant_of(base).with_effect(replace(whole, parameters=unstaged))
-            start = np.append(base.parameters, size)
-            first = fit_output_error(plant, records, [start], nuisance=best.nuisance, phi=fit.phi)
-            best = min(best, with_staged(base, whole, first, records, policy=policy), key=lambda one: one.cost)
-    return best
-
-
-def with_staged(
-    base: Fit,
-    effect: Effect,
-    fit: Fit,
-    records: Sequence[Record],
-    camera: float = 0.0,
-    policy: Policy = DEFAULT,
-) -> Fit:
-    """Add the staged parameters of a fit's last effect, one after another, as far as the data require them.
-
-    Added all at once, they could take over the role of the effect's first parameter. A single one may gain nothing
-    although it and the next one together do. The instant at which a stuck body breaks away is all or nothing, so the
-    cost has many local minima: of many starts, each with the previous staged parameters as fitted and without them,
-    those with the smallest cost are fitted. In a film, staged parameters must also change the prediction by more than
-    the angle's uncertainty, because a smaller change may follow errors of the measurement.
-    """
-    plant, best, spent = plant_of(base), fit, 0
-    effect = _bound_speeds(effect, fit, records, policy)
-    first = len(base.parameters) + sum(not p.staged for p in effect.parameters)
-    for count in range(len(effects_of(fit)[-1].parameters) + 1, len(effect.parameters) + 1):
-        richer = plant.with_effect(replace(effect, parameters=effect.parameters[:count]))
-        bare = np.append(fit.parameters[:first], np.zeros(len(fit.parameters) - first))
-        before = [fit.parameters] if np.array_equal(bare, fit.parameters) else [fit.parameters, bare]
-        values = [np.append(x, v) for v in effect.parameters[count - 1].starts for x in before]
-        values.sort(key=lambda one: output_error(richer, one, records, fit.nuisance, fit.phi))
-        fit = fit_best_start(richer, records, values[:STAGED_STARTS], fit.nuisance, fit.phi)
-        fit, spent = _beyond_flat(fit, records, policy), spent + 1
-        gain = log_likelihood_gain(best.cost, fit.cost, len(fit.white))
-        needed = special.chdtri(spent, policy.candidates.false_staged_parameter_rate)
-        if 2.0 * gain > needed and rms_difference(fit, best) > camera:
-            best, spent = fit, 0
-    return best
-
-
-def _beyond_flat(fit: Fit, records: Sequence[Record], policy: Policy) -> Fit:
-    """Fit again from other values of the last parameter while they lower the cost; the cost is flat between events."""
-    for _ in range(FLAT_ROUNDS):
-        value = fit.parameters[-1]
-        values = [np.append(fit.parameters[:-1], factor * value) for factor in FLAT_FACTORS]
-        costs = [output_error(fit.model, one, records, fit.nuisance, fit.phi) for one in values]
-        if log_likelihood_gain(fit.cost, min(costs), len(fit.white)) < policy.stepwise.better_minimum_nat:
-            break
-        start = values[int(np.argmin(costs))]
-        fit = fit_output_error(fit.model, records, [start], nuisance=fit.nuisance, phi=fit.phi)
-    return fit
-
-
-def _bound_speeds(effect: Effect, fit: Fit, records: Sequence[Record], policy: Policy) -> Effect:
-    """Bound parameters that are speeds to slow motion: a curve over all speeds can take the shape of other effects."""
-    predicted = [(r.time, r.angle - left) for r, left in zip(records, fit.residuals, strict=True)]
-    fastest = max(float(np.max(np.abs(np.gradient(angle, time)))) for time, angle in predicted)
-    slow = policy.candidates.slow_speed_share * fastest
-    bounded = [replace(p, upper=min(p.upper, slow)) if p.is_speed else p for p in effect.parameters]
-    return replace(effect, parameters=tuple(bounded))
-
-
-def find_rivals(
-    best: Fit,
-    base: Fit,
-    records: Sequence[Record],
-    effect: Effect,
-    others: Sequence[Forecast],
-    camera: float = 0.0,
-    policy: Policy = DEFAULT,
-) -> dict[str, Fit]:
-    """Find every effect B that could have produced the data although ``effect``, A, explains them better.
-
-    If B is true, log L(A) − log L(B) is normal with mean −d²/2 and variance d², where d is the distance, in standard
-    deviations of the noise, from B's prediction to the nearest prediction of A (Cox, J. R. Statist. Soc. B 24, 1962).
-    Whatever d is, the difference exceeds z²/2 no more often than a standard normal variable exceeds z. A is the best of
-    several effects, and each of them can exceed it, so the rate is divided among them (Bonferroni). Each parameter that
-    A has more than B follows noise, and counts one nat (Akaike). Where B's best fit does not describe B, the nearest
-    one that does is judged. In a film, errors of the measurement may follow the motion, too, so a difference below the
-    angle's uncertainty does not count.
-
-    Parameters
-    ----------
-    best : Fit
-        With ``effect``.
-    base : Fit
-        The same plant without it.
-    records : sequence of Record
-        The fitted recordings.
-    effect : Effect
-        A.
-    others : sequence of Forecast
-        Each a B.
-    camera : float
-        Stated standard uncertainty of a film's angle, rad; 0 for angle series from elsewhere.
-    policy : Policy
-        Thresholds.
-
-    Returns
-    -------
-    dict
-        Id of each B that cannot be excluded → the same plant with B in place of ``effect``.
-    """
-
-    def fit_rival(other: Forecast) -> Fit | None:
-        return _nearest_possible(fit_with(base, records, other, camera=camera, policy=policy), records)
-
-    others = [other for other in others if other.effect.id != effect.id]
-    fits = [(other, fit) for other, fit in zip(others, map_in_threads(fit_rival, others), strict=True) if fit]
-    widest = 0.5 * special.ndtri(policy.candidates.true_rival_rejection_rate / max(1, len(others))) ** 2
-
-    def gap(fit: Fit) -> float:
-        more = max(0, len(best.parameters) - len(fit.parameters))
-        return log_likelihood_gain(fit.cost, best.cost, len(best.white)) - more
-
-    return {other.effect.id: fit for other, fit in fits if gap(fit) <= widest or rms_difference(fit, best) <= camera}
-
-
-def _nearest_possible(fit: Fit, records: Sequence[Record]) -> Fit | None:
-    """Return a fit, or else one with a larger size of its last effect that describes that effect; see `is_possible`.
-
-    A stop that is hardly touched is fitted as well by a spring that is softer than any stop.
-    """
-    name = effects_of(fit)[-1].parameters[0].name
-    size = float(fit.parameters[fit.model.names.index(name)])
-    tried = chain([fit], (fit_at(fit, name, times * size, records) for times in LARGER))
-    return next((one for one in tried if is_possible(one, records)), None)
-
-
-def is_possible(fit: Fit, records: Sequence[Record]) -> bool:
-    """Return whether the parameters of a plant's last effect describe that effect at all; see `Effect.possible`."""
-    plant, effect = plant_of(fit), effects_of(fit)[-1]
-    first = len(fit.parameters) - len(effect.parameters)
-    abc = np.zeros(3)
-    abc[: plant.base_count] = fit.parameters[: plant.base_count]
-    predicted = np.concatenate([r.angle - left for r, left in zip(records, fit.residuals, strict=True)])
-    span = max(float(r.time[-1] - r.time[0]) for r in records)
-    motion = Motion(float(predicted.min()), float(predicted.max()), usual_range(predicted), span)
-    return effect.possible(tuple(effect.complete(fit.parameters[first:]).tolist()), tuple(abc.tolist()), motion)
-
-
-def rms_difference(one: Fit, other: Fit) -> float:
-    """Return the RMS difference, rad, between the predictions of two fits to the same recordings."""
-    return float(np.sqrt(np.mean((np.concatenate(one.residuals) - np.concatenate(other.residuals)) ** 2)))
-
-
-def log_likelihood_gain(before: float, after: float, n: int) -> float:
-    """Return the log-likelihood gain of n whitened residuals whose sum of squares, rad², falls from before to after."""
-    if not math.isfinite(after):
-        return -math.inf
-    offset = n * 1e-9**2  # rad²; avoids a division by zero for data without noise
-    return 0.5 * n * math.log((before + offset) / (after + offset))

@@ -22,12 +22,15 @@ from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.multiple_shooting import drifts, loses_step, windows
 from anglecam.identification.noise import LARGEST_PHI, RESIDUAL, autoregression, noise_floor
 from anglecam.identification.output_error import fit_output_error, predict_output_error
-from anglecam.loop.candidates import Candidate, find_rivals, fit_to_more, log_likelihood_gain, promising
+from anglecam.loop.candidates import Candidate, promising
 from anglecam.loop.cross_validation import compare, predict_held_out, robust_sigma, split_records
+from anglecam.loop.fit_effect import fit_to_more
 from anglecam.loop.free_form.result import find_free_form
+from anglecam.loop.likelihood import log_likelihood_gain
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.profile import interval_of
 from anglecam.loop.refit import effects_left, effects_of, plant_of, refit_with_last, refit_with_phi, refit_without
+from anglecam.loop.rivals import find_rivals
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.loop.standing import error_beyond_noise, model_that_stands
 from anglecam.loop.stepwise import (

@@ -18,7 +18,7 @@ from anglecam.data.record import Record
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.output_error import fit_output_error
-from anglecam.loop.candidates import log_likelihood_gain
+from anglecam.loop.likelihood import log_likelihood_gain
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_of, plant_of
 

@@ -20,16 +20,10 @@ from anglecam.data.record import Record
 from anglecam.effects import LEDGER, Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.noise import QUANTISED, RESIDUAL, Noise, autoregression
-from anglecam.loop.candidates import (
-    Candidate,
-    fit_candidates,
-    fit_from_candidates,
-    fit_with,
-    log_likelihood_gain,
-    promising,
-    rms_difference,
-)
+from anglecam.loop.candidates import Candidate, fit_candidates, fit_from_candidates, promising
 from anglecam.loop.cross_validation import Prediction, chosen_without, predict_held_out, predicts_better
+from anglecam.loop.fit_effect import fit_with
+from anglecam.loop.likelihood import log_likelihood_gain, rms_difference
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_left, effects_of, refit_with_phi, refit_without
 from anglecam.loop.residual_test import ResidualTest, run_residual_test

@@ -8,16 +8,12 @@ import pytest
 from anglecam.effects import effect
 from anglecam.identification.noise import DISTANCE, Noise
 from anglecam.identification.output_error import fit_output_error
-from anglecam.loop.candidates import (
-    Candidate,
-    find_rivals,
-    fit_from_candidates,
-    fit_with,
-    log_likelihood_gain,
-    rms_difference,
-)
+from anglecam.loop.candidates import Candidate, fit_from_candidates
 from anglecam.loop.cross_validation import split_records
+from anglecam.loop.fit_effect import fit_with
+from anglecam.loop.likelihood import log_likelihood_gain, rms_difference
 from anglecam.loop.policy import DEFAULT
+from anglecam.loop.rivals import find_rivals
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.loop.stepwise import Task, assess, rank_candidates
 from anglecam.models.plant import Plant

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from anglecam.loop.close import close_records
-from anglecam.loop.policy import DEFAULT, Policy, ResidualTestPolicy, StepwisePolicy, VerdictPolicy
+from anglecam.loop.policy import DEFAULT, Policy
+from anglecam.loop.search_policy import StepwisePolicy
 from anglecam.loop.verdict_json import verdict_as_dict
+from anglecam.loop.verdict_policy import ResidualTestPolicy, VerdictPolicy
 from support.closing import close_without_rivals
 from support.motion import Plant
 from support.series import session

@@ -9,8 +9,8 @@ import pytest
 
 from anglecam.effects import LEDGER, effect
 from anglecam.identification.output_error import fit_output_error
-from anglecam.loop.candidates import is_possible
 from anglecam.loop.close import close_records
+from anglecam.loop.rivals import is_possible
 from anglecam.loop.stepwise import applicable
 from anglecam.models.plant import Plant
 from benchmarks.blind.sessions import session as drawn_session

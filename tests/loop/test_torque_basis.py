@@ -7,8 +7,8 @@ import pytest
 
 from anglecam.effects import effect
 from anglecam.identification.output_error import fit_output_error
-from anglecam.loop.candidates import fit_with
 from anglecam.loop.cross_validation import split_records
+from anglecam.loop.fit_effect import fit_with
 from anglecam.loop.residual_test import run_residual_test
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.loop.torque_basis import torque_responses

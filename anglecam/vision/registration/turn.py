@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.transforms import rotation
 from anglecam.vision.registration.appearance import HIDDEN_MISFIT, TileAppearance, TileFit
+from anglecam.vision.registration.tile_weights import copied_share, weigh_tiles
 from anglecam.vision.registration.tiles import TILE_SIDE_PX, FrameView, MotionPlane, tile_middles, tile_reach
-from anglecam.vision.registration.turn_kernel import copied_share, frame_equations, weigh_tiles
+from anglecam.vision.registration.turn_kernel import frame_equations
 
 _MAX_STEPS = 3
 """Gauss-Newton steps."""

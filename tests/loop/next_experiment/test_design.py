@@ -16,7 +16,7 @@ from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.noise import Noise
 from anglecam.identification.output_error import fit_output_error
 from anglecam.io.command_csv import read_command
-from anglecam.loop.candidates import fit_with
+from anglecam.loop.fit_effect import fit_with
 from anglecam.loop.next_experiment.commands import candidate_commands, limits_of
 from anglecam.loop.next_experiment.design import separating_experiment, write_command
 from anglecam.loop.policy import DEFAULT

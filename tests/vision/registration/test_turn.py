@@ -9,9 +9,9 @@ import yaml
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.video.open_film import open_film
+from anglecam.vision.registration.tile_weights import copied_share
 from anglecam.vision.registration.tiles import FrameView
 from anglecam.vision.registration.turn import find_turn
-from anglecam.vision.registration.turn_kernel import copied_share
 from synth.session import render
 
 SPEC = {
