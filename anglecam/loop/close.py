@@ -20,19 +20,18 @@ from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.identification.initial_guess import start_parameters
 from anglecam.identification.multiple_shooting import drifts, loses_step, windows
-from anglecam.identification.noise import LARGEST_PHI, RESIDUAL, autoregression, noise_floor
-from anglecam.identification.output_error import fit_output_error, predict_output_error
+from anglecam.identification.noise import RESIDUAL, autoregression, noise_floor
+from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.candidates import Candidate, promising
-from anglecam.loop.cross_validation import compare, predict_held_out, robust_sigma, split_records
-from anglecam.loop.fit_effect import fit_to_more
+from anglecam.loop.cross_validation import compare, predict_held_out, split_records
 from anglecam.loop.free_form.result import find_free_form
-from anglecam.loop.likelihood import log_likelihood_gain
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.profile import interval_of
 from anglecam.loop.refit import effects_left, effects_of, plant_of, refit_with_last, refit_with_phi, refit_without
+from anglecam.loop.remaining_structure import is_wrong, structure_remains
 from anglecam.loop.rivals import find_rivals
 from anglecam.loop.screen import changes, directions, forecasts
-from anglecam.loop.standing import error_beyond_noise, model_that_stands
+from anglecam.loop.standing import model_that_stands
 from anglecam.loop.stepwise import (
     Assessment,
     Task,
@@ -231,7 +230,7 @@ def _conclude(
         before = fit_output_error(first.fit.model, task.fitted, [first.fit.parameters], phi=last.fit.phi)
     before_held_out, _ = predict_held_out(before, task.fitted, task.predicted, task.policy)
     noise = task.noise_within(last.fit) or replace(autoregression(last.fit.residuals, RESIDUAL), sigma=last.fit.rmse)
-    remains = _structure_remains(task, first, last, judged)
+    remains = structure_remains(task, first, last, judged)
     final = _model_that_stands(task, first, last) if remains else last
     named = effects_of(final.fit)
     # without an effect the final model is the base model
@@ -267,72 +266,12 @@ def _with_intervals(verdict: Verdict) -> Verdict:
     return replace(verdict, accepted=tuple(replace(one, interval_95=ends) for one, ends in pairs))
 
 
-def _structure_remains(task: Task, first: Assessment, last: Assessment, before: Fit) -> bool:
-    """Return whether the final model leaves structure that no candidate explains."""
-    policy = task.policy
-    named, least = bool(effects_of(last.fit)), smallest_structure(task, first)
-    if _is_wrong(task, last, least):
-        return True
-    if last.residual_test.passed or last.fit.rmse**2 <= task.camera**2 + least**2:
-        return False
-    driven = any(r.command is not None for r in task.fitted)
-    noise = task.noise_within(last.fit)
-    # the share of a free swing is for disturbances outside the mechanism, which a residual that only drifts is not
-    drifting = last.fit.phi >= LARGEST_PHI
-    share = policy.verdict.unexplained_share if driven or drifting else policy.verdict.undriven_unexplained_share
-    # two measures of what remains: the error beyond the noise floor, and the finer one, what further causes would
-    # explain of the log-likelihood; if the noise is unknown, the whole error counts
-    return (
-        not named
-        or error_beyond_noise(last.cross_validated, noise) > share * error_beyond_noise(first.cross_validated, noise)
-        or _further_gain_share(last, before) > share**2
-    )
-
-
 def _model_that_stands(task: Task, first: Assessment, last: Assessment) -> Assessment:
     """Return the model with the effects that stand although structure remains; the base model if it is wrong."""
     final = model_that_stands(task, first, last)
     # the base model may have been fitted in windows, which are not the recordings of this task
     none_stands = not effects_of(final.fit)
-    return first if none_stands or _is_wrong(task, final, smallest_structure(task, first)) else final
-
-
-def _is_wrong(task: Task, last: Assessment, least: float) -> bool:
-    """Return whether a model contradicts the recordings that it was not fitted to, or physics."""
-    return _contradicted(task, last, least) or _gains_energy(last.fit, task.policy)
-
-
-def _contradicted(task: Task, last: Assessment, least: float) -> bool:
-    """Return whether the held-out recordings differ from every prediction with parameters that fit the others as well.
-
-    The robust error is used, because a few frames are no contradiction: the instant at which dry friction lets a body
-    break away is all or nothing, and may be predicted wrongly once.
-    """
-    most = task.policy.verdict.contradiction_ratio * max(last.fit.rmse, least)
-    if last.held_out.robust_sigma <= most or not task.predicted:
-        return last.held_out.robust_sigma > most
-    predicted = predict_output_error(last.fit, task.predicted)
-    nuisance, both = [*last.fit.nuisance, *predicted.nuisance], [*task.fitted, *task.predicted]
-    fit = fit_to_more(last.fit, both, nuisance, task.ledger, task.policy)
-    return robust_sigma(fit.residuals[len(task.fitted) :]) > most
-
-
-def _gains_energy(fit: Fit, policy: Policy) -> bool:
-    """Return whether a body without a command would gain energy: something that the model lacks drives it."""
-    damping, sigma = float(fit.parameters[0]), float(np.nan_to_num(fit.sigma[0]))
-    return not plant_of(fit).driven and damping < -policy.verdict.energy_gain_sigmas * sigma
-
-
-def _further_gain_share(now: Assessment, before: Fit) -> float:
-    """Return the gain that one more effect, or an arbitrary torque curve, would bring as a share of the total gain.
-
-    The total is that further gain and the gain since ``before``. An error of the measurement that follows the angle,
-    such as that of a codec that lags where the body moves, is no further cause.
-    """
-    more = now.residual_test.further_gain
-    if more <= 0.0:
-        return 0.0
-    return more / (more + max(log_likelihood_gain(before.cost, now.fit.cost, len(before.white)), 0.0))
+    return first if none_stands or is_wrong(task, final, smallest_structure(task, first)) else final
 
 
 def _rivals(fit: Fit, effect: Effect, task: Task) -> dict[str, Fit]:

@@ -40,5 +40,5 @@ def test_a_base_model_that_was_fitted_in_windows_is_not_judged_by_whole_recordin
     monkeypatch.setattr(close, "effects_of", lambda fit: fit)
     monkeypatch.setattr(close, "model_that_stands", lambda task, first, last: first)
     monkeypatch.setattr(close, "smallest_structure", lambda task, first: 0.0)
-    monkeypatch.setattr(close, "_is_wrong", lambda *_: pytest.fail("its windows are no recordings of the task"))
+    monkeypatch.setattr(close, "is_wrong", lambda *_: pytest.fail("its windows are no recordings of the task"))
     assert close._model_that_stands(None, first, last) is first

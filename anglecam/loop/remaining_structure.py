@@ -1,0 +1,106 @@
+"""Whether the final model leaves structure that no effect explains, and whether it contradicts the recordings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anglecam.identification.fit import Fit
+from anglecam.identification.noise import LARGEST_PHI
+from anglecam.identification.output_error import predict_output_error
+from anglecam.loop.cross_validation import robust_sigma
+from anglecam.loop.fit_effect import fit_to_more
+from anglecam.loop.likelihood import log_likelihood_gain
+from anglecam.loop.policy import Policy
+from anglecam.loop.refit import effects_of, plant_of
+from anglecam.loop.standing import error_beyond_noise
+from anglecam.loop.stepwise import Assessment, Task, smallest_structure
+
+
+def structure_remains(task: Task, first: Assessment, last: Assessment, before: Fit) -> bool:
+    """Return whether the final model leaves structure that no candidate explains.
+
+    Parameters
+    ----------
+    task : Task
+        What the search worked on.
+    first, last : Assessment
+        Of the base model and of the final one.
+    before : Fit
+        The base model with the AR(1) coefficient of the final one.
+
+    Returns
+    -------
+    bool
+        Whether the verdict is ``unexplained``, or ``partly_explained`` if an effect stands.
+    """
+    policy = task.policy
+    named, least = bool(effects_of(last.fit)), smallest_structure(task, first)
+    if is_wrong(task, last, least):
+        return True
+    if last.residual_test.passed or last.fit.rmse**2 <= task.camera**2 + least**2:
+        return False
+    driven = any(r.command is not None for r in task.fitted)
+    noise = task.noise_within(last.fit)
+    # the share of a free swing is for disturbances outside the mechanism, which a residual that only drifts is not
+    drifting = last.fit.phi >= LARGEST_PHI
+    share = policy.verdict.unexplained_share if driven or drifting else policy.verdict.undriven_unexplained_share
+    # two measures of what remains: the error beyond the noise floor, and the finer one, what further causes would
+    # explain of the log-likelihood; if the noise is unknown, the whole error counts
+    return (
+        not named
+        or error_beyond_noise(last.cross_validated, noise) > share * error_beyond_noise(first.cross_validated, noise)
+        or _further_gain_share(last, before) > share**2
+    )
+
+
+def is_wrong(task: Task, last: Assessment, least: float) -> bool:
+    """Return whether a model contradicts the recordings that it was not fitted to, or physics.
+
+    Parameters
+    ----------
+    task : Task
+        What the search worked on.
+    last : Assessment
+        Of the model.
+    least : float
+        RMS, rad, below which structure is not searched.
+
+    Returns
+    -------
+    bool
+        Whether what it predicts is too far off, or its body gains energy that nothing gives it.
+    """
+    return _contradicted(task, last, least) or _gains_energy(last.fit, task.policy)
+
+
+def _contradicted(task: Task, last: Assessment, least: float) -> bool:
+    """Return whether the held-out recordings differ from every prediction with parameters that fit the others as well.
+
+    The robust error is used, because a few frames are no contradiction: the instant at which dry friction lets a body
+    break away is all or nothing, and may be predicted wrongly once.
+    """
+    most = task.policy.verdict.contradiction_ratio * max(last.fit.rmse, least)
+    if last.held_out.robust_sigma <= most or not task.predicted:
+        return last.held_out.robust_sigma > most
+    predicted = predict_output_error(last.fit, task.predicted)
+    nuisance, both = [*last.fit.nuisance, *predicted.nuisance], [*task.fitted, *task.predicted]
+    fit = fit_to_more(last.fit, both, nuisance, task.ledger, task.policy)
+    return robust_sigma(fit.residuals[len(task.fitted) :]) > most
+
+
+def _gains_energy(fit: Fit, policy: Policy) -> bool:
+    """Return whether a body without a command would gain energy: something that the model lacks drives it."""
+    damping, sigma = float(fit.parameters[0]), float(np.nan_to_num(fit.sigma[0]))
+    return not plant_of(fit).driven and damping < -policy.verdict.energy_gain_sigmas * sigma
+
+
+def _further_gain_share(now: Assessment, before: Fit) -> float:
+    """Return the gain that one more effect, or an arbitrary torque curve, would bring as a share of the total gain.
+
+    The total is that further gain and the gain since ``before``. An error of the measurement that follows the angle,
+    such as that of a codec that lags where the body moves, is no further cause.
+    """
+    more = now.residual_test.further_gain
+    if more <= 0.0:
+        return 0.0
+    return more / (more + max(log_likelihood_gain(before.cost, now.fit.cost, len(before.white)), 0.0))
