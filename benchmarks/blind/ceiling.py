@@ -23,8 +23,9 @@ from rich.table import Table
 from scipy.stats import norm
 
 from anglecam.identification.output_error import fit_output_error
-from anglecam.loop.candidates import fit_with, promising
+from anglecam.loop.candidates import promising
 from anglecam.loop.cross_validation import split_records
+from anglecam.loop.fit_effect import fit_with
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.loop.stepwise import applicable
 from anglecam.models.plant import Plant
