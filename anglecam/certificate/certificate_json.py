@@ -64,7 +64,7 @@ def what_to_play(one: Certified) -> str | None:
 
 def _quantity_as_dict(one: Certified, certificate: Certificate) -> dict[str, Any]:
     quantity, play = one.quantity, what_to_play(one)
-    certified = certificate.is_certified
+    certified = certificate.certifies(one)
     value = quantity.in_file(one.profile.estimate) if certified and one.profile is not None else math.nan
     low, high = quantity.interval_in_file(*one.interval) if certified else (-math.inf, math.inf)
     content: dict[str, Any] = {

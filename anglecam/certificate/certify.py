@@ -97,6 +97,14 @@ class Certificate:
         """Whether the model explains enough of the motion for its intervals to be stated, if with a doubt."""
         return self.holds or self.verdict.verdict == "partly_explained"
 
+    def certifies(self, one: Certified) -> bool:
+        """Return whether a quantity's value is stated.
+
+        Where structure remains, an effect that the verdict does not name may be seen only because it takes up a part of
+        that structure.
+        """
+        return self.holds or (self.is_certified and (one.accepted or one.state != "measured"))
+
 
 def certify(
     verdict: Verdict, clock: Clock = NO_LAMP, progress: Callable[[str], None] = lambda stage: None

@@ -22,6 +22,10 @@ NOT_NAMED = (
     "The verdict does not name its effect, which may be absent: up to 5 % of the intervals exclude an absent effect by "
     "chance."
 )
+PART_OF_THE_REST = (
+    "The verdict does not name its effect. Its interval excludes absence, but it may only take up a part of the "
+    "structure that the model leaves."
+)
 ONE_AT_A_TIME = "Dead time and a lag of the same length act almost alike: this is the interval with no {other}."
 
 
@@ -35,7 +39,7 @@ def statement(one: Certified, clock_shared: bool = False, certified: bool = True
     clock_shared : bool
         Whether command and angle have one clock, so that dead time is not the sum with a clock offset.
     certified : bool
-        Whether the verdict explains the motion. If not, no interval is stated.
+        Whether the quantity's value is stated (`Certificate.certifies`).
 
     Returns
     -------
@@ -72,6 +76,8 @@ def aliases(one: Certified, certificate: Certificate) -> list[str]:
     """Return what could be mistaken for a quantity in these recordings, a sentence each."""
     if not certificate.is_certified:
         return []
+    if not certificate.certifies(one):
+        return [PART_OF_THE_REST]
     notes = [NOT_NAMED] if one.state == "measured" and not one.accepted else []
     shared = certificate.clock.shared
     named = {e.id for e in effects_of(certificate.verdict.after)}

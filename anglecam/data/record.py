@@ -27,6 +27,11 @@ MIN_FRAMES = 20
 """Fewest measured frames; fewer do not determine three parameters and three nuisance parameters."""
 
 
+PLACED_PX = 1e-4
+"""Scatter of a mark's distance from the pivot, px, up to which it was placed there by a rotation that another body
+showed: the rounding of files. No camera shows a mark so well."""
+
+
 @dataclass(frozen=True)
 class Record:
     """The measured frames of one recording; arrays of length n."""
@@ -44,7 +49,7 @@ class Record:
     """Stated standard uncertainty, rad; NaN where none is stated."""
     lever_scatter: Floats | None = None
     """Scatter of the mark's distance from the pivot, divided by that distance, rad: the camera's noise in the direction
-    in which nothing can move; ``None`` for a series without marks."""
+    in which nothing can move; ``None`` for a series without marks, or whose marks were placed at one distance."""
     view: View = UNKNOWN_VIEW
     """How the camera views the mechanism."""
     clock_sigma: float = 0.0
@@ -113,10 +118,6 @@ def record_from_series(
             f"{series.name}: its command first changes at {change:.4g} s, after the last measured frame at {last:.4g} s"
             "; are its times seconds on the clip's clock?"
         )
-    lever_scatter = None
-    if series.mark_px is not None and series.pivot_px is not None:
-        lever = np.hypot(*(series.mark_px - series.pivot_px)[ok].T)
-        lever_scatter = lever / np.mean(lever) - 1.0 if np.all(np.isfinite(lever)) else None
     acts = command is not None and (change is not None or (zero_known and command.angle[0] != 0.0))
     record = Record(
         series.name,
@@ -125,11 +126,20 @@ def record_from_series(
         command if acts else None,
         zero_known,
         series.sigma[ok],
-        lever_scatter,
+        _lever_scatter(series, ok),
         _view(series, ok),
         mass_from_upright=mass_from_upright,
     )
     return record if acts else _from_release(record)
+
+
+def _lever_scatter(series: AngleSeries, ok: NDArray[np.bool_]) -> Floats | None:
+    if series.mark_px is None or series.pivot_px is None:
+        return None
+    lever = np.hypot(*(series.mark_px - series.pivot_px)[ok].T)
+    if not np.all(np.isfinite(lever)) or np.std(lever) <= PLACED_PX:
+        return None
+    return np.asarray(lever / np.mean(lever) - 1.0)
 
 
 def _view(series: AngleSeries, ok: NDArray[np.bool_]) -> View:

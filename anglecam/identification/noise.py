@@ -23,7 +23,8 @@ from anglecam.identification.quantisation import quantisation
 DISTANCE = "distance from the pivot"
 """Source of noise estimated from the mark's distance from the pivot."""
 MEASURED = "stated by the measurement"
-"""Source of noise whose size the measurement states and whose correlation the distance from the pivot shows."""
+"""Source of noise whose size the measurement of a film states; its correlation is that of the distance from the pivot,
+where a mark shows one."""
 QUANTISED = "step of the angles"
 """Source of noise that is the rounding of the angles to a grid."""
 REST, REPEATED = "rest", "repeated recordings"
@@ -95,7 +96,8 @@ def noise_floor(records: Sequence[Record]) -> Noise | None:
     -------
     Noise or None
         Of a film, the smaller of the stated uncertainty and the noise from the mark's distance: angles that
-        registration of the whole body gives are better than that distance shows. Otherwise the stated uncertainty, the
+        registration of the whole body gives are better than that distance shows. A body that was followed without a
+        mark shows no such distance. Otherwise the stated uncertainty, the
         rounding error of a quantised angle (or the scatter of the rest, if that is larger), the rest, or the scatter
         between repeated recordings, whichever is first available. ``None`` if nothing determines the noise.
     """
@@ -105,6 +107,8 @@ def noise_floor(records: Sequence[Record]) -> Noise | None:
         estimated = autoregression(scatters, DISTANCE)
         smaller = stated is not None and stated.sigma < estimated.sigma
         return replace(estimated, sigma=stated.sigma, source=MEASURED) if stated and smaller else estimated
+    if stated is not None and any(record.view.lever_px is not None for record in records):
+        return replace(stated, source=MEASURED)
     grid = quantisation(records)
     scatter = _scatter(records)
     if stated is not None:

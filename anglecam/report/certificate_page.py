@@ -53,8 +53,8 @@ def write_certificate_page(
     environment = Environment(loader=PackageLoader("anglecam.report", "."), autoescape=True, undefined=StrictUndefined)
     content = certificate_as_dict(certificate)
     rows = [_row(one, shown) for one, shown in zip(certificate.quantities, content["quantities"], strict=True)]
-    drawn = [one for one in certificate.quantities if one.profile is not None and len(one.profile.values) > 2]
-    drawn = drawn if certificate.is_certified else []
+    certified = [one for one in certificate.quantities if certificate.certifies(one)]
+    drawn = [one for one in certified if one.profile is not None and len(one.profile.values) > 2]
     text = environment.get_template("certificate.html").render(
         title=title,
         version=__version__,

@@ -13,7 +13,7 @@ import pytest
 from anglecam.certificate.certificate_json import certificate_as_dict
 from anglecam.certificate.certify import Clock, certify
 from anglecam.certificate.quantity import QUANTITIES
-from anglecam.certificate.statement import NOT_NAMED, aliases, statement
+from anglecam.certificate.statement import NOT_NAMED, PART_OF_THE_REST, aliases, statement
 from anglecam.io.files import json_text
 from anglecam.loop.close import close_records
 from support.motion import Plant, Recording
@@ -107,6 +107,24 @@ def test_with_a_lamp_the_dead_time_is_the_servos_and_includes_the_lamps_uncertai
     assert high - low == pytest.approx(2.0 * 1.96 * 0.004, rel=0.1)
     assert low < 0.03 < high
     assert statement(entry(seen, "dead_time"), clock_shared=True).startswith("dead time 0.03")
+
+
+def test_an_effect_that_a_partial_verdict_does_not_name_is_not_certified():
+    whole = certified(LATE, only=DELAYS)
+    unnamed = tuple(replace(one, accepted=False) for one in whole.quantities)
+    verdict = replace(whole.verdict, verdict="partly_explained")
+    partly = replace(whole, verdict=verdict)
+    states = {one["id"]: one["state"] for one in certificate_as_dict(partly)["quantities"]}
+    assert (states["dead_time"], states["lag"]) == ("measured", "bounded")
+    late = next(
+        one
+        for one in certificate_as_dict(replace(partly, quantities=unnamed))["quantities"]
+        if one["id"] == "dead_time"
+    )
+    assert late["state"] == "not_certified"
+    assert late["statement"].endswith(": not certified")
+    assert late["aliases"] == [PART_OF_THE_REST]
+    assert not math.isfinite(late["dead_time_s"]["interval_95"][1])
 
 
 def test_an_unexplained_verdict_says_that_its_intervals_do_not_hold():

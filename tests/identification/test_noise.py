@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from anglecam.identification.noise import QUANTISED, REST, autoregression, noise_floor
+from anglecam.data.record import record_from_series
+from anglecam.data.series import AngleSeries
+from anglecam.identification.noise import MEASURED, QUANTISED, REST, autoregression, noise_floor
 from anglecam.identification.quantisation import quantisation
 from support.motion import Plant
 from support.series import session
@@ -89,3 +91,25 @@ def test_the_estimated_noise_states_a_lower_limit_that_holds_in_95_percent(phi):
 def test_a_stated_uncertainty_is_its_own_lower_limit():
     floor = noise_floor([replace(r, sigma=np.full(len(r.time), 2e-4)) for r in session(Plant(), 6)])
     assert floor.least_sigma == pytest.approx(2e-4)
+
+
+@pytest.mark.parametrize("decimals", [15, 4])  # in memory, and as files state places
+def test_a_mark_that_a_bodys_rotation_placed_shows_no_noise_and_the_stated_one_counts(decimals):
+    rng = np.random.default_rng(2)
+    time = np.arange(0.0, 6.0, 1.0 / 30.0)
+    true, sigma = 0.2 * np.sin(3.0 * time), np.radians(0.05)
+    angle = true + rng.normal(0.0, sigma, len(time))
+    pivot = np.tile([320.0, 60.0], (len(time), 1))
+    placed = pivot + 210.0 * np.column_stack([np.sin(angle), np.cos(angle)])
+    seen = placed + rng.normal(0.0, 210.0 * sigma, placed.shape)
+    series = AngleSeries(
+        "body", time, angle, np.full(len(time), sigma), ("ok",) * len(time), line=angle, pivot_px=pivot
+    )
+    carried, marked = (
+        record_from_series(replace(series, mark_px=np.round(mark, decimals)), None, zero_known=False)
+        for mark in (placed, seen)
+    )
+    noise = noise_floor([carried])
+    assert (noise.source, noise.sigma, noise.filmed) == (MEASURED, pytest.approx(sigma), True)
+    assert noise_floor([marked]).sigma == pytest.approx(sigma, rel=0.15)
+    assert np.isfinite(noise_floor([marked]).phi_error)  # the distance from the pivot shows the correlation as well
