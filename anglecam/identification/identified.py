@@ -14,14 +14,16 @@ from anglecam.data.typing import Floats
 from anglecam.identification.clocks import Clocks
 from anglecam.identification.fit import Fit
 from anglecam.identification.multiple_shooting import loses_step, rms_motion
+from anglecam.identification.noise import noise_floor
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
 DOUBTFUL_RESIDUAL = 3.0
-"""Multiple of the angle's stated uncertainty; a model with a larger RMS residual lacks something, so that the stated
-uncertainties of its parameters do not hold."""
+"""Multiple of the angle's uncertainty; a model with a larger RMS residual lacks something, so that the stated
+uncertainties of its parameters do not hold. It is also that of the RMS residual beyond which held-out recordings
+contradict a model."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,8 @@ class Identified:
         elif at_bound:
             doubts.append(f"{', '.join(at_bound)}: at a bound of the possible values, so without an uncertainty")
         stated = np.concatenate([r.sigma for r in self.fitted])
-        noise = float(np.sqrt(np.mean(stated**2))) if np.all(np.isfinite(stated)) else np.nan
+        floor = None if np.all(np.isfinite(stated)) else noise_floor(self.fitted)
+        noise = float(np.sqrt(np.mean(stated**2))) if floor is None else floor.sigma
         if noise > 0.0 and self.fit.rmse > DOUBTFUL_RESIDUAL * noise:
             doubts.append(
                 f"the model leaves a residual of {np.degrees(self.fit.rmse):.2g}°, {self.fit.rmse / noise:.0f} times"
@@ -72,6 +75,11 @@ class Identified:
                 f"the model leaves a residual of {np.degrees(self.fit.rmse):.2g}° of a motion of"
                 f" {np.degrees(rms_motion(self.fitted)):.2g}° RMS: unless the angle is so noisy, it lacks something,"
                 f" and its ± do not hold; anglecam close searches for it"
+            )
+        if self.held_out is not None and self.held_out.rmse > DOUBTFUL_RESIDUAL * self.fit.rmse:
+            doubts.append(
+                f"held-out recordings are predicted with an error of {np.degrees(self.held_out.rmse):.2g}°,"
+                f" {self.held_out.rmse / self.fit.rmse:.0f} times that of the fit: the model does not hold for them"
             )
         if self.clock is not None and self.clock.notes:
             doubts.append(f"clock: {'; '.join(self.clock.notes)}; a, b, c take these time stamps as they are")

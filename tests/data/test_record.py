@@ -47,3 +47,11 @@ def test_a_model_that_does_not_follow_the_motion_is_doubted_though_no_noise_is_s
     faster = replace(series, angle=np.sin(2.0 * np.pi * (0.5 * series.time + 0.3 * series.time**2)))
     model = identify_records([record_from_series(faster, None, zero_known=False)], Rig(), "oe2")
     assert "lacks something" in model.doubts[0]
+
+
+def test_a_model_that_held_out_recordings_contradict_is_doubted():
+    fitted, other = (record_from_series(_knee(0.3, seed), None, zero_known=False) for seed in (4, 5))
+    later = replace(other, angle=other.angle * np.linspace(1.0, 4.0, len(other.angle)))
+    model = identify_records([fitted], Rig(), "oe2", held_out=[later])
+    assert not identify_records([fitted], Rig(), "oe2", held_out=[other]).doubts
+    assert any("held-out recordings" in doubt for doubt in model.doubts)

@@ -95,7 +95,7 @@ def test_without_held_out_recordings_the_page_names_block_cross_validation(write
     assert figures["Prediction error"] == 2 * len(dragged.fitted)  # before and after, and after on a finer scale
     assert "swing.avi: no mouth" in page
     assert re.search(r"− q·θ̇·\|θ̇\|</i> with q = [\d.]+ ± [\d.]+", page)
-    assert "No further recording is needed to attribute the error." in page
+    assert "No further recording is needed to distinguish this effect from others." in page
     for record in dragged.fitted:
         assert f"<figcaption>{record.name}</figcaption>" in page
 
