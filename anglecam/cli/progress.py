@@ -51,7 +51,7 @@ def stages() -> Iterator[Callable[[str], None]]:
             now = time.monotonic()
             if not errors.is_terminal and now - printed >= QUIET_S:
                 printed = now
-                errors.print(f"{stage} ({now - began:.0f} s)")
+                errors.print(f"after {now - began:.0f} s: {stage}")
 
         yield begin
         bars.update(bar, description="done", completed=1, total=1)

@@ -115,11 +115,13 @@ def write_closed(
     missing: list[str] = []
     progress("free form")
     verdict = attempt("free form", partial(with_free_form, verdict), missing) or verdict
-    progress("extended Kalman filter")
+    progress("clocks")
     models = []
     effects = _fitted_effects(verdict.after)
     clock = attempt("the clocks", lambda: session_clocks(measured, fitted, effects), missing)
-    for estimator, name, clocks in (("ekf", "ekf", None), ("oe2", "model", clock)):
+    stages = (("extended Kalman filter", "ekf", "ekf", None), ("output error", "oe2", "model", clock))
+    for stage, estimator, name, clocks in stages:
+        progress(stage)
         model = attempt(
             f"{name}.json", partial(_identify, fitted, held_out, session.rig, estimator, out, name, clocks), missing
         )
