@@ -25,7 +25,7 @@ TRUTHS = {
 }
 """Sizes that leave a residual of about twice the noise."""
 RECORDINGS = ("stairs", "release", "random")
-"""As many as show every effect; of `benchmarks.blind.sessions.RECORDINGS`, which `benchmarks.blind.attribution` uses."""
+"""Those of a session that are used here; `benchmarks.blind.attribution` closes the loop on all five."""
 
 
 @pytest.mark.parametrize("name", TRUTHS)
