@@ -119,9 +119,10 @@ def test_no_effect_is_named_if_none_is_hidden(clean):
 
 
 def test_an_effect_outside_the_ledger_is_called_unexplained():
-    records = drawn_session({"wind_gusts": {"rms": 1.0, "number": 3}}, seed=8)
-    three = [r for r in records if r.name in ("stairs", "chirp", "random")]  # the gusts act in each
-    verdict = close_records(three, held_out=HELD_OUT, seed=8)
+    # the gusts act in each recording; the search adds an effect that takes away a part of them and does not stand
+    records = drawn_session({"wind_gusts": {"rms": 1.0, "number": 3}}, seed=10)
+    three = [r for r in records if r.name in ("stairs", "chirp", "random")]
+    verdict = close_records(three, held_out=HELD_OUT, seed=10)
     assert verdict.verdict == "unexplained"
     assert verdict_as_dict(verdict)["effects"] == []
     assert "none" in sentence(verdict)
