@@ -23,7 +23,7 @@ from anglecam.workflow.live import measure_live
 from support.drawn import Look, Recording, draw_session
 
 LOOK = Look()
-SECONDS, BRIEF_S, RATE_HZ = 10.0, 7.0, 30
+SECONDS, RATE_HZ = 10.0, 30
 FIRST = 75
 """Frames that are written at once: enough to learn from."""
 PATIENCE_S = 240.0
@@ -34,14 +34,6 @@ PATIENCE_S = 240.0
 def truth(tmp_path_factory):
     folder = tmp_path_factory.mktemp("session")
     recordings = [Recording("random", "random", duration_s=SECONDS, rest_s=0.3)]
-    return draw_session(folder, look=LOOK, recordings=recordings, seed=2)["random"]
-
-
-@pytest.fixture(scope="module")
-def brief(tmp_path_factory):
-    """Film as much as shows what becomes of frames; parameters and angles are compared on the longer film."""
-    folder = tmp_path_factory.mktemp("brief")
-    recordings = [Recording("random", "random", duration_s=BRIEF_S, rest_s=0.3)]
     return draw_session(folder, look=LOOK, recordings=recordings, seed=2)["random"]
 
 
@@ -144,8 +136,8 @@ def test_the_recording_has_the_files_of_measure(lived, truth):
     assert not session.notes
 
 
-def test_frames_that_cannot_keep_up_are_counted(brief, tmp_path, monkeypatch):
-    writer = _Writer(brief.clip, tmp_path / "head")
+def test_frames_that_cannot_keep_up_are_counted(truth, tmp_path, monkeypatch):
+    writer = _Writer(truth.clip, tmp_path / "head")
     monkeypatch.setattr(workflow, "LATE_S", 0.0)  # every frame is later than that
 
     def show(row, cause) -> None:
@@ -154,24 +146,24 @@ def test_frames_that_cannot_keep_up_are_counted(brief, tmp_path, monkeypatch):
 
     result = measure_live(open_live(str(tmp_path / "head")), tmp_path, _rig(), None, show)
     assert result.count("late") > 50
-    assert result.count("learning") + result.count("late") == len(brief.time_s)
+    assert result.count("learning") + result.count("late") == len(truth.time_s)
     assert len(result.latencies) == 0
     assert result.measurement.series.ok.all()  # the recording is whole
 
 
-def test_where_nothing_is_learnt_the_recording_is_measured(brief, tmp_path):
+def test_where_nothing_is_learnt_the_recording_is_measured(truth, tmp_path):
     causes = []
     rig = Rig(pivot=_rig().pivot, mouth=RigMark(rgb=(20, 250, 20)))
     with pytest.raises(AnglecamError, match=r"random\.avi"):
-        measure_live(open_live(str(brief.clip)), tmp_path, rig, None, lambda row, cause: causes.append(cause))
-    assert (tmp_path / "random.avi").read_bytes() == brief.clip.read_bytes()
+        measure_live(open_live(str(truth.clip)), tmp_path, rig, None, lambda row, cause: causes.append(cause))
+    assert (tmp_path / "random.avi").read_bytes() == truth.clip.read_bytes()
     statuses = (tmp_path / "random.live.csv").read_text()
-    assert statuses.count("learning") == len(brief.time_s)
+    assert statuses.count("learning") == len(truth.time_s)
     assert all("random.avi" in cause for cause in causes if cause is not None)
 
 
-def test_while_nothing_is_learnt_the_cause_is_shown(brief, tmp_path):
-    writer, causes = _Writer(brief.clip, tmp_path / "head"), []
+def test_while_nothing_is_learnt_the_cause_is_shown(truth, tmp_path):
+    writer, causes = _Writer(truth.clip, tmp_path / "head"), []
     rig = Rig(pivot=_rig().pivot, mouth=RigMark(rgb=(20, 250, 20)))
 
     def show(row, cause) -> None:
@@ -185,7 +177,7 @@ def test_while_nothing_is_learnt_the_cause_is_shown(brief, tmp_path):
     assert "head" in causes[-1]
 
 
-def test_a_range_of_frames_is_refused(brief, tmp_path):
+def test_a_range_of_frames_is_refused(truth, tmp_path):
     rig = Rig(frames=RigFrames.model_validate({"from": 3}))
     with pytest.raises(RigError, match="no end yet"):
-        measure_live(open_live(str(brief.clip)), tmp_path, rig, None, lambda *_: None)
+        measure_live(open_live(str(truth.clip)), tmp_path, rig, None, lambda *_: None)
