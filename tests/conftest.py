@@ -11,6 +11,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 # before NumPy is loaded: there are as many test processes as cores, and libraries whose threads wait in a loop for a
 # core that another process has are a thousand times slower
 os.environ |= {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+os.environ["OPENCV_FOR_THREADS_NUM"] = "1"
 
 
 @pytest.fixture(scope="session", autouse=True)

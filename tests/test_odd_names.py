@@ -16,7 +16,7 @@ from anglecam.io.files import write_atomically, write_whole
 from anglecam.io.netcdf_parquet import Also, write_also
 from anglecam.io.series_csv import read_series, write_series
 from anglecam.report.figures import plot_series
-from support.drawn import Look, draw_frames, write_clip
+from support.tiny import tiny_clip
 
 COMMAND = "from anglecam.cli.app import main; main()"
 NAMES = [
@@ -87,9 +87,7 @@ def test_what_anybody_can_read_is_left_as_it_is():
 def test_a_folder_of_odd_names_is_measured_a_line_for_each_that_cannot_be(tmp_path):
     folder, out = tmp_path / "clips", tmp_path / "out"
     folder.mkdir()
-    small = Look(marker="ring")
-    write_clip(folder / "plain.avi", draw_frames(small, 8 * np.sin(np.arange(8) / 2), seed=1))
-    film = (folder / "plain.avi").read_bytes()
+    film = tiny_clip(folder / "plain.avi").read_bytes()
     good = ["[red] :boom: $x_{\n", os.fsdecode(b"latin-\xe9")]
     for name in good:
         (folder / f"{name}.avi").write_bytes(film)

@@ -71,7 +71,8 @@ def test_a_periodic_disturbance_repeats_itself_within_the_longest_recording(peri
 
 def test_a_load_that_shifts_once_is_no_periodic_disturbance():
     shifted = {"shifted_load": {"torque": 0.93, "at_s": 4.1}}
-    verdict = close_records(drawn_session(shifted, seed=412), held_out=["random"])
+    records = [r for r in drawn_session(shifted, seed=412) if r.name in ("stairs", "chirp", "random")]
+    verdict = close_records(records, held_out=["random"])
     assert "periodic_disturbance" not in [a.effect.id for a in verdict.accepted]
     assert verdict.verdict == "unexplained"
 

@@ -24,12 +24,15 @@ TRUTHS = {
     "perspective": {"yaw_deg": 40.0, "axis_deg": 3.0},
 }
 """Sizes that leave a residual of about twice the noise."""
+FEW = ("stairs", "release", "random")
+"""Recordings that name the effect as all five of a session do; perspective is named by its alias without the others."""
 
 
 @pytest.mark.parametrize("name", TRUTHS)
 def test_the_acting_effect_is_named_or_an_alias_and_its_size_agrees(name):
     effects = {name: TRUTHS[name]}
-    verdict = close_records(session(effects, seed=SEED), held_out=HELD_OUT, seed=SEED)
+    records = [r for r in session(effects, seed=SEED) if name == "perspective" or r.name in FEW]
+    verdict = close_records(records, held_out=HELD_OUT, seed=SEED)
     assert verdict.verdict == "attributed"
     (accepted,) = verdict.accepted
     assert name in accepted.alias_set

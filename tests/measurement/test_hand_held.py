@@ -28,6 +28,9 @@ def _in_hand(i):
     return tilt @ move
 
 
+MOVES = [_in_hand(i) for i in range(len(SWING))]
+
+
 def _film(path, moves, angles_deg):
     """Film a ball on a thick rod; the picture is drawn four times finer than it is shown."""
     rng = np.random.default_rng(3)
@@ -54,9 +57,13 @@ def _film(path, moves, angles_deg):
     return path
 
 
-def test_a_clip_from_the_hand_is_measured_as_seen_from_its_first_place(tmp_path):
-    moves = [_in_hand(i) for i in range(len(SWING))]
-    measured = measure_clip(open_film(_film(tmp_path / "clip.mkv", moves, SWING)), Rig())
+@pytest.fixture(scope="module")
+def swinging(tmp_path_factory):
+    return _film(tmp_path_factory.mktemp("hand") / "clip.mkv", MOVES, SWING)
+
+
+def test_a_clip_from_the_hand_is_measured_as_seen_from_its_first_place(swinging):
+    measured = measure_clip(open_film(swinging), Rig())
     assert any("comes nearer" in note for note in measured.notes)
     series = measured.series
     assert series.ok.mean() > 0.95
@@ -64,22 +71,19 @@ def test_a_clip_from_the_hand_is_measured_as_seen_from_its_first_place(tmp_path)
     error = error[series.ok] - np.median(error[series.ok])
     assert np.sqrt((error**2).mean()) < 0.1
     assert np.sqrt(((error / np.degrees(series.sigma[series.ok])) ** 2).mean()) < 1.5
-    expected = cv2.perspectiveTransform(np.array([[PIVOT]]), moves[60])[0, 0]
+    expected = cv2.perspectiveTransform(np.array([[PIVOT]]), MOVES[60])[0, 0]
     assert np.hypot(*(series.pivot_px[60] - expected)) < 1.0
 
 
 def test_a_camera_that_comes_nearer_to_a_still_desk_turns_nothing(tmp_path):
-    moves = [_in_hand(i) for i in range(0, len(SWING), 2)]
     with pytest.raises(InputError):
-        measure_clip(open_film(_film(tmp_path / "clip.mkv", moves, np.zeros(len(moves)))), Rig())
+        measure_clip(open_film(_film(tmp_path / "clip.mkv", MOVES[::2], np.zeros(len(MOVES[::2])))), Rig())
 
 
-def test_a_thing_that_hardly_moves_before_a_camera_in_the_hand_is_no_success(tmp_path):
-    moves = [_in_hand(i) for i in range(len(SWING))]
+def test_a_thing_that_hardly_moves_before_a_camera_in_the_hand_is_no_success(swinging, tmp_path):
+    hardly = _film(tmp_path / "clip.mkv", MOVES, 0.05 * SWING)
     rig = Rig(mark=RigMark(rgb=(200, 30, 40)), pivot=RigPivot(near=(PIVOT[0], PIVOT[1])))
-    few, far = (
-        measure_clip(open_film(_film(tmp_path / f"{share}.mkv", moves, share * SWING)), rig) for share in (0.05, 1.0)
-    )
+    few, far = (measure_clip(open_film(path), rig) for path in (hardly, swinging))
     assert few.doubt is not None
     assert "before a camera in the hand" in few.doubt
     assert far.doubt is None
