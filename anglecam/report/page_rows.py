@@ -71,11 +71,16 @@ def series_row(series: AngleSeries) -> dict[str, Any]:
 
 def model_row(model: Identified) -> dict[str, Any]:
     """List parameters and errors of a model."""
-    cells = [with_uncertainty(v, s) for v, s in zip(model.values[:3], model.sigmas[:3], strict=True)]
+    known = np.isfinite(model.sigmas[:3])
+    cells = [
+        with_uncertainty(v, s) if k else f"{v:.4g}"
+        for v, s, k in zip(model.values[:3], model.sigmas[:3], known, strict=True)
+    ]
     cells += [""] * (3 - len(cells))
     held_out = None if model.held_out is None else np.degrees(model.held_out.rmse)
     return {
         "name": ESTIMATORS[model.estimator],
+        "certain": bool(known.all()),
         "cells": [*cells, f"{np.degrees(model.fit.rmse):.4f}", _text(held_out, ".4f")],
     }
 
