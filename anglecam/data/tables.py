@@ -71,7 +71,7 @@ def _load(library: str) -> Any:
         return import_module(library)
     except ImportError as missing:
         raise ImportError(
-            f"{library} is needed for this table and is not installed; install it, or anglecam with its extra 'tables'"
+            f"{library} is needed for this table and is not installed: python -m pip install {library}"
         ) from missing
 
 

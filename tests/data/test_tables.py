@@ -56,7 +56,7 @@ def test_the_dataset_has_the_variables_of_the_netcdf_file(series, tmp_path):
 @pytest.mark.parametrize(("method", "library"), [("to_pandas", "pandas"), ("to_xarray", "xarray")])
 def test_a_missing_library_is_named_in_one_line(series, monkeypatch, method, library):
     monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(ImportError, match=rf"{library} is needed .*extra 'tables'") as missing:
+    with pytest.raises(ImportError, match=rf"{library} is needed .*pip install {library}") as missing:
         getattr(series, method)()
     assert "\n" not in str(missing.value)
 
