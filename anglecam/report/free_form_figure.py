@@ -20,6 +20,9 @@ LABELS = {
     "time": "time, s",
 }
 
+COLOURED = 0.98
+"""Share of the time in which the torque is within the scale of colours."""
+
 
 def free_form_figures(found: FreeForm) -> list[str]:
     """Draw the function as a curve over one quantity, or as colours over two and the width of its band beside it."""
@@ -52,14 +55,22 @@ def _curve(x: Floats, value: Floats, half: Floats, visited: Floats, label: str) 
 def _colours(
     points: Sequence[Floats], shown: Floats, visited: Floats, labels: Sequence[str], title: str, colours: str
 ) -> str:
-    """Draw values as colours, with zero in the middle of a scale of two colours."""
-    most = float(np.max(np.abs(shown)))
+    """Draw values as colours, with zero in the middle of a scale of two colours.
+
+    The scale ends where `COLOURED` of the time is spent below; a single far value would make all others pale.
+    """
+    order = np.argsort(np.abs(shown))
+    below = np.cumsum(visited[order]) / np.sum(visited)
+    most = float(np.abs(shown)[order][min(int(np.searchsorted(below, COLOURED)), len(order) - 1)])
     with plt.rc_context(STYLE):
         figure, ax = plt.subplots(figsize=(PANEL[0], 3.6), layout="constrained")
         least = -most if colours == "RdBu_r" else 0.0
         size = 20.0 + 600.0 * np.sqrt(visited)
-        drawn = ax.scatter(points[0], points[1], c=shown, s=size, cmap=colours, vmin=least, vmax=most)
-        figure.colorbar(drawn, ax=ax)
+        drawn = ax.scatter(
+            points[0], points[1], c=shown, s=size, cmap=colours, vmin=least, vmax=most, edgecolors=FAINT, linewidths=0.5
+        )
+        beyond = bool(np.max(np.abs(shown)) > most)
+        figure.colorbar(drawn, ax=ax, extend=("both" if least else "max") if beyond else "neither")
         ax.set_title(title + "; larger where visited longer", loc="left", fontsize=8)
         ax.set(xlabel=labels[0], ylabel=labels[1])
         return _svg(figure)

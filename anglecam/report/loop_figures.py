@@ -30,6 +30,8 @@ MOST_RECORDINGS = 8
 """Largest number of recordings in a figure; those with the largest errors are drawn."""
 BINS, FEWEST_FRAMES = 16, 5
 """Bins of a mean, and the smallest number of frames in a bin that is drawn."""
+MOST_LOSS = 0.3
+"""Largest loss in a figure of gains, as a share of the largest gain; the bar of a larger one reaches to the edge."""
 COLOURS = {"base model": BEFORE, "before": BEFORE, "after": AFTER}
 
 
@@ -109,8 +111,9 @@ def candidate_figure(candidates: Sequence[Candidate], found: Sequence[str]) -> s
         ax.set_yticks(rows, [plain(c.effect.id) for c in ordered])
         for tick, candidate in zip(ax.get_yticklabels(), ordered, strict=True):
             tick.set_fontweight("bold" if candidate.effect.id in found else "normal")
-        if max(np.abs([*fitted, *predicted]), default=0.0) > 100.0:
-            ax.set_xscale("symlog", linthresh=10.0)
+        least, most = min([*fitted, *predicted], default=0.0), max([*fitted, *predicted], default=0.0)
+        if least < -MOST_LOSS * most < 0.0:  # a candidate that predicts very badly would make all gains look alike
+            ax.set_xlim(left=-MOST_LOSS * most)
         ax.axvline(0.0, color=MEASURED, lw=0.8)
         ax.grid(axis="y", visible=False)
         ax.set_xlabel("log-likelihood gain over the base model")
