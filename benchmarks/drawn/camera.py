@@ -15,7 +15,7 @@ from benchmarks.drawn.mechanism import Stage
 
 Floats = NDArray[np.float32]
 BLUR_INSTANTS, BLUR_INSTANTS_OF_BAND, BANDS = 7, 3, 12
-"""Instants of a blurred exposure, of one by rows, and bands of rows that a rolling shutter exposes one after the other."""
+"""Instants of a blurred exposure, of one by rows, and bands of rows that a rolling shutter exposes in turn."""
 
 
 class Camera:
