@@ -21,7 +21,7 @@ from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.pivot import HINT_PX
-from anglecam.vision.mark.outline_turn import outline_turn
+from anglecam.vision.mark.outline_turn import outline_bend, outline_turn
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle
 from anglecam.vision.status import AMBIGUOUS
@@ -219,13 +219,21 @@ def reaches_over_pivot(detections: Detections, ok: Flags, angles: Angles) -> boo
 def _why_not_its_line(detections: Detections, ok: Flags, angles: Angles) -> str | None:
     """Return a message where a mark that reaches over its pivot turns by another angle than the line to its middle.
 
-    That middle is some pixels from the pivot. Where a part of the mark is not seen, it moves on another circle.
+    That middle is some pixels from the pivot. Where a part of the mark is not seen, it moves on another circle, and
+    where the mark bends, neither its axis nor the line to its middle is the angle of one of its parts.
     """
     regions, arm = _seen(detections, ok, angles)
-    found = outline_turn(regions, np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))) if regions else None
-    if found is None or abs(found[0]) < _OTHER_TURN + _PIVOT_SIGMAS * found[1]:
+    line = np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))
+    found, bend = outline_turn(regions, line), outline_bend(regions, line)
+    if found is None or bend is None or not reaches_over_pivot(detections, ok, angles):
         return None
-    if not reaches_over_pivot(detections, ok, angles):
+    turned = float(np.std(line))
+    if bend > max(_MAX_OFF_CIRCLE * turned, _FLOOR_PX / (_usual_length(regions)[0] / 2.0)):
+        return (
+            f"the mark bends: its outline turns by {np.degrees(bend):.2g}° RMS otherwise than the line to its middle,"
+            f" which turns by {np.degrees(turned):.2g}°; declare another: mark: {{at: [x, y], frame: k}} in rig.yaml"
+        )
+    if abs(found[0]) < _OTHER_TURN + _PIVOT_SIGMAS * found[1]:
         return None
     return (
         "the mark reaches over its pivot and turns by another angle than the line to its middle,"
