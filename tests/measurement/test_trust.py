@@ -12,8 +12,9 @@ import pytest
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig, RigMark, RigPivot
 from anglecam.measurement.clip import measure_clip
+from anglecam.measurement.one_rigid_mark import why_not_rigid, why_two_alike
 from anglecam.measurement.rigid_body_pass import detect_rigid_body
-from anglecam.measurement.trust import why_few, why_not_rigid, why_two_alike, why_unproven
+from anglecam.measurement.trust import why_few, why_unproven
 from anglecam.video.open_film import open_film
 from benchmarks.hostile import nothing_turns
 from benchmarks.hostile.draw import write
