@@ -90,10 +90,12 @@ def _why_another_later(detections: Detections, ok: Flags, angles: Angles) -> str
     """Return a message where a mark with a rival is seen elsewhere after frames in which it was lost.
 
     It is elsewhere if it turned faster meanwhile than it ever turns while it is seen, and is beside its former place.
-    The rival is a thing whose motion is nearly as convincing, such as the other arm of a balance.
+    The rival is a thing whose motion is nearly as convincing, such as the other arm of a balance, or that is seen
+    together with the mark and may be it.
     """
     frames, regions = np.flatnonzero(ok), [region for region in detections.regions if region is not None]
-    if detections.clear or not regions or len(frames) < 3:
+    rival = not detections.clear or AMBIGUOUS in detections.status
+    if not rival or not regions or len(frames) < 3:
         return None
     turned = np.abs((np.diff(angles.line) + np.pi) % (2.0 * np.pi) - np.pi)
     gap = np.diff(frames)
