@@ -22,8 +22,9 @@ from anglecam.measurement.clock_sync import DARK, note_on, offset_of, on_clip_cl
 from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.duplicates import duplicate_frames
 from anglecam.measurement.followed import Followed, follow_mark_or_body
+from anglecam.measurement.one_rigid_mark import why_not_rigid
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
-from anglecam.measurement.trust import why_elsewhere, why_few, why_not_rigid, why_unproven
+from anglecam.measurement.trust import why_elsewhere, why_few, why_unproven
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.mark.outline_turn import outline_turn

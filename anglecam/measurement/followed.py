@@ -25,9 +25,10 @@ from anglecam.measurement.carried_marks import carried_marks, smeared_marks, wit
 from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.fine_angles import fine_angles
 from anglecam.measurement.mark_pass import MarkNotFoundError, detect_mark
+from anglecam.measurement.one_rigid_mark import reaches_over_pivot
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
 from anglecam.measurement.rigid_body_pass import detect_layer, detect_outline, detect_rigid_body
-from anglecam.measurement.trust import reaches_over_pivot, require_rotation, why_off_circle
+from anglecam.measurement.trust import require_rotation, why_off_circle
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion

@@ -20,38 +20,17 @@ from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.detections import Detections
+from anglecam.measurement.one_rigid_mark import FLOOR_PX, MAX_OFF_CIRCLE, PIVOT_SIGMAS, why_not_one_mark
 from anglecam.measurement.pivot import HINT_PX
-from anglecam.vision.mark.outline_turn import outline_turn
-from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle
-from anglecam.vision.status import AMBIGUOUS
 
-_MAX_OFF_CIRCLE = 0.02
-"""Largest systematic variation of the distance from the pivot, as a share of the mark's travel. An error along the
-lever has a like error across it, so the angle is then wrong by 2 % of its range. A wheel seen from 16° aside has as
-much."""
 _MAX_OFF_CENTRE = 0.1
 """The same for a body whose rotation is seen on itself: the pivot's place then hardly enters the angle."""
-_FLOOR_PX = 0.25
-"""Variation that shows nothing, px: codecs and the pixel grid shift a centroid by up to this much, evenly in time."""
-_PIVOT_SIGMAS = 3.0
-"""Standard uncertainties of the pivot that may add to the variation."""
 _MAX_SCALE_SIGMA = 0.2
 """Relative standard uncertainty of the path's radius from which on the path does not show its centre, as for a pivot
 (`anglecam.vision.pivot.estimate`), and of a body's rotation from which on it is not seen."""
 _HINT_SIGMAS = 3.0
 """Standard uncertainties by which a hint at the pivot may be off the centre of rotation."""
-_SHORTEST = 0.05
-"""Share of the frames in which a mark may be shorter."""
-_LEAST_LENGTH, _LENGTH_PX = 0.75, 4.0
-"""Least length of a mark in the others, relative to its usual one, and the change that shows nothing, px. Motion blur
-lengthens a mark, and noise changes a small one."""
-_OTHER_TURN = 0.25
-"""Excess of the mark's own rotation over that of the line to it, as a share, from which on the line is not its own. A
-view from 37° aside has as much."""
-_WITH_ANOTHER = 0.2
-"""Share of the frames in which another thing may be the mark, from which on it turns with the mark. A thing that the
-mark passes, or that crosses its path, is taken for it in fewer."""
 _DECLARE = "pivot: {at: [x, y], sigma_px: s} in rig.yaml"
 _TRAVEL_PX = 0.5
 """Least RMS travel of a mark that moves, px. Noise, rain and flicker shift the centroid of a thing at rest by 0.2."""
@@ -108,30 +87,6 @@ def why_few(status: Sequence[str], least: float) -> str | None:
     )
 
 
-def why_two_alike(status: Sequence[str]) -> str | None:
-    """Return a message where two things that are alike turn together, so that either may be the measured one.
-
-    The two blades of a propeller are such things: after frames in which both are seen, the other one may be followed.
-
-    Parameters
-    ----------
-    status : sequence of str
-        Of every frame.
-
-    Returns
-    -------
-    str or None
-        With the number of frames in which both are seen.
-    """
-    both = sum(s == AMBIGUOUS for s in status)
-    if both < _WITH_ANOTHER * len(status):
-        return None
-    return (
-        f"in {both} of {len(status)} frames two things may be the mark, and after them either may be followed; mark one"
-        " of them, or declare it: mark: {at: [x, y], frame: k} in rig.yaml"
-    )
-
-
 def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig) -> str | None:
     declared = rig.pivot.expected is not None
     seen_to_turn = detections.body is not None or angles.registered is not None
@@ -147,7 +102,7 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
         return f"nothing is seen to turn; to measure a mechanism at rest, declare {_DECLARE}"
     otherwise = None if at_rest else why_off_circle(detections, angles)
     if otherwise is None and not seen_to_turn:
-        otherwise = why_two_alike(detections.status) or _why_not_its_line(detections, ok, angles)
+        otherwise = why_not_one_mark(detections, ok, angles)
     if otherwise is None and detections.body is not None:
         otherwise = _why_not_seen_to_turn(angles)
     if otherwise is not None:
@@ -183,98 +138,16 @@ def why_off_circle(detections: Detections, angles: Angles) -> str | None:
         With the variation of the distance, and the travel.
     """
     travelled = travel(angles.mark_px)
-    off, share = _off_circle(detections, angles), _MAX_OFF_CIRCLE
+    off, share = _off_circle(detections, angles), MAX_OFF_CIRCLE
     if detections.body is not None:
         off, share = detections.body.pivot_scatter_px, _MAX_OFF_CENTRE
         travelled = float(np.hypot(travelled, detections.body.extent_px * np.nanstd(detections.body.turn)))
-    if off <= max(share * travelled, _FLOOR_PX):
+    if off <= max(share * travelled, FLOOR_PX):
         return None
     return (
         f"what moves does not turn about a fixed pivot: its distance from the centre varies by {off:.2g} px RMS"
         f" while it travels {travelled:.2g} px RMS"
     )
-
-
-def reaches_over_pivot(detections: Detections, ok: Flags, angles: Angles) -> bool:
-    """Return whether a mark is longer than its distance from the pivot, as a servo's horn is.
-
-    Parameters
-    ----------
-    detections : Detections
-        The coarse pass.
-    ok : ndarray
-        (frames,) the measured frames.
-    angles : Angles
-        Of these frames.
-
-    Returns
-    -------
-    bool
-        False for a body without a mark.
-    """
-    regions, arm = _seen(detections, ok, angles)
-    return bool(regions) and float(np.median(np.hypot(*arm.T))) < _usual_length(regions)[0]
-
-
-def _why_not_its_line(detections: Detections, ok: Flags, angles: Angles) -> str | None:
-    """Return a message where a mark that reaches over its pivot turns by another angle than the line to its middle.
-
-    That middle is some pixels from the pivot. Where a part of the mark is not seen, it moves on another circle.
-    """
-    regions, arm = _seen(detections, ok, angles)
-    found = outline_turn(regions, np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))) if regions else None
-    if found is None or abs(found[0]) < _OTHER_TURN + _PIVOT_SIGMAS * found[1]:
-        return None
-    if not reaches_over_pivot(detections, ok, angles):
-        return None
-    return (
-        "the mark reaches over its pivot and turns by another angle than the line to its middle,"
-        f" {1.0 + found[0]:.2g} times as far; to measure its rotation, hint at its pivot: pivot: {{near: [x, y]}} in"
-        " rig.yaml"
-    )
-
-
-def _seen(detections: Detections, ok: Flags, angles: Angles) -> tuple[list[Region], Floats]:
-    """Return the mark where it is seen, and the lines (n, 2) from the pivot to its middle, px."""
-    pairs = [(detections.regions[i], place) for i, place in zip(np.flatnonzero(ok), angles.mark_px, strict=True)]
-    regions = [region for region, _ in pairs if region is not None]
-    places = [place for region, place in pairs if region is not None]
-    return regions, np.array(places).reshape(-1, 2) - angles.pivot.centre_px
-
-
-def why_not_rigid(detections: Detections, ok: Flags) -> str | None:
-    """Return a message where what was followed as a mark is seen whole in some frames and in part in others.
-
-    Parameters
-    ----------
-    detections : Detections
-        The coarse pass.
-    ok : ndarray
-        (frames,) the measured frames.
-
-    Returns
-    -------
-    str or None
-        With its least length; ``None`` for a mark of constant length, and for a body without a mark.
-    """
-    whole = [r for r, seen in zip(detections.regions, ok, strict=True) if seen and r is not None]
-    if not whole:
-        return None
-    usual, least = _usual_length(whole)
-    if least > min(_LEAST_LENGTH * usual, usual - _LENGTH_PX):
-        return None
-    return (
-        f"the mark is {usual:.0f} px long, but only {least:.0f} px in some frames: something covers a part of it, or it"
-        " is no rigid thing; declare another: mark: {at: [x, y], frame: k} in rig.yaml"
-    )
-
-
-def _usual_length(regions: Sequence[Region]) -> tuple[float, float]:
-    """Return the median and the least length of a mark, px."""
-    longest = [float(np.linalg.eigvalsh(region.moments_px2)[1]) for region in regions]
-    # a homogeneous bar is √12 times as long as its standard deviation
-    usual, least = np.sqrt(12.0 * np.quantile(longest, (0.5, _SHORTEST)))
-    return float(usual), float(least)
 
 
 def why_elsewhere(detections: Detections, rig: Rig) -> str | None:
@@ -371,7 +244,7 @@ def _off_circle(detections: Detections, angles: Angles) -> float:
     variance = float((off[1:] * off[:-1]).mean())
     if circle is None:
         directions = np.cov((arm / np.maximum(lever, 1e-9)[:, None]).T)
-        variance -= _PIVOT_SIGMAS**2 * float(np.trace(angles.pivot.covariance_px2 @ directions))
+        variance -= PIVOT_SIGMAS**2 * float(np.trace(angles.pivot.covariance_px2 @ directions))
     return float(np.sqrt(max(variance, 0.0)))
 
 

@@ -12,8 +12,9 @@ import pytest
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig, RigMark, RigPivot
 from anglecam.measurement.clip import measure_clip
+from anglecam.measurement.one_rigid_mark import why_not_rigid, why_two_alike
 from anglecam.measurement.rigid_body_pass import detect_rigid_body
-from anglecam.measurement.trust import why_few, why_not_rigid, why_two_alike, why_unproven
+from anglecam.measurement.trust import why_few, why_unproven
 from anglecam.video.open_film import open_film
 from benchmarks.hostile import nothing_turns
 from benchmarks.hostile.draw import write
@@ -179,3 +180,12 @@ def test_a_page_of_text_that_scrolls_is_refused(tmp_path):
     (text,) = (film for film in nothing_turns.films() if film.name == "scrolling-text")
     with pytest.raises(InputError):
         measure_clip(open_film(write(text, tmp_path)), Rig())
+
+
+def test_of_two_like_balls_on_a_beam_that_are_hidden_in_turn_none_is_measured(tmp_path):
+    angle = np.radians(25.0) * np.sin(2 * np.pi * 0.9 * TIME)
+    arm = 60.0 * np.column_stack([np.cos(angle), -np.sin(angle)])
+    frame = np.arange(len(TIME))[:, None]
+    one, other = np.where(frame < 25, MIDDLE + arm, -80.0), np.where(frame >= 20, MIDDLE - arm, -80.0)
+    with pytest.raises(InputError, match="faster than it is ever seen to turn, and another thing may be the mark"):
+        measure_clip(_film(tmp_path, one, other=other), Rig())

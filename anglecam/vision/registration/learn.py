@@ -26,6 +26,7 @@ from anglecam.vision.registration.appearance import join_tiles
 from anglecam.vision.registration.axis_view import axis_in_perspective
 from anglecam.vision.registration.centre_equations import (
     DIRECTION,
+    NO_INFORMATION,
     PIVOT,
     Centres,
     centre_equations,
@@ -96,6 +97,8 @@ def learn_body(
             if len(tiles.corners) >= _FEWEST_TILES:
                 plane, (data, last) = deep, _learn(frames, tiles, deep, pivot)
                 end = _at_the_end(data, last)
+    if not _is_seen(end):
+        return None
     return _body(data, last, end, plane, moving=frames[0].pivot_covariance_px2 is not None)
 
 
@@ -125,6 +128,11 @@ def _at_the_end(data: Data, last: Round) -> tuple[Floats, Floats]:
     """Return normal matrices and gradients, divided by the variances, in the state that the last round found."""
     fits = compare_all(last.appearance, data.seen(last.state), last.state.turns, data.centres(last.state))
     return fits.without(last.hidden | fits.without_information).weighted(last.variance * last.excess)
+
+
+def _is_seen(end: tuple[Floats, Floats]) -> bool:
+    """Return whether the tiles show the angle of any frame, and are not all taken for hidden."""
+    return bool((end[0][..., 0, 0].sum(axis=0) > NO_INFORMATION).any())
 
 
 def _body(data: Data, last: Round, end: tuple[Floats, Floats], plane: MotionPlane, moving: bool) -> BodyAppearance:

@@ -27,7 +27,7 @@ from anglecam.vision.rigid_body.feature_matching import (
     find_features,
     find_turning_body,
 )
-from anglecam.vision.rigid_body.keyframes import Keyframe, choose_keyframes, match_keyframe
+from anglecam.vision.rigid_body.keyframes import Keyframe, choose_keyframes, match_keyframe, repetition
 from anglecam.vision.status import NO_MARK, OCCLUDED, UNDECODABLE
 
 _MAX_SAMPLES = 16
@@ -36,6 +36,10 @@ _NEAR_POINT = 0.05
 """Of the picture's width: features as near as this to a point that is declared belong to the body."""
 _MIN_SEEN_SHARE = 0.3
 """Share of a keyframe's points that must move as one body for a frame to be measured."""
+_SMALL_STEP = 0.25
+"""Largest step between measured frames of a body that repeats itself, as a share of the repetition. From a half on the
+step may be the other way round; where the holes of a gear repeat themselves otherwise than its teeth, the two
+together are taken for others at less."""
 
 
 def follow_rigid_body(
@@ -87,7 +91,15 @@ def follow_rigid_body(
         rigid = apply_motion(inverse_motion(keyframe.pose), keyframe.points[match.inlier])
         information = pose_information(pose, rigid - middle) / match.variance
         poses.append(FramePose(OK, pose, information, match.group_ratio))
-    return fit_common_centre(poses, middle, spread)
+    motion = fit_common_centre(poses, middle, spread)
+    if isinstance(motion, str):
+        return motion
+    fullest = max(keyframes, key=lambda k: len(k.points))
+    repeats = repetition(fullest, motion.pivot_px, _MIN_SEEN_SHARE)
+    steps = np.abs(np.diff(motion.turn[np.isfinite(motion.turn)]))
+    if repeats is None or steps.max(initial=0.0) < _SMALL_STEP * repeats:
+        return motion
+    return f"the rotating body looks alike after {np.degrees(repeats):.0f}°, and turns too far between two frames"
 
 
 def _guesses(recent: list[tuple[float, Floats]], time: float, body: Features, grey: Image) -> Iterator[Floats]:

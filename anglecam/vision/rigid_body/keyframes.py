@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.clusters import group_neighbours
-from anglecam.vision.image.transforms import apply_motion, fit_rigid, inverse_motion, turn_of
+from anglecam.vision.image.transforms import apply_motion, fit_rigid, inverse_motion, rotation, turn_of
 from anglecam.vision.rigid_body.feature_matching import MIN_POINTS, MIN_TURN, fit_body_motion
 
 POINT_GROUPS = 8
@@ -51,6 +51,11 @@ _FINE_PX = 1.5
 _REPEAT_TURN = np.radians(1.0)
 """Remaining rotation, rad, beyond which a patch is not tracked exactly: the frame is rotated back by the result, and
 tracked again."""
+_TRIED = np.radians(15.0)
+"""Angle between the rotations at which a body is compared with itself, rad: the displacement of a point at an arm of
+150 px is then tracked from half of it."""
+_SAME_TURN = 0.05
+"""Largest rotation of a body that counts as none, rad: less than half the pitch of sixty teeth."""
 _FLOOR_PX = 0.02
 """Least standard deviation of a tracked point, px: not even points of the keyframe itself are tracked better."""
 
@@ -130,6 +135,35 @@ def match_keyframe(keyframe: Keyframe, grey: Image, guess: Floats) -> KeyframeMa
             break
         guess = motion
     return match
+
+
+def repetition(keyframe: Keyframe, centre_px: Floats, share: float) -> float | None:
+    """Return the least rotation after which a body looks like itself, as a gear does from tooth to tooth.
+
+    Parameters
+    ----------
+    keyframe : Keyframe
+        Of the body.
+    centre_px : ndarray
+        (2,) centre of rotation.
+    share : float
+        Share of the keyframe's points that has to be found again: as many as make a frame measured.
+
+    Returns
+    -------
+    float or None
+        In rad; ``None`` for a body that shows its angle in the whole turn.
+    """
+    itself = replace(keyframe, corner=np.zeros(2), points=keyframe.points - keyframe.corner)
+    centre, found = centre_px - keyframe.corner, []
+    for turn in np.arange(_TRIED, 2.0 * np.pi - _TRIED / 2.0, _TRIED):
+        guess = np.eye(3)
+        guess[:2, :2] = rotation(turn).T
+        guess[:2, 2] = centre - guess[:2, :2] @ centre
+        match = match_keyframe(itself, keyframe.image, guess)
+        if match is not None and match.inlier.sum() >= share * len(keyframe.points):
+            found.append(abs(turn_of(match.motion)))
+    return min((turn for turn in found if turn > _SAME_TURN), default=None)
 
 
 def choose_keyframes(images: Sequence[Image], poses: dict[int, Floats], body: Floats) -> tuple[list[Keyframe], float]:

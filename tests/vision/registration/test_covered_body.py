@@ -1,5 +1,7 @@
 """A small body before which something stands in many frames: few of its tiles are seen, and in some frames none."""
 
+import warnings
+
 import numpy as np
 
 from anglecam.camera.lens import Lens
@@ -28,16 +30,27 @@ def draw(turn, rng, *, covered):
     return (picture + rng.normal(0.0, NOISE, picture.shape)).round().clip(0, 255).astype(np.uint8)[..., None]
 
 
-def test_frames_that_show_nothing_of_the_body_do_not_stop_its_learning():
-    # with this seed the light explains all of some views, and rounding left less than nothing of their information
-    rng, free = np.random.default_rng(11), 30
+def learnt_from(seed, free):
+    """Learn the body from frames in which it is covered, but for the first few."""
+    rng = np.random.default_rng(seed)
     turns = rng.uniform(-1.0, 1.0, FRAMES) * np.radians(15.0)
     start = PivotEstimate(PIVOT, 4.0 * np.eye(2), "marker")
     frames = [
         FrameView(draw(turn, rng, covered=k >= free), float(turn), start.centre_px, 0.0, 0.0)
         for k, turn in enumerate(turns)
     ]
-    learnt = learn_from_frames(frames, motion_plane(Lens(), SIZE), start)
+    return learn_from_frames(frames, motion_plane(Lens(), SIZE), start)
+
+
+def test_frames_that_show_nothing_of_the_body_do_not_stop_its_learning():
+    # with this seed the light explains all of some views, and rounding left less than nothing of their information
+    learnt = learnt_from(seed=11, free=30)
     if not isinstance(learnt, str):  # then its pivot must be right
         sigma = np.sqrt(np.linalg.eigvalsh(learnt.pivot_covariance_px2)[-1])
         assert np.hypot(*(learnt.pivot_px - PIVOT)) < 4.0 * sigma
+
+
+def test_a_body_whose_tiles_are_all_hidden_is_not_learnt_and_nothing_is_divided_by_zero():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert isinstance(learnt_from(seed=4, free=0), str)

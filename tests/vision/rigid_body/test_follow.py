@@ -2,6 +2,7 @@
 
 import itertools
 
+import cv2
 import numpy as np
 import pytest
 import yaml
@@ -131,3 +132,27 @@ def test_a_plain_ball_shows_no_rotation():
     """Its centre moves on a circle, but its rotation on the thread is not visible."""
     images = [frame.image for frame in itertools.islice(open_film(FILM).frames(), 0, 60)]
     assert isinstance(follow_rigid_body(numbered(images, 24.0), images[::10], 2.0), str)
+
+
+def _gear(angle_deg, light):
+    """Draw a gear of 21 teeth with four holes, which coincide after five teeth but for 4°."""
+    picture = np.full((240, 240), 210.0, np.float32)
+
+    def put(radius, angles_deg, side, grey):
+        for a in np.radians(angles_deg):
+            c, s = np.cos(a), -np.sin(a)
+            corners = [(radius * c + x * c - y * s, radius * s + x * s + y * c) for x, y in side]
+            cv2.fillPoly(picture, [np.round(16 * (120 + np.array(corners))).astype(np.int32)], grey, cv2.LINE_AA, 4)
+
+    cv2.circle(picture, (120, 120), 80, 120.0, -1, cv2.LINE_AA)
+    put(78.0, angle_deg + 360.0 / 21 * np.arange(21), [(0, -7), (12, -5), (12, 5), (0, 7)], 120.0)
+    put(45.0, angle_deg + 90.0 * np.arange(4), [(-11, -11), (11, -11), (11, 11), (-11, 11)], 60.0)
+    noisy = picture * light + np.random.default_rng(int(1e3 * angle_deg)).normal(0.0, 2.0, picture.shape)
+    return cv2.cvtColor(np.clip(noisy, 0, 255).astype(np.uint8), cv2.COLOR_GRAY2BGR)
+
+
+def test_a_gear_whose_teeth_and_holes_repeat_themselves_is_right_or_refused():
+    turned = 5.0 * np.arange(70)
+    images = [_gear(a, 1.0 - 0.3 * np.sin(k / 8.0)) for k, a in enumerate(turned)]
+    motion = follow_rigid_body(numbered(images), sampled(images), 2.0)
+    assert isinstance(motion, str) or rms(errors(motion, turned)[0]) < 1.0
