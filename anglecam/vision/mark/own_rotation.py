@@ -24,6 +24,9 @@ _LEAST_LENGTH = 0.5
 """Least length L of such a mark, relative to the circle's radius R. An edge displaced by δ turns the mark's outline by
 about δ/L and displaces its centroid by up to δ/2, which on an arc of ± θ changes the radius by about δ/θ². As shares of
 the angle these are δ/(Lθ) and δ/(Rθ²): the outline is the surer one from L = θR on, half the radius at ± 29°."""
+_HANGS = -0.5
+"""Excess of the own rotation over the line's, as a share, below which the mark hangs from what turns, as the pan of a
+balance does: its path is right, though it does not turn. It is nearer to -1, no rotation, than to 0, a rigid mark."""
 _BAR = 12.0
 """Square of the length of a homogeneous bar, over the variance along it."""
 
@@ -54,7 +57,7 @@ def widened_by_own_rotation(circle: Circle, regions: Sequence[Region]) -> Circle
         return circle
     arm = np.array([region.centre_px for region in regions]) - circle.centre_px
     found = outline_turn(regions, np.unwrap(np.arctan2(arm[:, 1], arm[:, 0])))
-    if found is None:
+    if found is None or found[0] < _HANGS:
         return circle
     off, sigma = circle.radius_px * found[0], circle.radius_px * found[1]
     if off**2 <= _AGREE**2 * (circle.covariance_px2[2, 2] + sigma**2):

@@ -45,3 +45,11 @@ def test_the_uncertainty_covers_the_pivot_of_a_bar_whose_path_has_another_curvat
 def test_a_path_that_the_own_rotation_does_not_contradict_is_left_as_it_is(length, slid_px):
     before, after = _distance(length, slid_px)
     assert before == after
+
+
+def test_the_path_of_a_pan_that_hangs_and_does_not_turn_is_left_as_it_is():
+    upright = np.diag([60.0**2, 20.0**2]) / 12.0
+    places = PIVOT + LEVER * np.column_stack([np.sin(TURN), np.cos(TURN)])
+    pans = [Region(place, 1200.0, upright, np.eye(2), np.zeros((0, 2), np.int32), True) for place in places]
+    circle = fit_circle(places + np.random.default_rng(4).normal(0.0, 0.05, places.shape))
+    assert widened_by_own_rotation(circle, pans) is circle
