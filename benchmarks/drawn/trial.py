@@ -20,8 +20,8 @@ from benchmarks.drawn.film import Drawn, draw
 
 HONEST = 2.0
 """Largest RMS of error over sigma that counts as honest."""
-SMALL_DEG, SMALL_SHARE = 0.3, 0.02
-"""An error, RMS, below either of these is no wrong angle, whatever its sigma; the share is of the true motion, RMS."""
+SMALL_DEG = 0.3
+"""An error, RMS, below this is no wrong angle, whatever its sigma."""
 SEVERAL = 3.0
 """RMS of error over sigma from which on a large error is a wrong angle."""
 WORTHLESS = 0.1
@@ -112,9 +112,8 @@ def _outcome(film: Drawn, verdict: str, line: str, draw_s: float, began: float, 
 
 
 def _verdict(rms: float, ratio: float, share: float, ok: float) -> str:
-    small = rms < SMALL_DEG or share < SMALL_SHARE
     if ratio > HONEST:
-        return "sigma small" if small or ratio <= SEVERAL else "wrong"
+        return "sigma small" if rms < SMALL_DEG or ratio <= SEVERAL else "wrong"
     if share > WORTHLESS:
         return "vague"
     return "right" if ok >= MOST else "fewer frames"

@@ -60,6 +60,9 @@ _KNOWN = 24
 _ALIKE = 0.7
 """Share of the best match's points that another pose has if the outline repeats itself. A tooth of a gear is as good as
 the next but for the wall behind it, which displaces some edges: of a drawn gear, other teeth had 0.8."""
+_ALL_ROUND = 0.1
+"""Angle between the poses at which an outline that was found again is sought once more, rad: from half of it a match
+converges (`anglecam.vision.rigid_body.outline`). The known poses are those of one stretch, and may miss a tooth."""
 _SAME_TURN = 0.05
 """Difference of two matches of one pose, rad: less than half the pitch of sixty teeth."""
 
@@ -143,7 +146,7 @@ def follow_outline(frames: Iterator[Frame], moving: MovingOutline) -> RigidMotio
     """
     poses: list[FramePose] = []
     recent: list[Floats] = []
-    last, since, fastest = None, 0, 0.0
+    last, since, fastest, repetition = None, 0, 0.0, np.inf
     for frame in frames:
         since += 1
         if frame.image is None:
@@ -151,8 +154,13 @@ def follow_outline(frames: Iterator[Frame], moving: MovingOutline) -> RigidMotio
             continue
         seen = slopes(frame.image, moving.background)
         match = max(_matches(moving, seen, [_going_on(recent)] if recent else []), key=_followers, default=None)
-        if match is None and (seen.steepness > moving.level).sum() >= MIN_OUTLINE_POINTS:
-            match = _found_again(_matches(moving, seen, moving.known), last, since, fastest)
+        may_be_any = since > 1 and since * fastest >= repetition / 2.0
+        if match is None and not may_be_any and (seen.steepness > moving.level).sum() >= MIN_OUTLINE_POINTS:
+            again = _matches(moving, seen, moving.known)
+            if again and last is not None:
+                again += _matches(moving, seen, _all_round(max(again, key=_followers).pose, moving.centre))
+            match, least = _found_again(again, last, since, fastest)
+            repetition = min(repetition, least)
         recent = [] if match is None else [*recent[-1:], match.pose]
         if match is not None:
             if last is not None and since == 1:
@@ -214,14 +222,25 @@ def _matches(moving: MovingOutline, seen: Slopes, guesses: Sequence[Floats]) -> 
     return [match for match in tried if match is not None and match.follows.mean() >= _SEEN_SHARE]
 
 
+def _all_round(pose: Floats, centre: Centre) -> list[Floats]:
+    """Return a pose turned about a centre, all the way round."""
+    poses = []
+    for turn in np.arange(_ALL_ROUND, 2.0 * np.pi, _ALL_ROUND):
+        turned = np.eye(3)
+        turned[:2, :2] = rotation(turn).T
+        turned[:2, 2] = centre.place_px - turned[:2, :2] @ centre.place_px
+        poses.append(turned @ pose)
+    return poses
+
+
 def _followers(match: OutlineMatch) -> int:
     return int(match.follows.sum())
 
 
 def _found_again(
     matches: Sequence[OutlineMatch], last: Floats | None, since: int, fastest: float
-) -> OutlineMatch | None:
-    """Return which of several matches goes on from the last pose; ``None`` where that cannot be known.
+) -> tuple[OutlineMatch | None, float]:
+    """Return which of several matches goes on from the last pose, and after which least rotation the outline is alike.
 
     An outline that repeats itself, as a gear's does from tooth to tooth, is seen in several poses alike. The nearest to
     the last one is the right one if the body cannot have turned by half the repetition since: it turns no faster than
@@ -230,25 +249,33 @@ def _found_again(
     Parameters
     ----------
     matches : sequence of OutlineMatch
-        From all known poses.
+        From all known poses, and from the best of them, turned all the way round.
     last : ndarray, optional
         (3, 3) the pose when the outline was last seen; the first pose may be any of those alike.
     since : int
         Frames since then.
     fastest : float
         Largest rotation from one frame to the next one so far, rad.
+
+    Returns
+    -------
+    match : OutlineMatch or None
+        ``None`` where it cannot be known.
+    repetition : float
+        Rad; infinite for an outline that is seen in one pose only.
     """
     best = max(matches, key=_followers, default=None)
     if best is None or last is None:
-        return best
+        return best, np.inf
     alike = [match for match in matches if _followers(match) >= _ALIKE * _followers(best)]
     turned = np.array([turn_of(match.pose @ inverse_motion(last)) for match in alike])
     nearest = int(np.argmin(np.abs(turned)))
     apart = np.abs((turned - turned[nearest] + np.pi) % (2.0 * np.pi) - np.pi)
     others = apart[apart > _SAME_TURN]
     if not len(others):
-        return best
-    return alike[nearest] if since == 1 or since * fastest < others.min() / 2.0 else None
+        return best, np.inf
+    repetition = float(others.min())
+    return alike[nearest] if since == 1 or since * fastest < repetition / 2.0 else None, repetition
 
 
 def _as_frame_pose(match: OutlineMatch) -> FramePose:

@@ -34,13 +34,22 @@ def _distance(length, slid_px):
     return [float(np.sqrt(off @ np.linalg.solve(c.centre_covariance_px2, off))) for c in (circle, found)]
 
 
-def test_the_uncertainty_covers_the_pivot_of_a_bar_whose_path_has_another_curvature():
-    before, after = _distance(150.0, 6.0)
+@pytest.mark.parametrize("length", [60.0, 150.0])
+def test_the_uncertainty_covers_the_pivot_of_a_bar_whose_path_has_another_curvature(length):
+    before, after = _distance(length, 6.0)
     assert before > 10.0
     assert after < 2.0
 
 
-@pytest.mark.parametrize(("length", "slid_px"), [(150.0, 0.0), (40.0, 6.0)], ids=["a consistent bar", "a short bar"])
+@pytest.mark.parametrize(("length", "slid_px"), [(150.0, 0.0), (30.0, 6.0)], ids=["a consistent bar", "a short bar"])
 def test_a_path_that_the_own_rotation_does_not_contradict_is_left_as_it_is(length, slid_px):
     before, after = _distance(length, slid_px)
     assert before == after
+
+
+def test_the_path_of_a_pan_that_hangs_and_does_not_turn_is_left_as_it_is():
+    upright = np.diag([60.0**2, 20.0**2]) / 12.0
+    places = PIVOT + LEVER * np.column_stack([np.sin(TURN), np.cos(TURN)])
+    pans = [Region(place, 1200.0, upright, np.eye(2), np.zeros((0, 2), np.int32), True) for place in places]
+    circle = fit_circle(places + np.random.default_rng(4).normal(0.0, 0.05, places.shape))
+    assert widened_by_own_rotation(circle, pans) is circle
