@@ -20,6 +20,7 @@ from anglecam.measurement.clip import measure_clip
 from anglecam.report.budget_page import budget_table, stated, write_budget, write_page
 from anglecam.report.figure8 import touching_point
 from anglecam.video.open_film import open_film
+from support.browser import Watched, chromium
 from support.drawn import Look, Recording, draw_session
 
 TRIALS = 100_000
@@ -72,6 +73,16 @@ def test_the_page_holds_the_numbers_and_the_figures(written):
         assert term.name in page
     assert "None" not in page
     assert "nan" not in page.replace("provenance", "")
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_no_table_is_cut(written, width):
+    _, _, out = written
+    with chromium() as browser:
+        watched = Watched(browser, out / "stairs.budget.html", width)
+        tables = "[...document.querySelectorAll('main .scroll')].map(e => e.scrollWidth - e.clientWidth)"
+        assert watched.page.evaluate(tables) == [0] * watched.page.locator("main table").count()
+        assert watched.overflow() == 0
 
 
 def test_the_table_shows_terms_bounds_and_expanded_uncertainty(written):
