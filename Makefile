@@ -52,7 +52,7 @@ $(RUN): pyproject.toml requirements/build.lock requirements/run.lock
 	@$(INSTALL) --require-hashes -r requirements/run.lock
 	@$(INSTALL) --no-deps -e .
 	@touch $@
-	@echo "setup: done; $(BIN)/anglecam doctor tells whether this machine has all that anglecam needs"
+	@echo "setup: done; next: $(BIN)/anglecam doctor"
 
 $(DEV): $(RUN) requirements/dev.lock
 	@echo "setup: adding the packages of requirements/dev.lock, which the tests need, to $(VENV)"

@@ -197,7 +197,8 @@ def terms_over_time(sources: ErrorSources) -> tuple[TermOverTime, ...]:
         found.append(TermOverTime("mark's position on the body", "rad", s.mark_on_body, even, "angles of the mark (A)"))
     if s.neutral is not None and line0 is not None:
         dof = s.noise_dof if s.registration is None else math.inf
-        found.append(TermOverTime("neutral line", "rad", line0, -even, f"mean of {s.neutral.frames} frames (A)", dof))
+        known = f"frames that define it: {s.neutral.frames} (A)"
+        found.append(TermOverTime("neutral line", "rad", line0, -even, known, dof))
     if s.lens_px is not None:
         found.append(TermOverTime("lens", "px", s.lens_px, 1.0 / lever, "calibration's covariance (B)"))
     if s.tilt is not None and s.tilt.sigma > 0.0:

@@ -5,6 +5,7 @@ pandas and xarray are optional. They are imported when a table is asked for, and
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib import import_module
@@ -71,7 +72,7 @@ def _load(library: str) -> Any:
         return import_module(library)
     except ImportError as missing:
         raise ImportError(
-            f"{library} is needed for this table and is not installed: python -m pip install {library}"
+            f"{library} is needed for this table and is not installed: {sys.executable} -m pip install {library}"
         ) from missing
 
 

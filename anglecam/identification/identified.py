@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from anglecam.data.record import Record
+from anglecam.data.rounding import UNDETERMINED
 from anglecam.data.step_figures import StepFigures
 from anglecam.data.tables import html_table, pandas_table, xarray_dataset
 from anglecam.data.typing import Floats
@@ -54,14 +55,7 @@ class Identified:
     @property
     def doubts(self) -> tuple[str, ...]:
         """Reasons why the parameters or their uncertainties are unreliable, one line each; empty if there are none."""
-        at_bound = [name for name, sigma in zip(self.names, self.sigmas, strict=True) if not np.isfinite(sigma)]
-        doubts = []
-        if not self.settled:
-            doubts.append(
-                f"{self.estimator} did not settle: its parameters are the best that it reached, and have no uncertainty"
-            )
-        elif at_bound:
-            doubts.append(f"{', '.join(at_bound)}: at a bound of the possible values, so without an uncertainty")
+        doubts = [f"{self.estimator}: {self.no_uncertainty}"] if self.no_uncertainty else []
         stated = np.concatenate([r.sigma for r in self.fitted])
         floor = None if np.all(np.isfinite(stated)) else noise_floor(self.fitted)
         noise = float(np.sqrt(np.mean(stated**2))) if floor is None else floor.sigma
@@ -84,6 +78,14 @@ class Identified:
         if self.clock is not None and self.clock.notes:
             doubts.append(f"clock: {'; '.join(self.clock.notes)}; a, b, c take these time stamps as they are")
         return tuple(doubts)
+
+    @property
+    def no_uncertainty(self) -> str:
+        """Which parameters have no uncertainty, and why, in one line; empty if all have one."""
+        if not self.settled:
+            return "no uncertainty (it did not settle; its parameters are the best that it reached)"
+        missing = [name for name, sigma in zip(self.names, self.sigmas, strict=True) if not np.isfinite(sigma)]
+        return f"no uncertainty of {', '.join(missing)} ({UNDETERMINED})" if missing else ""
 
     @property
     def sigmas(self) -> Floats:

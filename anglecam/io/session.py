@@ -192,7 +192,8 @@ def read_session(directory: Path, rig: Rig | None = None) -> Session:
     sources |= tracks
     sources |= {recording_name(p): p for p in directory.glob(f"*{SERIES_ENDING}") if p.is_file()}
     if not sources:
-        fault = f"no clip ({', '.join(CLIP_ENDINGS)}) and no *{SERIES_ENDING} in it"
+        series = f"*{SERIES_ENDING} (columns time_s,angle_deg: see docs/files.md)"
+        fault = f"no clip ({', '.join(CLIP_ENDINGS)}) and no {series} in it"
         raise RigError(unused[0] if unused else f"{directory}: {fault}")
     filmed = [source for source in sources.values() if not source.name.endswith(SERIES_ENDING)]
     if rig.source == "encoder" and filmed:

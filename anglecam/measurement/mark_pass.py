@@ -132,7 +132,8 @@ def detect_mark(
     if pivot is None:
         raise InputError(
             f"{path}: no pivot found: the mark's path is too short to determine its centre, and there is no round"
-            " marker near it; declare it: pivot: {at: [x, y], sigma_px: s} in rig.yaml, also outside the picture"
+            " marker near it; in rig.yaml, hint at it to some 10 px: pivot: {near: [x, y]}, or declare it, also outside"
+            " the picture: pivot: {at: [x, y], sigma_px: s}"
         )
     notes = [note for note in (_choice(found, track), disagreement) if note]
     if shakes is not None:

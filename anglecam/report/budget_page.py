@@ -140,7 +140,7 @@ def budget_table(budget: Budget) -> Table:
         "sensitivity",
         "contribution, °",
         "share",
-        title=f"{budget.name}: frame {one.frame}, {one.angle_deg:.{digits}f}°, lever arm {one.lever_px:.1f} px",
+        title=f"{budget.name}: typical frame {one.frame}, lever arm {one.lever_px:.1f} px\n{stated(one)}",
         title_justify="left",
     )
     for i in (1, 3, 4, 5, 6):
@@ -160,8 +160,8 @@ def budget_table(budget: Budget) -> Table:
     table.add_row(
         "expanded, 95 %", "", "", "", f"k = {combined.coverage_factor:.2f}", f"{combined.expanded:.{digits}f}"
     )
-    half = (one.drawn.high - one.drawn.low) / 2.0
-    table.add_row("by Monte Carlo, 95 %", "", "", "", f"{one.drawn.trials} trials", f"{half:.{digits}f}")
+    drawn = _interval(one, one.drawn.low, one.drawn.high, digits)
+    table.add_row("by Monte Carlo, 95 %", "", "", "", f"{one.drawn.trials} trials", drawn)
     table.add_section()
     rms, worst = math.sqrt(float((budget.total**2).mean())), float(budget.total.max())
     table.add_row("combined, RMS of the clip", "", "", "", "", f"{math.degrees(rms):.{digits}f}")
@@ -175,6 +175,28 @@ def budget_table(budget: Budget) -> Table:
     return table
 
 
+def stated(one: FrameBudget) -> str:
+    """Return a frame's angle with its 95 % interval, as the page's head and the terminal state it.
+
+    The interval is ± U, or that by Monte Carlo if the linear budget is not validated (JCGM 101, 5.8). The last digit
+    of U sets the last digit of all (GUM 7.2.6).
+    """
+    angle, expanded = one.angle_deg, one.combined.expanded
+    low, middle, high = (
+        f"{x:.{_decimals(expanded, 2)}f}°".replace("-", "−") for x in (one.drawn.low, angle, one.drawn.high)
+    )
+    if one.comparison.agrees:
+        return (
+            f"angle = {middle} ± {expanded:.{_decimals(expanded, 2)}f}° (95 %, k = {one.combined.coverage_factor:.2f})"
+        )
+    return f"angle = {middle}, between {low} and {high} (95 %, by Monte Carlo: the linear budget is not validated)"
+
+
+def _interval(one: FrameBudget, low: float, high: float, digits: int) -> str:
+    """Return an interval relative to a frame's angle, °."""
+    return f"{low - one.angle_deg:+.{digits}f} … {high - one.angle_deg:+.{digits}f}".replace("-", "−")
+
+
 def _scene(film: Film, measured: Measurement, row: int) -> Scene | None:
     contour = measured.contours_px[row]
     mark, pivot = measured.series.mark_px, measured.series.pivot_px
@@ -185,29 +207,21 @@ def _scene(film: Film, measured: Measurement, row: int) -> Scene | None:
 
 
 def _frame_content(title: str, one: FrameBudget, content: dict[str, Any]) -> dict[str, Any]:
-    """Return the page's content for one frame; the last digit of U sets the last digit of the angle (GUM 7.2.6)."""
-    stated = _decimals(one.combined.expanded, 2)
+    """Return the page's content for one frame."""
     fine = _decimals(one.combined.standard, 4)
-
-    def interval(low: float, high: float) -> str:
-        return f"{low - one.angle_deg:+.{fine}f} … {high - one.angle_deg:+.{fine}f}"
 
     known = 1.959964 * one.combined.standard
     low, high = one.angle_deg - one.combined.expanded, one.angle_deg + one.combined.expanded
-    # if the linear budget is not validated, the Monte Carlo interval is stated (JCGM 101, 5.8)
-    ends = (one.drawn.low, one.drawn.high)
-    half = one.combined.expanded if one.comparison.agrees else max(abs(end - one.angle_deg) for end in ends)
     return {
         "title": title,
         "content": content,
-        "angle": f"{one.angle_deg:.{stated}f}",
-        "expanded": f"{half:.{stated}f}",
+        "stated": stated(one),
         "decimals": _decimals(one.combined.standard, 3),
         "fine": fine,
-        "gum": interval(low, high),
-        "gum_known": interval(one.angle_deg - known, one.angle_deg + known),
-        "drawn": interval(one.drawn.low, one.drawn.high),
-        "drawn_known": interval(one.drawn_as_known.low, one.drawn_as_known.high),
+        "gum": _interval(one, low, high, fine),
+        "gum_known": _interval(one, one.angle_deg - known, one.angle_deg + known, fine),
+        "drawn": _interval(one, one.drawn.low, one.drawn.high, fine),
+        "drawn_known": _interval(one, one.drawn_as_known.low, one.drawn_as_known.high, fine),
         "agrees": one.comparison.agrees,
         "linear": one.linearity.agrees,
         "apart": max(one.comparison.low, one.comparison.high),

@@ -10,6 +10,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 from matplotlib.ticker import MaxNLocator
 from rich.table import Table
 
@@ -28,6 +29,8 @@ STATES = {
     "not_determined": "not determined",
     "not_certified": "not certified",
 }
+FIGURE = (2.9, 2.1)
+"""Size of the figure of one quantity, inches; three stand side by side, or one on a narrow screen."""
 TALLEST = 12.0
 """Largest deviance that a figure shows; beyond it the value is excluded without any doubt."""
 
@@ -62,7 +65,7 @@ def write_certificate_page(
         colour=COLOURS[certificate.holds],
         content=content,
         rows=rows,
-        figure=environment.filters["safe"](_figure(drawn)) if drawn else "",
+        figures=[Markup(_figure(one)) for one in drawn],
         with_uncertainty=with_uncertainty,
         inputs=inputs,
         problems=problems,
@@ -96,18 +99,12 @@ def _row(one: Certified, content: dict[str, Any]) -> dict[str, Any]:
     return content | {"state": STATES[content["state"]], "name": one.quantity.name, "command": command}
 
 
-def _figure(drawn: Sequence[Certified]) -> str:
-    """Draw the profile likelihoods as SVG: deviance over the quantity, with the 95 % level and the interval."""
-    columns = min(4, len(drawn))
-    lines = -(-len(drawn) // columns)
+def _figure(one: Certified) -> str:
+    """Draw a profile likelihood as SVG: deviance over the quantity, with the 95 % level and the interval."""
     with plt.rc_context(STYLE):
-        figure, axes = plt.subplots(lines, columns, figsize=(9, 2.2 * lines), layout="constrained", squeeze=False)
-        for ax in axes.flat[len(drawn) :]:
-            ax.set_visible(False)
-        for ax, one in zip(axes.flat, drawn, strict=False):
-            _draw_profile(ax, one)
-        for ax in axes[:, 0]:
-            ax.set_ylabel("2·loss of log L")
+        figure, ax = plt.subplots(figsize=FIGURE, layout="constrained")
+        _draw_profile(ax, one)
+        ax.set_ylabel("2·loss of log L", fontsize=8)
         return _svg(figure)
 
 

@@ -70,7 +70,9 @@ def _colours(
             points[0], points[1], c=shown, s=size, cmap=colours, vmin=least, vmax=most, edgecolors=FAINT, linewidths=0.5
         )
         beyond = bool(np.max(np.abs(shown)) > most)
-        figure.colorbar(drawn, ax=ax, extend=("both" if least else "max") if beyond else "neither")
+        ends = ("both" if least else "max") if beyond else "neither"
+        label = f"scale of {100.0 * COLOURED:g} % of the time" if beyond else None
+        figure.colorbar(drawn, ax=ax, extend=ends, label=label)
         ax.set_title(title + "; larger where visited longer", loc="left", fontsize=8)
         ax.set(xlabel=labels[0], ylabel=labels[1])
         return _svg(figure)

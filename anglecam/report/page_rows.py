@@ -80,7 +80,7 @@ def model_row(model: Identified) -> dict[str, Any]:
     held_out = None if model.held_out is None else np.degrees(model.held_out.rmse)
     return {
         "name": ESTIMATORS[model.estimator],
-        "certain": bool(known.all()),
+        "no_uncertainty": model.no_uncertainty,
         "cells": [*cells, f"{np.degrees(model.fit.rmse):.4f}", _text(held_out, ".4f")],
     }
 

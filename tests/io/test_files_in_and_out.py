@@ -149,6 +149,14 @@ def test_one_bad_command_costs_its_recording_only(tmp_path):
     assert "b.command.csv" in str(session.problems[0])
 
 
+def test_a_folder_without_recordings_is_refused_with_what_an_angles_file_is(tmp_path):
+    (tmp_path / "angles.json").write_text("{}")
+    with pytest.raises(RigError) as error:
+        read_session(tmp_path)
+    assert "no *.angles.csv (columns time_s,angle_deg: see docs/files.md) in it" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
 def test_an_unknown_held_out_name_is_a_rig_error(tmp_path):
     (tmp_path / "a.angles.csv").write_text("time_s,angle_deg\n0,1\n1,2\n2,3\n")
     (tmp_path / "rig.yaml").write_text("held_out: [nowhere]")

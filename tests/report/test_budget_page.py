@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import re
+from dataclasses import replace
 from functools import partial
 from html import unescape
 
@@ -11,13 +13,14 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from anglecam.budget.gum import propagate
+from anglecam.budget.gum import Comparison, propagate
 from anglecam.io.command_csv import read_command
 from anglecam.io.rig import read_rig
 from anglecam.measurement.clip import measure_clip
-from anglecam.report.budget_page import budget_table, write_budget
+from anglecam.report.budget_page import budget_table, stated, write_budget, write_page
 from anglecam.report.figure8 import touching_point
 from anglecam.video.open_film import open_film
+from support.browser import Watched, chromium
 from support.drawn import Look, Recording, draw_session
 
 TRIALS = 100_000
@@ -72,14 +75,41 @@ def test_the_page_holds_the_numbers_and_the_figures(written):
     assert "nan" not in page.replace("provenance", "")
 
 
+@pytest.mark.parametrize("width", [1280, 390])
+def test_no_table_is_cut(written, width):
+    _, _, out = written
+    with chromium() as browser:
+        watched = Watched(browser, out / "stairs.budget.html", width)
+        tables = "[...document.querySelectorAll('main .scroll')].map(e => e.scrollWidth - e.clientWidth)"
+        assert watched.page.evaluate(tables) == [0] * watched.page.locator("main table").count()
+        assert watched.overflow() == 0
+
+
 def test_the_table_shows_terms_bounds_and_expanded_uncertainty(written):
     budget, _, _ = written
     console = Console(width=160, record=True, file=None)
     with console.capture() as capture:
         console.print(budget_table(budget))
     shown = capture.get()
+    assert stated(budget.typical) in shown
     for name in (budget.terms_over_time[0].name, "pivot", "expanded, 95 %", "6 px, worst case", "10 px, standard"):
         assert name in shown
+
+
+def test_page_and_table_state_one_interval_and_by_monte_carlo_if_the_linear_budget_is_not_validated(written, tmp_path):
+    budget, _, _ = written
+    drawn = replace(budget.typical.drawn, low=budget.typical.angle_deg - 0.46, high=budget.typical.angle_deg + 0.43)
+    skewed = replace(budget.typical, drawn=drawn, comparison=Comparison(tolerance=0.005, low=0.02, high=0.01))
+    budget = replace(budget, typical=skewed)
+    write_page(tmp_path / "b.html", budget, None)
+    page = (tmp_path / "b.html").read_text()
+    console = Console(width=160, record=True, file=None)
+    with console.capture() as capture:
+        console.print(budget_table(budget))
+    for shown in (page, capture.get()):
+        assert stated(skewed) in shown
+        assert "the linear budget is not validated" in shown
+        assert re.search(r"−0\.460* … \+0\.430*", shown)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

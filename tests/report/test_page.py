@@ -9,6 +9,7 @@ from html import unescape
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from anglecam.data.command import Command
 from anglecam.data.series import AngleSeries
@@ -23,6 +24,7 @@ from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.verdict import Accepted
 from anglecam.loop.verdict_json import next_experiment, verdict_as_dict, write_next_command
 from anglecam.report.page import p_in_words, validation_in_words, write_report
+from anglecam.report.session_tables import model_table
 from anglecam.report.wording import sentence
 from support.motion import Plant
 from support.series import session
@@ -44,11 +46,11 @@ def model(dragged):
 def write(model, tmp_path):
     """Return a function that writes the page of a verdict on those recordings and returns its text."""
 
-    def page(found, experiment=None, problems=()):
+    def page(found, experiment=None, problems=(), models=(model,)):
         series = [AngleSeries(r.name, r.time, r.angle, r.sigma, ("ok",) * len(r.time)) for r in found.fitted]
         path = tmp_path / "report.html"
         result = verdict_as_dict(found, experiment)
-        write_report(path, "a <b> & c", found, result, experiment, series, [model], problems)
+        write_report(path, "a <b> & c", found, result, experiment, series, models, problems)
         return path.read_text()
 
     return page
@@ -77,6 +79,21 @@ def test_the_page_states_the_verdict(write, dragged, verdict):
     assert ("Detectable effects" in page) == (verdict == "nothing_missing")
     assert "a <b> & c" in page
     assert "a <b>" not in text  # a session's name is text, not markup
+
+
+def test_a_filter_that_did_not_settle_has_one_wording_on_page_and_terminal(write, dragged, model):
+    unsettled = replace(model, settled=False, covariance=np.full_like(model.covariance, np.nan))
+    page = unescape(write(dragged, models=[unsettled]))
+    assert page.count(unsettled.no_uncertainty) == 1
+    assert "did not settle" in unsettled.no_uncertainty
+    assert f'<td data-label="a, 1/s">{unsettled.values[0]:.4g}</td>' in page
+    assert unsettled.no_uncertainty in unsettled.doubts[0]
+    console = Console(width=160, file=None)
+    with console.capture() as capture:
+        console.print(model_table([unsettled]))
+    assert capture.get().count("no uncertainty") == len(unsettled.names)
+    assert model.no_uncertainty == ""
+    assert "no uncertainty" not in unescape(write(dragged))
 
 
 def test_what_is_held_out_is_named(dragged):

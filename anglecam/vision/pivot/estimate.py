@@ -158,9 +158,10 @@ def _density_across(expected: PivotEstimate, marker: RoundMarker) -> float:
 
 def _disagreement(expected: PivotEstimate, marker: RoundMarker, distance: float) -> str:
     sigma = float(np.sqrt(np.trace(marker.covariance_px2 + expected.covariance_px2) / 2.0))
+    shown_by = " and ".join(f"the {one}" for one in expected.source.split(" and "))
     return (
-        f"marker and {expected.source} are {distance:.2f} px apart (uncertainty {sigma:.2f} px);"
-        f" the {expected.source} is used"
+        f"the round marker is {distance:.2f} px apart from the pivot by {shown_by} (uncertainty {sigma:.2f} px);"
+        f" that pivot is used"
     )
 
 

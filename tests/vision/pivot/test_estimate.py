@@ -27,7 +27,8 @@ def test_a_marker_off_the_centre_of_rotation_is_reported_and_not_used():
     pivot, note = combine_pivot(
         RoundMarker(np.array([50.0, 66.0]), 0.05**2 * np.eye(2), 9.0), fit_circle(_path((50, 60)))
     )
-    assert "6.0" in note
+    assert note.startswith("the round marker is 6.0")
+    assert "from the pivot by the centre of rotation (uncertainty 0." in note
     assert pivot.source == "centre of rotation"
     assert np.hypot(*(pivot.centre_px - [50, 60])) < 0.5
 
@@ -43,6 +44,20 @@ SCREWS = 10.0 / (640 * 480)
 
 def _marker(x, y):
     return RoundMarker(np.array([x, y]), 0.05**2 * np.eye(2), 9.0)
+
+
+def test_a_hint_is_a_pivot_where_the_path_is_too_short():
+    circle = fit_circle(_path((50, 60))[:4])
+    assert combine_pivot(None, circle, None) == (None, None)
+    pivot, _ = combine_pivot(None, circle, HINT)
+    assert np.hypot(*(pivot.centre_px - [50.0, 60.0])) < 3.0 * np.sqrt(np.trace(pivot.covariance_px2))
+
+
+def test_a_marker_off_hint_and_path_is_named_with_both():
+    pivot, note = combine_pivot(_marker(50.0, 160.0), fit_circle(_path((50, 60))[:12]), HINT)
+    assert pivot.source == "hint and centre of rotation"
+    assert "from the pivot by the hint and the centre of rotation (uncertainty" in note
+    assert note.endswith("that pivot is used")
 
 
 def test_a_round_thing_far_from_the_hint_is_an_uncertain_pivot():
