@@ -114,4 +114,4 @@ def test_a_model_with_a_large_residual_or_a_parameter_at_a_bound_is_doubted(angl
     assert "lacks something" in linear.doubts[0]
     assert not identify_records(fitted, Rig(), "neck", neck=LABORATORY).doubts
     held = replace(linear, covariance=np.diag([1.0, np.nan, 1.0]))
-    assert held.doubts[0].startswith("b_per_s2: at a bound")
+    assert held.doubts[0].startswith("oe2: no uncertainty of b_per_s2 (")
