@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 DOUBTFUL_RESIDUAL = 3.0
 """Multiple of the angle's uncertainty; a model with a larger RMS residual lacks something, so that the stated
-uncertainties of its parameters do not hold. It is also that of the RMS residual beyond which held-out recordings
-contradict a model."""
+uncertainties of its parameters do not hold. Held-out recordings contradict a model if their error is larger than this
+multiple of the residual, and of the angle's uncertainty."""
 
 
 @dataclass(frozen=True)
@@ -70,10 +70,11 @@ class Identified:
                 f" {np.degrees(rms_motion(self.fitted)):.2g}° RMS: unless the angle is so noisy, it lacks something,"
                 f" and its ± do not hold; anglecam close searches for it"
             )
-        if self.held_out is not None and self.held_out.rmse > DOUBTFUL_RESIDUAL * self.fit.rmse:
+        usual = max(self.fit.rmse, noise) if noise > 0.0 else self.fit.rmse
+        if self.held_out is not None and self.held_out.rmse > DOUBTFUL_RESIDUAL * usual:
             doubts.append(
-                f"held-out recordings are predicted with an error of {np.degrees(self.held_out.rmse):.2g}°,"
-                f" {self.held_out.rmse / self.fit.rmse:.0f} times that of the fit: the model does not hold for them"
+                f"held-out recordings are predicted with an error of {np.degrees(self.held_out.rmse):.2g}°, those that"
+                f" were fitted with {np.degrees(self.fit.rmse):.2g}°: the model does not hold for the others"
             )
         if self.clock is not None and self.clock.notes:
             doubts.append(f"clock: {'; '.join(self.clock.notes)}; a, b, c take these time stamps as they are")

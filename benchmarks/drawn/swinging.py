@@ -125,7 +125,10 @@ def person_on_swing(stage: Stage) -> Mechanism:
         for side in (-1, 1):
             canvas.bar(pivot, (w / 2 + side * 0.36 * w, h + MARGIN), 10 * k, (70, 75, 80))
         # x from the pivot towards the seat, y forwards
-        body = lambda x, y: turned([(x, y)], angle)[0] + seat(pose)  # noqa: E731
+
+        def body(x: float, y: float) -> np.ndarray:
+            return turned([(x, y)], angle)[0] + seat(pose)
+
         canvas.bar(pivot, seat(pose), 3 * k, (60, 60, 60))
         canvas.bar(body(0, -35 * k), body(0, 35 * k), 8 * k, (40, 60, 90))
         canvas.bar(body(-8 * k, -10 * k), body(-8 * k, 45 * k), 20 * k, trousers)

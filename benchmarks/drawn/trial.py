@@ -10,6 +10,7 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -106,9 +107,9 @@ def judged(film: Drawn, draw_s: float = 0.0) -> Outcome:
     )
 
 
-def _outcome(film: Drawn, verdict: str, line: str, draw_s: float, began: float, **figures: object) -> Outcome:
+def _outcome(film: Drawn, verdict: str, line: str, draw_s: float, began: float, **figures: Any) -> Outcome:
     faults = " ".join(sorted(film.faults.names))
-    return Outcome(film.name, verdict, line, faults, film.codec, draw_s, time.monotonic() - began, **figures)  # type: ignore[arg-type]
+    return Outcome(film.name, verdict, line, faults, film.codec, draw_s, time.monotonic() - began, **figures)
 
 
 def _verdict(rms: float, ratio: float, share: float, ok: float) -> str:

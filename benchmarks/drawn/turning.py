@@ -217,7 +217,9 @@ def t_shape(stage: Stage) -> Mechanism:
         if dot is not None:
             canvas.disc(pivot, 0.3 * width, dot)
 
-    angle: Motion = lambda t: 40.0 + (rate * t if round_ else swing(t))  # noqa: E731
+    def angle(t: float) -> float:
+        return 40.0 + (rate * t if round_ else swing(t))
+
     return Mechanism(pivot, one("plate", angle), paint, _at(pivot, 0.8 * r, "plate"))
 
 

@@ -55,3 +55,10 @@ def test_a_model_that_held_out_recordings_contradict_is_doubted():
     model = identify_records([fitted], Rig(), "oe2", held_out=[later])
     assert not identify_records([fitted], Rig(), "oe2", held_out=[other]).doubts
     assert any("held-out recordings" in doubt for doubt in model.doubts)
+    exact = replace(model.fit, residuals=[np.zeros_like(residual) for residual in model.fit.residuals])
+    assert any("fitted with 0°" in doubt for doubt in replace(model, fit=exact).doubts)
+    nearly = replace(model.fit, residuals=[1e-3 * residual for residual in model.fit.residuals])
+    within_noise = replace(
+        model, fit=nearly, held_out=model.fit, fitted=(replace(fitted, sigma=0.0 * fitted.angle + 0.01),)
+    )
+    assert not within_noise.doubts

@@ -83,3 +83,11 @@ def inverse_motion(motion: Floats) -> Floats:
 def turn_of(motion: Floats) -> float:
     """Return the rotation angle of a motion (3, 3), rad."""
     return float(np.arctan2(motion[0, 1], motion[0, 0]))
+
+
+def turned_about(pivot_px: Floats, turn: float) -> Floats:
+    """Return the motion (3, 3) that rotates about a point."""
+    motion = np.eye(3)
+    motion[:2, :2] = rotation(turn).T
+    motion[:2, 2] = pivot_px - motion[:2, :2] @ pivot_px
+    return motion

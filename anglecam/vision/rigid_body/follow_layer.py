@@ -19,10 +19,10 @@ from anglecam.data.typing import Flags, Floats, Image
 from anglecam.video.film import Frame
 from anglecam.vision.image.median import still_background
 from anglecam.vision.image.reduction import reduced, reduction
-from anglecam.vision.image.transforms import apply_motion, inverse_motion, turn_of
+from anglecam.vision.image.transforms import apply_motion, inverse_motion, turn_of, turned_about
 from anglecam.vision.rigid_body.centre_of_rotation import FramePose, RigidMotion, fit_common_centre
 from anglecam.vision.rigid_body.layer import Layer, cut_layer, match_layer
-from anglecam.vision.rigid_body.polar_match import PolarReference, learn_polar, turned_about
+from anglecam.vision.rigid_body.polar_match import PolarReference, learn_polar
 from anglecam.vision.rigid_body.rough_centre import Centre, with_pose
 from anglecam.vision.status import NO_MARK, UNDECODABLE
 

@@ -16,7 +16,7 @@ from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.video.film import Frame
 from anglecam.vision.image.median import still_background
-from anglecam.vision.image.transforms import inverse_motion, rotation, turn_of
+from anglecam.vision.image.transforms import inverse_motion, rotation, turn_of, turned_about
 from anglecam.vision.rigid_body.centre_of_rotation import FramePose, RigidMotion, fit_common_centre
 from anglecam.vision.rigid_body.outline import (
     MIN_OUTLINE_POINTS,
@@ -224,13 +224,7 @@ def _matches(moving: MovingOutline, seen: Slopes, guesses: Sequence[Floats]) -> 
 
 def _all_round(pose: Floats, centre: Centre) -> list[Floats]:
     """Return a pose turned about a centre, all the way round."""
-    poses = []
-    for turn in np.arange(_ALL_ROUND, 2.0 * np.pi, _ALL_ROUND):
-        turned = np.eye(3)
-        turned[:2, :2] = rotation(turn).T
-        turned[:2, 2] = centre.place_px - turned[:2, :2] @ centre.place_px
-        poses.append(turned @ pose)
-    return poses
+    return [turned_about(centre.place_px, turn) @ pose for turn in np.arange(_ALL_ROUND, 2.0 * np.pi, _ALL_ROUND)]
 
 
 def _followers(match: OutlineMatch) -> int:

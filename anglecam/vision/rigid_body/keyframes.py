@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.clusters import group_neighbours
-from anglecam.vision.image.transforms import apply_motion, fit_rigid, inverse_motion, rotation, turn_of
+from anglecam.vision.image.transforms import apply_motion, fit_rigid, inverse_motion, turn_of, turned_about
 from anglecam.vision.rigid_body.feature_matching import MIN_POINTS, MIN_TURN, fit_body_motion
 
 POINT_GROUPS = 8
@@ -157,10 +157,7 @@ def repetition(keyframe: Keyframe, centre_px: Floats, share: float) -> float | N
     itself = replace(keyframe, corner=np.zeros(2), points=keyframe.points - keyframe.corner)
     centre, found = centre_px - keyframe.corner, []
     for turn in np.arange(_TRIED, 2.0 * np.pi - _TRIED / 2.0, _TRIED):
-        guess = np.eye(3)
-        guess[:2, :2] = rotation(turn).T
-        guess[:2, 2] = centre - guess[:2, :2] @ centre
-        match = match_keyframe(itself, keyframe.image, guess)
+        match = match_keyframe(itself, keyframe.image, turned_about(centre, turn))
         if match is not None and match.inlier.sum() >= share * len(keyframe.points):
             found.append(abs(turn_of(match.motion)))
     return min((turn for turn in found if turn > _SAME_TURN), default=None)

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
-from anglecam.vision.image.transforms import rotation
 
 _ANGLES = 720
 """Angles of a full turn that are compared."""
@@ -88,14 +87,6 @@ def learn_polar(reference: Image, background: Image, pivot_px: Floats) -> PolarR
     weight = area * (differs > _DIFFERS * np.quantile(differs, _LARGEST))
     thing, weighted = (np.conj(np.fft.rfft(part, axis=0)) for part in (weight, weight * seen))
     return PolarReference(pivot_px, behind, thing, weighted)
-
-
-def turned_about(pivot_px: Floats, turn: float) -> Floats:
-    """Return the motion (3, 3) that rotates about a point."""
-    motion = np.eye(3)
-    motion[:2, :2] = rotation(turn).T
-    motion[:2, 2] = pivot_px - motion[:2, :2] @ pivot_px
-    return motion
 
 
 def _unrolled(image: Image, pivot_px: Floats, radii: int) -> Image:
