@@ -15,7 +15,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMBA")}
 """Environment of a process whose libraries are to use one thread each."""
-_BEGUN = 2
+_BEGUN = 4
 """Pictures that a decoder begins beyond one for each core: it goes on while the thread that feeds it is busy."""
 _OPEN = 8
 """Pieces of work that wait at most: what they work on stays in memory."""

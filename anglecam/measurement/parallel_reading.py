@@ -29,9 +29,10 @@ from anglecam.video.film import Film
 from anglecam.video.film_parts import FilmParts, parts_of
 from anglecam.video.from_key import IrregularFilmError
 from anglecam.video.open_film import open_film
+from anglecam.video.row_cache import MOST_ROWS
 from anglecam.vision.mark.mark_search import WHOLE_EVERY
 
-FEWEST = 2048
+FEWEST = MOST_ROWS
 """Frames of a film from which on processes are started, which takes each of them one to two seconds."""
 PARTS_EACH = 4
 """Least number of parts for each process."""

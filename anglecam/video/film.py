@@ -2,7 +2,7 @@
 
 The frames are those that a player shows, as it shows them: upright, with square pixels, one instant each.
 
-The pictures of a short film are kept in a bounded memory from its first reading on (`anglecam.video.kept_rows`). A
+The pictures of a short film are kept in a bounded memory from its first reading on (`anglecam.video.film_rows`). A
 longer film is decoded again for every reading; evenly spaced pictures of it are kept.
 """
 

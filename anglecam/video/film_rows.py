@@ -2,6 +2,7 @@
 
 Measuring reads a film several times, and decoding a lossless picture takes as long as measuring in it. So the pictures
 of a short film are kept from its first reading on. Of a long film, what it shows is learnt from evenly spaced ones.
+Where all have to be decoded for that, they are kept as far as the free memory allows (`anglecam.video.row_cache`).
 """
 
 from __future__ import annotations
@@ -11,11 +12,10 @@ from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
-import av
-
 from anglecam.errors import InputError
 from anglecam.io.rig import RigFrames
 from anglecam.video.decode import Row, Wants
+from anglecam.video.row_cache import MOST_ROWS, RowCache, cache_room, picture_bytes
 
 MOST_BYTES = 256 * 2**20
 """Of decoded pictures: 220 lossless ones of 640 × 480 px, 580 of an ordinary codec."""
@@ -97,6 +97,7 @@ class FilmRows:
         self._times: list[float] | None = None
         self._undecodable = self._interlaced = self._count = 0
         self._kept: KeptRows | None = None
+        self._all: list[Row] | None = None
 
     @property
     def times(self) -> list[float]:
@@ -154,6 +155,8 @@ class FilmRows:
         """
         if self._kept is not None and self._kept.stride == 1:
             yield from (row for _, row in self._kept.rows)
+        elif self._all is not None:
+            yield from self._all
         elif self.is_read or wants is not None:
             yield from self._decoded(wants)
         else:
@@ -164,9 +167,16 @@ class FilmRows:
         self._times, self._undecodable, self._interlaced, self._count = times, 0, interlaced, len(times)
 
     def _read_once(self) -> None:
-        if not self.is_read:
-            for _ in self._read_all():
-                pass
+        """Read the film to learn from some of its pictures; keep all of them for what comes next."""
+        if self.is_read:
+            return
+        room = cache_room()
+        fits = self._declared <= MOST_ROWS and self._declared * self._bytes_each <= room
+        cache = RowCache(room if fits else 0)
+        for row in self._read_all():
+            cache.add(row)
+        if self._kept is not None and self._kept.stride > 1:
+            self._all = cache.rows
 
     def _read_all(self) -> Iterator[Row]:
         times: list[float] = []
@@ -250,8 +260,3 @@ def _keep(kept: KeptRows, rows: Iterator[Row], pictures_only: bool = False) -> t
             gap, last = max(gap, count - last), count
         count += 1
     return count, max(gap, count - last)
-
-
-def picture_bytes(picture: av.VideoFrame | None) -> int:
-    """Return the memory of a decoded picture."""
-    return 0 if picture is None else sum(plane.buffer_size for plane in picture.planes)

@@ -16,10 +16,10 @@ from anglecam.errors import InputError
 from anglecam.threads import native_threads
 from anglecam.video.container import open_container
 from anglecam.video.film import Film
-from anglecam.video.film_rows import picture_bytes
 from anglecam.video.frame_index import FrameIndex, index_frames
 from anglecam.video.from_key import IrregularFilmError, decode_from_key
 from anglecam.video.picture import Picture
+from anglecam.video.row_cache import picture_bytes
 
 _MOST_BYTES = 192 * 2**20
 """Of decoded pictures that are kept: 60 of 1920 × 1080 px, two seconds back."""

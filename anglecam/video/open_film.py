@@ -16,8 +16,9 @@ from anglecam.video.decode import INTRA_CODECS, Row, decode, decode_container, d
 from anglecam.video.display import Display, read_display
 from anglecam.video.fields import STILL_CODECS, is_bottom_first
 from anglecam.video.film import Film
-from anglecam.video.film_rows import FilmRows, picture_bytes
+from anglecam.video.film_rows import FilmRows
 from anglecam.video.images import decode_images
+from anglecam.video.row_cache import picture_bytes
 from anglecam.video.truncation import is_cut_short
 
 

@@ -17,6 +17,7 @@ import av
 import numpy as np
 
 from anglecam.errors import AnglecamError
+from anglecam.free_memory import free_memory
 from anglecam.threads import cores, native_threads
 from anglecam.workflow.self_test import FRAMES, self_test
 
@@ -108,7 +109,7 @@ def check_kernel_cache() -> Check:
 
 def check_memory() -> Check:
     """Check that enough memory is free."""
-    free = _free_memory()
+    free = free_memory()
     if free is None:
         return Check("memory", "unknown on this system", {"free_bytes": None})
     problem = f"memory: {_gib(free)} are free; a clip in full HD needs 0.7 GiB" if free < LEAST_MEMORY else None
@@ -165,20 +166,6 @@ def _can_write(folder: Path) -> bool:
             return True
     except OSError:
         return False
-
-
-def _free_memory() -> int | None:
-    """Return the memory that this process can still get, bytes: what the machine and the control group leave."""
-    left = []
-    meminfo = Path("/proc/meminfo")
-    if meminfo.exists():
-        lines = dict(line.split(":", 1) for line in meminfo.read_text().splitlines())
-        left.append(int(lines["MemAvailable"].split()[0]) * 1024)
-    group = Path("/sys/fs/cgroup")
-    limit, used = group / "memory.max", group / "memory.current"
-    if limit.exists() and used.exists() and (text := limit.read_text().strip()) != "max":
-        left.append(int(text) - int(used.read_text()))
-    return min(left, default=None)
 
 
 def _gib(size: int) -> str:

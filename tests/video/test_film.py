@@ -14,7 +14,7 @@ import pytest
 from anglecam.errors import InputError
 from anglecam.io.rig import RigFrames
 from anglecam.video import decode as decode_module
-from anglecam.video import film_rows
+from anglecam.video import film_rows, row_cache
 from anglecam.video import picture as picture_module
 from anglecam.video.display import Display
 from anglecam.video.film import Film
@@ -86,6 +86,28 @@ def test_a_long_film_is_decoded_at_every_reading_and_evenly_spaced_pictures_are_
         assert decoder.calls == calls
         in_memory = [picture() is not None for picture in decoder.pictures]
         assert in_memory == [k in (0, 2, 3, 5, 7, 9) for k in range(11)] + [False] * 11 * (calls - 1)  # row 3 has none
+
+
+@pytest.mark.parametrize(("room", "most", "calls"), [(11, 12, 1), (10, 12, 2), (11, 11, 2), (0, 12, 2)])
+def test_a_long_film_that_had_to_be_decoded_to_be_sampled_is_kept_as_far_as_memory_is_free(
+    decoder, monkeypatch, room, most, calls
+):
+    monkeypatch.setattr(film_rows, "MOST_BYTES", 10 * BYTES)
+    monkeypatch.setattr(film_rows, "_FEWEST", 4)
+    monkeypatch.setattr(film_rows, "cache_room", lambda: room * BYTES)  # there are eleven pictures in twelve rows
+    monkeypatch.setattr(row_cache, "MOST_ROWS", most)
+    film = new_film(decoder)
+    assert [frame.index for frame in film.sample(8).frames] == [0, 2, 4, 6, 8, 10]
+    assert [frame.index for frame in film.frames(only={1, 10})] == [1, 10]
+    assert decoder.calls == calls
+    frames = list(film.frames())
+    assert [frame.time for frame in frames] == pytest.approx([k / 30 for k in range(12)])
+    assert [frame.index for frame in frames if frame.image is None] == [3]
+    assert film.thinned() is not None
+    kept = [picture() is not None for picture in decoder.pictures[:11]]
+    assert all(kept) == (calls == 1)
+    del film, frames
+    assert all(picture() is None for picture in decoder.pictures)
 
 
 def test_a_long_film_is_thinned_to_the_frames_that_are_kept(decoder, monkeypatch):

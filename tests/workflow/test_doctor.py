@@ -47,7 +47,7 @@ def test_problems_are_one_line_each_and_status_1(result, monkeypatch, capsys):
     monkeypatch.setattr(doctor, "self_test", lambda: result)
     monkeypatch.setattr(doctor, "_decodes", lambda codec: codec != "h264")
     monkeypatch.setattr(doctor, "_can_write", lambda folder: False)
-    monkeypatch.setattr(doctor, "_free_memory", lambda: 2**28)
+    monkeypatch.setattr(doctor, "free_memory", lambda: 2**28)
     usage = namedtuple("usage", "free")
     monkeypatch.setattr(doctor.shutil, "disk_usage", lambda folder: usage(2**20))
     monkeypatch.setattr(sys, "argv", ["anglecam", "doctor"])
