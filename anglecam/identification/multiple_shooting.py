@@ -67,8 +67,8 @@ def drifts(plant_parameters: Floats, records: Sequence[Record]) -> bool:
 
 
 def loses_step(fit: Fit, records: Sequence[Record]) -> bool:
-    """Return whether a fitted model's free run is out of step with the measured angles."""
-    return fit.rmse > OUT_OF_STEP * rms_motion(records)
+    """Return whether a fitted model's free run is out of step with the measured angles, or runs away (no number)."""
+    return not fit.rmse <= OUT_OF_STEP * rms_motion(records)
 
 
 def rms_motion(records: Sequence[Record]) -> float:

@@ -157,7 +157,7 @@ def _p(p: float) -> str:
 def _degrees_filter(verdict: Verdict) -> Any:
     """Return what formats degrees with as many digits as the noise leaves meaning."""
     sigma = np.degrees(verdict.noise.sigma)
-    decimals = 4 if sigma == 0.0 else int(np.clip(1 - np.floor(np.log10(sigma)), 4, 6))
+    decimals = int(np.clip(1 - np.floor(np.log10(sigma)), 4, 6)) if sigma > 0.0 else 4
     return lambda value: f"{value:.{decimals}f}"
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -57,3 +59,10 @@ def test_a_wide_swing_with_which_a_linear_model_loses_step_is_fitted_through_win
     found = fit_output_error(SWING, [whole], [near.parameters])
     np.testing.assert_allclose(found.parameters, HANGING, atol=1e-3)
     assert not loses_step(found, [whole])
+
+
+def test_a_model_whose_free_run_runs_away_loses_step():
+    whole = record(SWING, HANGING, [-1.6, 0.0])
+    linear = fit_output_error(Plant(driven=False), [whole], [np.array([0.1, 52.0])])
+    (residual,) = linear.residuals
+    assert loses_step(replace(linear, residuals=(np.full_like(residual, np.nan),)), [whole])
