@@ -7,7 +7,9 @@ import pytest
 
 from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.loop.cross_validation import Prediction
+from anglecam.loop.free_form.penalised import smoothing
 from anglecam.loop.free_form.result import find_free_form
+from anglecam.loop.free_form.search import RATIOS
 from anglecam.loop.verdict_json import free_form_as_dict
 from anglecam.models.plant import Plant
 from anglecam.report.free_form_figure import free_form_figures
@@ -39,6 +41,18 @@ def test_a_cause_outside_the_ledger_is_found_over_what_it_depends_on(name):
     assert all(row["sigma"] > 0.0 for row in written["curve"])
     assert [figure[:4] for figure in free_form_figures(found)] == ["<svg"] * len(CAUSES[name].over)
     assert "lacks a torque that depends on the " in free_form_sentence(found, held_out=True, stretches=False)
+
+
+def test_a_curve_so_smooth_that_rounding_hides_the_data_is_not_tried():
+    # a curve over two quantities, at one of whose 81 nodes alone there are data
+    bending = np.diff(np.eye(9), 2, axis=0)
+    along = bending.T @ bending
+    response = np.zeros((100, 81))
+    response[:, 40] = np.random.default_rng(0).normal(size=100)
+    roughness = [np.kron(along, np.eye(9)), np.kron(np.eye(9), along)]
+    smoothness = smoothing(response, response[:, 40], roughness, 100, RATIOS)
+    assert all(np.isfinite(smoothness))
+    assert min(smoothness) > 0.0
 
 
 def test_nothing_is_found_where_nothing_is_missing():

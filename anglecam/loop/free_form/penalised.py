@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from anglecam.data.typing import Floats
 
@@ -59,7 +59,10 @@ def smoothing(
         penalty = np.sum([size * one for size, one in zip(sizes, roughness, strict=True)], axis=0)
         bent = float(np.sum(np.log(np.linalg.eigvalsh(penalty)[len(gram) - rank :])))
         for decade in np.arange(ROUGHEST, SMOOTHEST, 1.0 / PER_DECADE):
-            factor = cho_factor(gram + 10.0**decade * penalty, lower=True)
+            try:
+                factor = cho_factor(gram + 10.0**decade * penalty, lower=True)
+            except LinAlgError:  # so smooth that rounding hides what the data say
+                break
             remaining = max(energy - float(along @ cho_solve(factor, along)), 1e-12 * energy)
             both = 2.0 * float(np.sum(np.log(np.diag(factor[0]))))
             criterion = (free - len(gram) + rank) * np.log(remaining) + both - bent - rank * decade * np.log(10.0)
