@@ -41,16 +41,7 @@ EFFECT = Effect(
     equation="tan(y − α) = tan(λ − α)·cos φ − h·sin φ/cos(λ − α)",
     relaxes="Fig. 7: the camera is square to the plane of motion",
     parameters=(
-        Parameter(
-            "tilt_deg",
-            "φ",
-            null=0.0,
-            lower=0.0,
-            upper=0.9,
-            starts=(0.1, 0.3),
-            to_file=math.degrees(1.0),
-            geometric=True,
-        ),
+        Parameter("tilt_deg", "φ", null=0.0, lower=0.0, upper=0.9, starts=(0.1, 0.3), to_file=math.degrees(1.0)),
         Parameter("axis_deg", "α", 0.0, -math.pi, math.pi, (0.8, 1.6, 2.4), math.degrees(1.0)),
         Parameter("mark_before_plane_in_levers", "h", 0.0, -2.0, 2.0, (0.8, -0.8)),
     ),

@@ -76,9 +76,6 @@ class Parameter:
     """Whether it moves the body as a wrong zero of the angle does, so that it is determined only if zero is known."""
     is_speed: bool = False
     """Whether it is a speed of the body, which much slower recordings cannot determine."""
-    geometric: bool = False
-    """Whether geometry sets its bounds, as a camera seldom stands more than 50° aslant; they then limit the size
-    whatever the recordings show."""
     unlimited: bool = False
     """Whether the effect remains what it is however large this size, as a rigid stop is a stop; recordings then need
     not limit it from above."""

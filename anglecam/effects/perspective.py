@@ -67,7 +67,7 @@ EFFECT = Effect(
     equation="seen = (P + m⊥(φ, α))/(1 − κ·m∥) − (P + h·n⊥)/(1 − κ·h·n∥), y = ∠seen",
     relaxes="Fig. 7: the camera is square to the plane of motion and far away",
     parameters=(
-        Parameter("yaw_deg", "φ", 0.0, 0.0, 0.9, to_file=math.degrees(1.0), geometric=True),
+        Parameter("yaw_deg", "φ", 0.0, 0.0, 0.9, to_file=math.degrees(1.0)),
         Parameter("yaw_axis_deg", "α", 0.0, -math.pi, math.pi, to_file=math.degrees(1.0)),
         Parameter("distance_in_levers", "κ", 0.0, 0.0, 0.8, inverse=True),
         Parameter("mark_depth_in_levers", "h", 0.0, -1.0, 1.0),

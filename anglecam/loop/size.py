@@ -41,8 +41,8 @@ def sizes_determined(fit: Fit, records: Sequence[Record], policy: Policy = DEFAU
     Returns
     -------
     bool
-        False if a size is at a bound, changes no prediction or has no upper limit; geometry is a limit, and
-        the stiffness of a stop needs none.
+        False if a size is at a bound, changes no prediction or has no upper limit; the stiffness of a stop needs
+        none.
     """
     return all(_determined(fit, effect, records, policy) for effect in effects_of(fit))
 
@@ -55,7 +55,7 @@ def _determined(fit: Fit, effect: Effect, records: Sequence[Record], policy: Pol
         return bool(size != 0.0)
     if not np.isfinite(sigma):
         return False
-    if first.geometric or abs(size) > policy.candidates.linear_size_sigmas * sigma:
+    if abs(size) > policy.candidates.linear_size_sigmas * sigma:
         return True
     farther = float(np.clip(first.null + FARTHER * size, first.lower, first.upper))
     fixed = effect.with_fixed({first.name: farther})

@@ -21,7 +21,7 @@ TRUTHS = {
     "periodic_disturbance": {"amplitude": 1.45, "frequency_hz": 1.46, "phase": 3.3},
     "time_varying_parameter": {"share": -2.4, "time_s": 58.7},
     "command_curve": {"p_per_rad": -0.129, "q_per_rad2": -0.172},
-    "perspective": {"yaw_deg": 40.0, "axis_deg": 3.0},
+    "perspective": {"yaw_deg": 17.7, "axis_deg": 149.0},
 }
 """Sizes that leave a residual of about twice the noise."""
 FEW = ("stairs", "release", "random")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from anglecam.effects import effect
@@ -29,6 +31,13 @@ def test_the_size_of_what_never_acts_is_not_determined():
     # a spring that acts below an angle which the motion does not reach
     spring, records = fit("one_sided_spring", [-50.0, -1.5], TruePlant())
     assert not sizes_determined(spring, records)
+
+
+def test_a_tilt_of_which_the_motion_shows_little_more_than_the_scale_is_not_determined():
+    rng = np.random.default_rng(0)
+    records = [replace(r, angle=r.angle + rng.normal(0.0, 0.02, len(r.angle))) for r in session(TruePlant(), 0)[:3]]
+    tilt = fit_output_error(Plant((effect("camera_tilt"),)), records, [np.array([26.0, 524.0, 508.0, 0.3, 0.8, 0.8])])
+    assert not sizes_determined(tilt, records)
 
 
 def test_a_stop_too_stiff_to_be_measured_is_a_stop_and_no_spring():
