@@ -134,7 +134,7 @@ def hold_camera(film: Film) -> HeldCamera:
     if not followed:
         how = "from one place with fixed focus and zoom, or so that a desk or a wall with edges fills the picture"
         return HeldCamera(film, steady, f"{film.path}: {why}; film {how}")
-    own = {field.name: getattr(film, field.name) for field in fields(film)}
+    own = {field.name: getattr(film, field.name) for field in fields(film) if field.init}
     return HeldCamera(FilmAtRest(**own, moves=moves, first=images[0]))
 
 

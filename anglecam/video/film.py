@@ -73,8 +73,9 @@ class Film:
     bottom_first: bool | None = None
     """Whether the second line of an interlaced picture belongs to its first field; ``None`` where all lines of a
     picture are of one instant, as in photographs."""
-    _samples: dict[int, Sample] = field(default_factory=dict, repr=False)
-    """By the upper limit of their frames: several stages look at the same ones."""
+    _samples: dict[int, Sample] = field(default_factory=dict, init=False, repr=False)
+    """By the upper limit of their frames: several stages look at the same ones. A film that is made from another one
+    has samples of its own, because it shows other pictures."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -196,7 +197,7 @@ class Film:
         if kept.stride == 1:
             return None
         rows = [row for _, row in kept.rows]
-        return replace(self, rows=FilmRows(self.path, lambda wants: iter(rows)), _samples={})
+        return replace(self, rows=FilmRows(self.path, lambda wants: iter(rows)))
 
     def why_truncated(self, sample: Sample) -> str | None:
         """Return how much could be read of a file that ends too early, ``None`` for a complete one."""

@@ -7,7 +7,9 @@ import pytest
 
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig, RigMark, RigPivot
+from anglecam.measurement.camera_pass import FilmAtRest, hold_camera
 from anglecam.measurement.clip import measure_clip
+from anglecam.measurement.detections import frames_to_keep
 from anglecam.video.open_film import open_film
 from support import things
 
@@ -73,6 +75,17 @@ def test_a_clip_from_the_hand_is_measured_as_seen_from_its_first_place(swinging)
     assert np.sqrt(((error / np.degrees(series.sigma[series.ok])) ** 2).mean()) < 1.5
     expected = cv2.perspectiveTransform(np.array([[PIVOT]]), MOVES[60])[0, 0]
     assert np.hypot(*(series.pivot_px[60] - expected)) < 1.0
+
+
+def test_the_samples_of_a_clip_from_the_hand_are_at_rest_as_its_frames_are(swinging):
+    film = open_film(swinging)
+    most = frames_to_keep(film)
+    film.sample(most)  # as filmed: the camera's motion is found in these
+    held = hold_camera(film).film
+    frames = {frame.index: frame.image for frame in held.frames()}
+    assert isinstance(held, FilmAtRest)
+    for sampled in held.sample(most).frames:
+        np.testing.assert_array_equal(sampled.image, frames[sampled.index])
 
 
 def test_a_camera_that_comes_nearer_to_a_still_desk_turns_nothing(tmp_path):

@@ -108,6 +108,7 @@ def test_in_the_hand_a_horn_is_measured_about_its_pivot(tmp_path):
     measured = measure_clip(open_film(_film(tmp_path / "clip.mkv", TURNS, moves=moves)), NEAR)
     series = measured.series
     assert any("camera moves" in note for note in measured.notes)
+    assert measured.by == "layer"  # the horn is learnt from samples that are at rest too
     assert series.ok.mean() > 0.9
     error = _error(series, TURNS)
     assert np.sqrt((error**2).mean()) < 0.5
