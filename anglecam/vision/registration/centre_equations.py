@@ -216,12 +216,3 @@ def disagreement_of_groups(covariance: Floats, scores: Floats, groups: NDArray[n
     freedom = max(len(names) - 2, 1)
     variance = float((influence**2).sum()) * len(names) / max(freedom - 2, 1)
     return variance / float(np.trace(acting @ covariance @ acting.T))
-
-
-def excess_displacement(normal: Floats, gradient: Floats) -> float:
-    """Return the mean square of the displacement that a body on a fixed pivot cannot have, in units of its noise."""
-    seen = normal[:, 0, 0] > NO_INFORMATION
-    normal, gradient = normal[seen], gradient[seen]
-    place = normal[:, 1:3, 1:3] - normal[:, 1:3, :1] * normal[:, :1, 1:3] / normal[:, :1, :1]
-    shift = gradient[:, 1:3] - normal[:, 1:3, 0] * (gradient[:, :1] / normal[:, :1, 0])
-    return float(np.einsum("ni,nij,nj->n", shift, np.linalg.pinv(place, hermitian=True), shift).mean() / 2.0)

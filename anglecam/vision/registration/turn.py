@@ -73,6 +73,9 @@ class BodyAppearance:
     """(tiles,) group of neighbours to which each tile belongs."""
     birge: float
     """Birge ratio: scatter between groups over that expected from the pixels' noise; at least 1."""
+    wander_px: float
+    """Standard deviation of a frame's pivot along each axis, px, where the camera is taken to be at rest; 0 where it
+    is, too."""
     absorbed_share: float
     """Share of an error of the angles, proportional to the angle itself, that the appearance would absorb. It is well
     below 1 where the body was seen in many poses between its extremes."""
@@ -296,8 +299,11 @@ def _step(body: BodyAppearance, view: FrameView, turn: float, middles_px: Floats
         return None
     normal, gradient = normals.sum(axis=0), gradients.sum(axis=0)
     noise_share = 1.0
-    if view.pivot_covariance_px2 is not None:
-        normal, gradient, noise_share = _eliminate_pivot(normal, gradient, view.pivot_covariance_px2)
+    covariance = view.pivot_covariance_px2
+    if covariance is None and body.wander_px > 0.0:
+        covariance = body.wander_px**2 * np.eye(2)
+    if covariance is not None:
+        normal, gradient, noise_share = _eliminate_pivot(normal, gradient, covariance)
     if not normal[0, 0] > 0.0:  # the body has left the picture
         return None
     step = float(gradient[0] / normal[0, 0])
