@@ -109,7 +109,8 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
         return otherwise
     if not declared and not seen_to_turn and not shows_its_centre(detections.circle):
         return (
-            f"the mark's path is too short or too straight to show about which point it turns; declare it: {_DECLARE}"
+            "the mark's path is too short or too straight to show about which point it turns; hint at it: pivot: {near:"
+            f" [x, y]}}, or declare it: {_DECLARE}"
         )
     return None
 
