@@ -72,12 +72,13 @@ def cover(
     light : ndarray
         (rows, width, 3), written at `places`.
     """
-    xs, ys = np.empty((_PIECES, _CORNERS)), np.empty((_PIECES, _CORNERS))
+    # one corner more than fits: `_cut` writes before it knows whether a corner stays
+    xs, ys = np.empty((_PIECES, _CORNERS + 1)), np.empty((_PIECES, _CORNERS + 1))
     sizes, owners, farthest = np.empty(_PIECES, np.int64), np.empty(_PIECES, np.int64), np.empty(_PIECES)
     longest = 0
     for slot in range(len(places)):
         longest = max(longest, starts[slot + 1] - starts[slot])
-    lines, sides, spare = np.empty((longest, 4, 3)), np.empty(longest, np.int64), np.empty((3, _CORNERS))
+    lines, sides, spare = np.empty((longest, 4, 3)), np.empty(longest, np.int64), np.empty((3, _CORNERS + 1))
     for slot in range(len(places)):
         x, y = float(places[slot, 1]), float(places[slot, 0] + first)
         begin, end = starts[slot], starts[slot + 1]
@@ -142,7 +143,7 @@ def _sort(begin: int, end: int, listed: Ints, depths: Floats) -> None:
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _cutting(p: int, lines: Floats, at: int, sides: int, xs: Floats, ys: Floats, size: int) -> int:
     """Return which of a triangle's sides cut piece p, one bit each; below zero if one separates the two."""
-    cutting = 0
+    cutting, apart = 0, False
     for e in range(sides):
         a, b, c = lines[at, e, 0], lines[at, e, 1], lines[at, e, 2]
         margin = _ON_LINE * (abs(a) + abs(b))
@@ -151,10 +152,9 @@ def _cutting(p: int, lines: Floats, at: int, sides: int, xs: Floats, ys: Floats,
             distance = a * xs[p, i] + b * ys[p, i] + c
             within += distance > margin
             without += distance < -margin
-        if within == 0:
-            return _APART
+        apart |= within == 0
         cutting |= (without > 0) << e
-    return cutting
+    return _APART if apart else cutting
 
 
 @njit(cache=True, error_model="numpy", forceinline=True)
@@ -210,19 +210,18 @@ def _cut(
         j = i + 1 if i + 1 < size else 0
         here, there = spare[2, i], spare[2, j]
         x, y = xs[p, i], ys[p, i]
-        if here >= -margin:
-            spare[0, within], spare[1, within] = x, y
-            within += 1
-        if here <= margin:
-            xs[new, without], ys[new, without] = x, y
-            without += 1
-        if (here > margin and there < -margin) or (here < -margin and there > margin):
-            share = here / (here - there)
-            x, y = x + share * (xs[p, j] - x), y + share * (ys[p, j] - y)
-            spare[0, within], spare[1, within] = x, y
-            xs[new, without], ys[new, without] = x, y
-            within += 1
-            without += 1
+        # every corner is written to both pieces, and kept where it belongs: branches would take longer
+        spare[0, within], spare[1, within] = x, y
+        within += here >= -margin
+        xs[new, without], ys[new, without] = x, y
+        without += here <= margin
+        crossed = ((here > margin) & (there < -margin)) | ((here < -margin) & (there > margin))
+        share = here / (here - there)
+        x, y = x + share * (xs[p, j] - x), y + share * (ys[p, j] - y)
+        spare[0, within], spare[1, within] = x, y
+        within += crossed
+        xs[new, without], ys[new, without] = x, y
+        without += crossed
     for i in range(within):
         xs[p, i], ys[p, i] = spare[0, i], spare[1, i]
     return within, without

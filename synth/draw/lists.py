@@ -72,7 +72,7 @@ def gather(seen: Ints, shapes: Floats, places: Ints, before: Ints, first: int) -
         greater first.
     """
     rows, width = before.shape[0], before.shape[1] - 1
-    found, bounds = np.empty((8 * len(places) + 64, 2), np.int32), np.empty((8 * len(places) + 64, 2))
+    found = np.empty((8 * len(places) + 64, 2), np.int32)
     starts, count = np.zeros(len(places) + 1, np.int32), 0
     # most triangles are far from every such pixel, as a coarser picture shows
     blocks = np.zeros(((rows >> _BLOCK) + 1, (width >> _BLOCK) + 1), np.bool_)
@@ -94,12 +94,10 @@ def gather(seen: Ints, shapes: Floats, places: Ints, before: Ints, first: int) -
         a0, b0, c0 = _side(xa, ya, xb, yb)
         a1, b1, c1 = _side(xb, yb, xc, yc)
         a2, b2, c2 = _side(xc, yc, xa, ya)
-        gx, gy, q0, nearest, farthest = shapes[t, 6], shapes[t, 7], shapes[t, 8], shapes[t, 9], shapes[t, 10]
-        reach = 0.5 * (abs(gx) + abs(gy))
         for row in range(top, bottom + 1):
             begin, end = before[row, left], before[row, right + 1]
             if count + end - begin > len(found):
-                found, bounds = np.concatenate((found, found)), np.concatenate((bounds, bounds))
+                found = np.concatenate((found, found))
             y = row + first
             for slot in range(begin, end):
                 # written for every pixel, and kept if the triangle reaches into it: a branch would take longer
@@ -107,8 +105,6 @@ def gather(seen: Ints, shapes: Floats, places: Ints, before: Ints, first: int) -
                 inside = a0 * x + b0 * y + c0 > 0.0
                 inside &= a1 * x + b1 * y + c1 > 0.0
                 inside &= a2 * x + b2 * y + c2 > 0.0
-                middle = gx * x + gy * y + q0
-                bounds[count, 0], bounds[count, 1] = min(middle + reach, nearest), max(middle - reach, farthest)
                 found[count, 0], found[count, 1] = slot, t
                 starts[slot + 1] += inside
                 count += inside
@@ -116,9 +112,14 @@ def gather(seen: Ints, shapes: Floats, places: Ints, before: Ints, first: int) -
         starts[slot + 1] += starts[slot]
     listed, depths, ends = np.empty(count, np.int32), np.empty((count, 2)), starts[:-1].copy()
     for n in range(count):
-        at = ends[found[n, 0]]
-        listed[at], depths[at, 0], depths[at, 1] = found[n, 1], bounds[n, 0], bounds[n, 1]
-        ends[found[n, 0]] += 1
+        slot, t = found[n, 0], found[n, 1]
+        gx, gy = shapes[t, 6], shapes[t, 7]
+        middle = gx * places[slot, 1] + gy * (places[slot, 0] + first) + shapes[t, 8]
+        reach = 0.5 * (abs(gx) + abs(gy))
+        at = ends[slot]
+        listed[at] = t
+        depths[at, 0], depths[at, 1] = min(middle + reach, shapes[t, 9]), max(middle - reach, shapes[t, 10])
+        ends[slot] += 1
     return starts, listed, depths
 
 

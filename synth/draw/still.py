@@ -73,5 +73,6 @@ def restore(spans: Ints, drawn: Ints, at: Floats, nearest: Ints, depths: Floats)
         (height, width), written there.
     """
     for row in range(len(spans)):
-        for x in range(spans[row, 0], spans[row, 1]):
-            nearest[row, x], depths[row, x] = drawn[row, x], at[row, x]
+        begin, end = spans[row, 0], spans[row, 1]
+        nearest[row, begin:end] = drawn[row, begin:end]
+        depths[row, begin:end] = at[row, begin:end]
