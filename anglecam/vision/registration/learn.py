@@ -98,15 +98,21 @@ def learn_body(
         if have_own_centres(*end, last.state.turns, arms, deep.axis.parallax):
             tiles = choose_tiles(stack, deep, pivot.centre_px, noise)
             if len(tiles.corners) >= _FEWEST_TILES:
-                plane, (data, last) = deep, _learn(frames, tiles, deep, pivot)
+                plane, (data, last) = deep, _learn(frames, tiles, deep, pivot, last.state)
                 end = _at_the_end(data, last)
     if not _is_seen(end):
         return None
     return _body(data, last, end, plane, moving=frames[0].pivot_covariance_px2 is not None)
 
 
-def _learn(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot: PivotEstimate) -> tuple[Data, Round]:
-    """Learn with the unknowns that the view of the axis leaves free."""
+def _learn(
+    frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot: PivotEstimate, flat: State | None = None
+) -> tuple[Data, Round]:
+    """Learn with the unknowns that the view of the axis leaves free, from the state of a flat body if there is one.
+
+    Heights that grow with the distance from the pivot look nearly like another scale of the angles together with
+    another pivot. They would keep an error of the mark's pivot, which a flat body does not.
+    """
     start = pivot.centre_px
     prior = np.eye(3)
     prior[PIVOT, PIVOT] = np.linalg.inv(pivot.covariance_px2)
@@ -114,7 +120,12 @@ def _learn(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot:
         prior[DIRECTION, DIRECTION] = plane.axis.direction_sigma**-2
     views = collect_tiles(tiles.corners, tiles.heights, frames, plane, start)
     data = Data(tiles, views, start, plane.axis, prior)
-    return data, alternate(data, _first_state(frames, tiles, plane, start))
+    first = _first_state(frames, tiles, plane, start)
+    if flat is not None:
+        values = first.centres.values.copy()
+        values[PIVOT] = flat.centres.pivot
+        first = replace(first, centres=Centres(values), turns=flat.turns)
+    return data, alternate(data, first)
 
 
 def _first_state(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, start_px: Floats) -> State:
