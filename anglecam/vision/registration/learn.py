@@ -20,7 +20,6 @@ import numpy as np
 from anglecam.data.typing import Floats
 from anglecam.vision.image.clusters import group_neighbours
 from anglecam.vision.pivot.estimate import PivotEstimate
-from anglecam.vision.registration.acceleration import MAX_RATIO
 from anglecam.vision.registration.alternation import Data, Round, State, alternate, compare_all, one_round
 from anglecam.vision.registration.appearance import join_tiles
 from anglecam.vision.registration.axis_view import axis_in_perspective
@@ -153,8 +152,10 @@ def _body(data: Data, last: Round, end: tuple[Floats, Floats], plane: MotionPlan
     """Return the body of the last round with its uncertainties."""
     normal, gradient = end
     absorbed_of_turns = _absorbed_of_turns(data, last)
-    absorbed = float(np.clip(max(absorbed_of_turns, _absorbed_of_pivot(data, last)), 0.0, MAX_RATIO))
-    state, covariance = last.state, last.covariance / (1.0 - absorbed)
+    absorbed = float(np.clip(max(absorbed_of_turns, _absorbed_of_pivot(data, last)), 0.0, 1.0))
+    state = last.state
+    # what the appearance absorbs is no information; where it absorbs all, the centre is known as it was before
+    covariance = np.linalg.inv((1.0 - absorbed) * np.linalg.inv(last.covariance) + absorbed * data.prior_in(state))
     corners = data.tiles.corners
     groups = group_neighbours(corners, _GROUPS)
     total, freedom = group_scatter(normal, gradient, groups)
