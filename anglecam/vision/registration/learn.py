@@ -155,7 +155,8 @@ def _body(data: Data, last: Round, end: tuple[Floats, Floats], plane: MotionPlan
     absorbed = float(np.clip(max(absorbed_of_turns, _absorbed_of_pivot(data, last)), 0.0, 1.0))
     state = last.state
     # what the appearance absorbs is no information; where it absorbs all, the centre is known as it was before
-    covariance = np.linalg.inv((1.0 - absorbed) * np.linalg.inv(last.covariance) + absorbed * data.prior_in(state))
+    information = (1.0 - absorbed) * np.linalg.inv(last.covariance) + absorbed * data.prior_in(state)
+    covariance = np.asarray(np.linalg.inv(information), dtype=float)
     corners = data.tiles.corners
     groups = group_neighbours(corners, _GROUPS)
     total, freedom = group_scatter(normal, gradient, groups)
