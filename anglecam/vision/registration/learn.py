@@ -20,7 +20,6 @@ import numpy as np
 from anglecam.data.typing import Floats
 from anglecam.vision.image.clusters import group_neighbours
 from anglecam.vision.pivot.estimate import PivotEstimate
-from anglecam.vision.registration.acceleration import MAX_RATIO
 from anglecam.vision.registration.alternation import Data, Round, State, alternate, compare_all, one_round
 from anglecam.vision.registration.appearance import join_tiles
 from anglecam.vision.registration.axis_view import axis_in_perspective
@@ -98,15 +97,21 @@ def learn_body(
         if have_own_centres(*end, last.state.turns, arms, deep.axis.parallax):
             tiles = choose_tiles(stack, deep, pivot.centre_px, noise)
             if len(tiles.corners) >= _FEWEST_TILES:
-                plane, (data, last) = deep, _learn(frames, tiles, deep, pivot)
+                plane, (data, last) = deep, _learn(frames, tiles, deep, pivot, last.state)
                 end = _at_the_end(data, last)
     if not _is_seen(end):
         return None
     return _body(data, last, end, plane, moving=frames[0].pivot_covariance_px2 is not None)
 
 
-def _learn(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot: PivotEstimate) -> tuple[Data, Round]:
-    """Learn with the unknowns that the view of the axis leaves free."""
+def _learn(
+    frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot: PivotEstimate, flat: State | None = None
+) -> tuple[Data, Round]:
+    """Learn with the unknowns that the view of the axis leaves free, from the state of a flat body if there is one.
+
+    Heights that grow with the distance from the pivot look nearly like another scale of the angles together with
+    another pivot. They would keep an error of the mark's pivot, which a flat body does not.
+    """
     start = pivot.centre_px
     prior = np.eye(3)
     prior[PIVOT, PIVOT] = np.linalg.inv(pivot.covariance_px2)
@@ -114,7 +119,12 @@ def _learn(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot:
         prior[DIRECTION, DIRECTION] = plane.axis.direction_sigma**-2
     views = collect_tiles(tiles.corners, tiles.heights, frames, plane, start)
     data = Data(tiles, views, start, plane.axis, prior)
-    return data, alternate(data, _first_state(frames, tiles, plane, start))
+    first = _first_state(frames, tiles, plane, start)
+    if flat is not None:
+        values = first.centres.values.copy()
+        values[PIVOT] = flat.centres.pivot
+        first = replace(first, centres=Centres(values), turns=flat.turns)
+    return data, alternate(data, first)
 
 
 def _first_state(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, start_px: Floats) -> State:
@@ -142,8 +152,11 @@ def _body(data: Data, last: Round, end: tuple[Floats, Floats], plane: MotionPlan
     """Return the body of the last round with its uncertainties."""
     normal, gradient = end
     absorbed_of_turns = _absorbed_of_turns(data, last)
-    absorbed = float(np.clip(max(absorbed_of_turns, _absorbed_of_pivot(data, last)), 0.0, MAX_RATIO))
-    state, covariance = last.state, last.covariance / (1.0 - absorbed)
+    absorbed = float(np.clip(max(absorbed_of_turns, _absorbed_of_pivot(data, last)), 0.0, 1.0))
+    state = last.state
+    # what the appearance absorbs is no information; where it absorbs all, the centre is known as it was before
+    information = (1.0 - absorbed) * np.linalg.inv(last.covariance) + absorbed * data.prior_in(state)
+    covariance = np.asarray(np.linalg.inv(information), dtype=float)
     corners = data.tiles.corners
     groups = group_neighbours(corners, _GROUPS)
     total, freedom = group_scatter(normal, gradient, groups)

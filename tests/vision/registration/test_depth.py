@@ -5,6 +5,8 @@ import pytest
 
 from anglecam.camera.lens import Lens
 from anglecam.vision.pivot.estimate import PivotEstimate
+from anglecam.vision.registration import learn
+from anglecam.vision.registration.alternation import alternate
 from anglecam.vision.registration.learn import learn_body
 from anglecam.vision.registration.tiles import FrameView, motion_plane
 from anglecam.vision.registration.turn import find_turn
@@ -87,3 +89,27 @@ def test_halves_at_different_depths_turn_about_centres_of_their_own(seed):
     np.testing.assert_allclose(np.median(centres[right], axis=0) - np.median(centres[~right], axis=0), apart, atol=0.1)
     assert np.sqrt(np.mean(error**2)) < MOST_DEG
     assert COVERED[0] < np.sqrt(np.mean((error / sigma) ** 2)) < COVERED[1]
+
+
+def test_a_body_with_depth_is_learnt_from_the_state_of_the_flat_one(monkeypatch):
+    # else its heights keep the error of the mark's pivot
+    began, ended = [], []
+
+    def alternated(data, state):
+        began.append(state)
+        ended.append(alternate(data, state))
+        return ended[-1]
+
+    monkeypatch.setattr(learn, "alternate", alternated)
+    monkeypatch.setattr(learn, "have_own_centres", lambda *evidence: True)
+    measure(np.zeros(2), 1)
+    np.testing.assert_array_equal(began[1].turns, ended[0].state.turns)
+    np.testing.assert_array_equal(began[1].centres.pivot, ended[0].state.centres.pivot)
+
+
+def test_a_body_whose_appearance_absorbs_its_pivot_is_no_surer_of_it_than_the_mark(monkeypatch):
+    monkeypatch.setattr(learn, "_absorbed_of_pivot", lambda *state: 1.1)
+    body, _, _ = measure(np.zeros(2), 1)
+    assert (
+        np.linalg.eigvalsh(body.centre_covariance_px2)[0] > 0.999
+    )  # px²: the mark's pivot has 1 px² in each direction
