@@ -80,14 +80,19 @@ def unfinished(out: Path) -> list[str]:
 
 def children(pid: int) -> list[int]:
     """Return the ids of the processes that a process has started."""
-    listed = Path(f"/proc/{pid}/task")
-    return [int(c) for task in listed.iterdir() for c in (task / "children").read_text().split()]
+    threads = Path(f"/proc/{pid}/task").iterdir()
+    return [int(child) for thread in threads for child in _text_of(thread / "children").split()]
 
 
 def command_line(pid: int) -> str:
     """Return a process's command line; an empty string if the process is gone."""
+    return _text_of(Path(f"/proc/{pid}/cmdline"))
+
+
+def _text_of(path: Path) -> str:
+    """Return the text of a file about a process or a thread; an empty string if that has ended."""
     try:
-        return Path(f"/proc/{pid}/cmdline").read_text()
+        return path.read_text()
     except (ProcessLookupError, FileNotFoundError):
         return ""
 
