@@ -2,9 +2,9 @@
 
     .venv/bin/python benchmarks/filming.py
 
-Films the demo's stairs at 640 × 480 and 1280 × 720, without and with motion blur, and its chirp to 5 Hz at 640 × 480
-with motion blur, with one worker per core. Also prints the time of one drawing, of the sensor and of the codec on one
-core.
+Films stairs by the demo's rig at 640 × 480 and 1280 × 720, without and with motion blur, and a chirp to 5 Hz at
+640 × 480 with motion blur, with one worker per core. Also prints the time of one drawing, of the sensor and of the
+codec on one core.
 """
 
 from __future__ import annotations
@@ -27,7 +27,14 @@ DEMO = Path(__file__).parents[1] / "configs" / "demo.yaml"
 WARM_UP = 48
 """Frames that are not timed, while the workers start and load."""
 STAIRS, CHIRP = 0, 1
-"""Recordings of the demo."""
+RECORDINGS = (
+    {"name": "stairs", "duration_s": 6.0, "command": {"kind": "stairs", "levels_deg": [15, 0, -12, 6, 18, 0]}},
+    {
+        "name": "chirp",
+        "duration_s": 7.0,
+        "command": {"kind": "chirp", "amplitude_deg": 9, "from_hz": 0.3, "to_hz": 5.0},
+    },
+)
 FILMS = (
     ((640, 480), 0.0, STAIRS),
     ((640, 480), 0.01, STAIRS),
@@ -41,6 +48,8 @@ FILMS = (
 def variant(size: tuple[int, int], exposure_s: float) -> Spec:
     demo = read_spec(DEMO).model_dump()
     demo["camera"] |= {"size": size, "exposure_s": exposure_s}
+    demo["recordings"] = [dict(recording) for recording in RECORDINGS]
+    demo["declare"]["held_out"] = []
     demo["rig"] |= {"lever_px": size[1] / 2.4, "pivot_px": (size[0] * 0.375, size[1] * 0.625)}
     return Spec.model_validate(demo)
 
