@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from dataclasses import replace
 from html import unescape
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from anglecam.loop.close import close_records
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.verdict import Accepted
 from anglecam.loop.verdict_json import next_experiment, verdict_as_dict, write_next_command
+from anglecam.report import page
 from anglecam.report.page import p_in_words, validation_in_words, write_report
 from anglecam.report.session_tables import model_table
 from anglecam.report.wording import sentence
@@ -192,3 +194,9 @@ def test_a_parameters_name_is_split_from_its_unit(name, parted):
 )
 def test_a_p_value_is_stated_as_a_number_of_sessions(p, words):
     assert p_in_words(p) == words
+
+
+@pytest.mark.parametrize(("sigma_deg", "text"), [(np.nan, "1.2346"), (0.0, "1.2346"), (0.0002, "1.23457")])
+def test_degrees_have_the_digits_that_the_noise_leaves_meaning(sigma_deg, text):
+    verdict = SimpleNamespace(noise=SimpleNamespace(sigma=np.radians(sigma_deg)))
+    assert page._degrees_filter(verdict)(1.2345678) == text

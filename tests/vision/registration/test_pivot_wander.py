@@ -16,10 +16,10 @@ FRAMES, BIRGE2 = 100, 4.0
 FINER, SHAKE_PX = 4, 0.2
 
 
-def equations(wander_px: float, seed: int):
+def equations(wander_px: float, seed: int, seen: float = 10.0):
     """Draw normal matrices and scores of frames whose place is displaced and whose scores are noisy."""
     rng = np.random.default_rng(seed)
-    roots = rng.normal(size=(FRAMES, 3, 8)) * np.array([300.0, 10.0, 10.0])[:, None]
+    roots = rng.normal(size=(FRAMES, 3, 8)) * np.array([300.0, seen, seen])[:, None]
     normal = roots @ roots.transpose(0, 2, 1)
     off = np.column_stack([rng.normal(0.0, 1e-3, FRAMES), rng.normal(0.0, wander_px, (FRAMES, 2))])
     noise = np.sqrt(BIRGE2) * np.einsum("nij,nj->ni", roots, rng.normal(size=(FRAMES, 8)))
@@ -34,7 +34,13 @@ def test_the_wander_is_found_beside_turn_and_noise(wander):
 
 
 def test_a_pivot_at_rest_does_not_wander():
-    assert [pivot_wander(*equations(0.0, seed), BIRGE2) for seed in range(400)] == [0.0] * 400
+    assert [pivot_wander(*equations(0.0, seed), BIRGE2) for seed in range(200)] == [0.0] * 200
+    # where a frame's place is known to 0.7 px only, the likeliest wander is often above the least that counts
+    assert [pivot_wander(*equations(0.0, seed, seen=1.0), BIRGE2) for seed in range(200)] == [0.0] * 200
+
+
+def test_a_wander_within_the_errors_of_codecs_is_noise():
+    assert [pivot_wander(*equations(0.05, seed, seen=100.0), BIRGE2) for seed in range(20)] == [0.0] * 20
 
 
 def test_a_plate_before_a_blank_wall_in_a_shaking_hand_has_an_honest_angle(tmp_path):
