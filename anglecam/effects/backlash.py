@@ -22,7 +22,7 @@ def _play(given: Knots, parameters: Floats) -> Knots:
     return given if width <= 0.0 else Knots(*_follow(given.time, given.level, given.slope, width))
 
 
-@njit(nogil=True, cache=True)
+@njit("(float64[::1], float64[::1], float64[::1], float64)", nogil=True, cache=True)
 def _follow(time: Floats, level: Floats, slope: Floats, width: float) -> tuple[Floats, Floats, Floats]:
     knots = np.zeros((3, 2 * len(time)))
     n, at = 0, level[0]

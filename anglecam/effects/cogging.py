@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from anglecam.data.typing import Floats
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 from anglecam.effects.seen import Motion, Seen, sines_and_cosines
 
@@ -23,7 +23,7 @@ PER_PERIOD = 5
 """Numbers that are tried for each period more over the range."""
 
 
-@njit
+@ports.load
 def _load(time: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     return parameters[0] * np.sin(parameters[1] * theta + parameters[2])
 

@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 
 
-@njit
+@ports.load
 def _load(time: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     return parameters[0]
 

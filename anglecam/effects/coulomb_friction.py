@@ -12,14 +12,13 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 
 SI_TO_FILE = math.degrees(1.0)
 
 
-@njit
+@ports.friction
 def _friction(torque: float, theta: float, abc: Values, parameters: Values) -> tuple[float, float, float, float]:
     mean, difference, more = parameters[0], parameters[1], parameters[2]
     breakaway = mean + more if more > 0.0 else 0.0

@@ -7,12 +7,11 @@ The paper's damping is one lubricant film, Eqs. (19)–(22), the same in both di
 
 from __future__ import annotations
 
-from numba import njit
-
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 
 
-@njit
+@ports.load
 def _load(time: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     return -parameters[0] * abs(omega)
 

@@ -11,12 +11,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 
 
-@njit
+@ports.servo
 def _servo(torque: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     if parameters[0] == 0.0:
         return torque

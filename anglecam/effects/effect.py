@@ -16,7 +16,7 @@ through one *port*. With its parameters at their null values the model is exactl
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, MutableSequence, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
@@ -29,7 +29,9 @@ from anglecam.effects.seen import Motion, Seen
 from anglecam.effects.unit_names import split_unit
 
 Values = tuple[float, ...]
-"""Parameters as compiled functions take them. Reading them from an array would cost more than the evaluation."""
+"""Numbers that the function of a port reads: parameters, states, or a, b and c."""
+Out = MutableSequence[float]
+"""Numbers that it writes."""
 
 PORTS = ("command", "lag", "servo", "load", "friction", "dynamics", "timing", "observation")
 
@@ -179,7 +181,8 @@ class Effect:
     """Parameters → τ, s."""
     servo: Any = field(default=None, repr=False)
     """Compiled (torque, θ, ω, abc, parameters) → torque of servo and springs, rad/s². Its first argument is c·v − b·θ,
-    or the result of the servo effect before it."""
+    or the result of the servo effect before it. A decorator of `anglecam.effects.ports` compiles this and the ports
+    that follow."""
     load: Any = field(default=None, repr=False)
     """Compiled (time, θ, ω, abc, parameters) → angular acceleration added, rad/s². Time is the recording's, s. It is
     integrated in steps of 6 ms; for quadratic drag that is accurate to 2e-4° at 5 1/rad and to 1e-3° at 20 1/rad. See
@@ -189,12 +192,12 @@ class Effect:
     (rad/s²), Stribeck speed (rad/s); opposes motion. The torque is that of servo and springs after every servo effect,
     rad/s². There is no friction where all parameters are zero."""
     dynamics: Any = field(default=None, repr=False)
-    """Compiled (time, θ, ω, v, abc, states, parameters) → (derivatives of the states, angular acceleration added in
-    rad/s²). v is the command at the drive, rad, and abc is a, b, c. ``states`` and the derivatives are tuples of
-    `states` numbers. The integrator steps by at most 2 ms, so rates of the states must stay below 1000/s."""
+    """Compiled (time, θ, ω, v, abc, states, parameters, derivatives) → angular acceleration added, rad/s²; it fills the
+    `states` derivatives of the states. v is the command at the drive, rad, and abc is a, b, c. The integrator steps by
+    at most 2 ms, so rates of the states must stay below 1000/s."""
     initial: Any = field(default=None, repr=False)
-    """Compiled (θ, ω, v, abc, parameters) → tuple of the states at a recording's first frame, for ``dynamics``; zeros
-    where it is ``None``."""
+    """Compiled (θ, ω, v, abc, parameters, states), for ``dynamics``; it fills the states at a recording's first frame,
+    which are zeros where it is ``None``."""
     timing: Callable[[Floats, Floats, Floats, View], Floats] | None = field(default=None, repr=False)
     """(frame times s, angle rad, parameters, view) → instants at which what the frames show happened, s."""
     observation: Callable[[Floats, Floats, Floats, View], Floats] | None = field(default=None, repr=False)

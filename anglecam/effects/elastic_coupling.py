@@ -16,7 +16,8 @@ import numpy as np
 from numba import njit
 
 from anglecam.data.typing import Floats
-from anglecam.effects.effect import Effect, Parameter, Values
+from anglecam.effects import ports
+from anglecam.effects.effect import Effect, Out, Parameter, Values
 from anglecam.effects.seen import Seen
 
 TRIED_HZ = np.geomspace(0.6, 12.0, 150)
@@ -25,18 +26,19 @@ DAMPINGS = (0.03, 0.2)
 """Damping ratios with which they are compared."""
 
 
-@njit
+@ports.dynamics
 def _dynamics(
-    time: float, theta: float, omega: float, v: float, abc: Values, states: Values, parameters: Values
-) -> tuple[tuple[float, float], float]:
+    time: float, theta: float, omega: float, v: float, abc: Values, states: Values, parameters: Values, derivatives: Out
+) -> float:
     rate = math.tau * parameters[1]
     push = rate * rate * (theta - states[0]) + 2.0 * parameters[2] * rate * (omega - states[1])
-    return (states[1], push), -parameters[0] * push
+    derivatives[0], derivatives[1] = states[1], push
+    return -parameters[0] * push
 
 
-@njit
-def _initial(theta: float, omega: float, v: float, abc: Values, parameters: Values) -> tuple[float, float]:
-    return theta, omega
+@ports.initial
+def _initial(theta: float, omega: float, v: float, abc: Values, parameters: Values, states: Out) -> None:
+    states[0], states[1] = theta, omega
 
 
 def _searched(seen: Seen) -> list[Floats]:
@@ -60,7 +62,7 @@ def _starts(seen: Seen) -> list[Values]:
     return found or [(0.03, float(frequency), DAMPINGS[0]) for frequency in TRIED_HZ[30::40]]
 
 
-@njit(nogil=True, cache=True)
+@njit("float64[:, ::1](float64[::1], float64, float64[::1], float64)", nogil=True, cache=True)
 def _push(angle: Floats, step: float, rates: Floats, damping: float) -> Floats:
     """Return p, (n, k), along an evenly sampled motion, in steps that are accurate enough to start a fit."""
     push = np.zeros((len(angle), len(rates)))

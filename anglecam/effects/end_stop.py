@@ -11,8 +11,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 from anglecam.effects.seen import Motion, Seen
 
@@ -21,7 +20,7 @@ DISSIPATION = 0.3
 out, which is another minimum of the cost."""
 
 
-@njit
+@ports.load
 def _load(time: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     stiffness, upper, lower, dissipation = parameters[0], parameters[1], parameters[2], parameters[3]
     if upper > 0.0 and theta * upper > 1.0:

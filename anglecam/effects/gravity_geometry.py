@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 from anglecam.effects.seen import Seen
 
@@ -20,7 +20,7 @@ DIRECTIONS = (0.25, 0.75, -0.75, 1.0, -0.25, 0.0)
 """Angles of the centre of mass from upright at which a fit starts, in half turns."""
 
 
-@njit
+@ports.load
 def _load(time: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     if parameters[0] == 0.0:
         return 0.0

@@ -9,9 +9,12 @@ links and 0 for the constant γ of Eq. (3). All of b is attributed to the servo'
 
 from __future__ import annotations
 
-import numpy as np
-from numba import njit
+from typing import Any
 
+import numpy as np
+
+from anglecam.data.typing import Floats
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 from anglecam.neck.fourbar import NEUTRAL_SERVO, FourBar, head_angle, reach, servo_angle
 from anglecam.neck.transmission import slope
@@ -21,26 +24,34 @@ _LINKS = FourBar()
 _NEUTRAL = float(head_angle(_LINKS, NEUTRAL_SERVO))
 _LOW, _HIGH = (_NEUTRAL - end for end in reversed(reach(_LINKS)))
 _GRID = np.linspace(_LOW, _HIGH, _NODES)[1:-1]
-_SPACING = _GRID[1] - _GRID[0]
 _CRANK = servo_angle(_LINKS, _NEUTRAL - _GRID)
 _AT_NEUTRAL = float(slope(_LINKS, NEUTRAL_SERVO))
 _PHI = -_AT_NEUTRAL * (_CRANK - NEUTRAL_SERVO)
 _LEVER = _AT_NEUTRAL / slope(_LINKS, _CRANK)
 
 
-@njit
-def _servo(torque: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
-    amount = parameters[0]
-    if amount == 0.0:
-        return torque
-    # beyond the reach of the links the last ratio holds: a trial step of the fit may go there
-    inside = min(max(theta, _GRID[0]), _GRID[-1])
-    place = (inside - _GRID[0]) / _SPACING
-    i = min(int(place), len(_GRID) - 2)
-    part = place - i
-    phi = theta + amount * ((1.0 - part) * _PHI[i] + part * _PHI[i + 1] - inside)
-    lever = 1.0 + amount * ((1.0 - part) * _LEVER[i] + part * _LEVER[i + 1] - 1.0)
-    return lever * (torque + abc[1] * (theta - phi))
+def _servo_with(grid: Floats, crank: Floats, levers: Floats) -> Any:
+    """Compile the port for tables over the angle.
+
+    Numba compiles the values of enclosed arrays in, and finds the code again only for the same values.
+    """
+    spacing = grid[1] - grid[0]
+
+    @ports.servo
+    def _servo(torque: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
+        amount = parameters[0]
+        if amount == 0.0:
+            return torque
+        # beyond the reach of the links the last ratio holds: a trial step of the fit may go there
+        inside = min(max(theta, grid[0]), grid[-1])
+        place = (inside - grid[0]) / spacing
+        i = min(int(place), len(grid) - 2)
+        part = place - i
+        phi = theta + amount * ((1.0 - part) * crank[i] + part * crank[i + 1] - inside)
+        lever = 1.0 + amount * ((1.0 - part) * levers[i] + part * levers[i + 1] - 1.0)
+        return lever * (torque + abc[1] * (theta - phi))
+
+    return _servo
 
 
 EFFECT = Effect(
@@ -54,5 +65,5 @@ EFFECT = Effect(
     separating_experiment="slow stairs over the whole range: the linkage shows in the angle at which each step ends",
     source="the paper, Eqs. (1)-(3); anglecam.neck.transmission",
     rank=-1,
-    servo=_servo,
+    servo=_servo_with(_GRID, _PHI, _LEVER),
 )

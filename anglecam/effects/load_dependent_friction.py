@@ -12,12 +12,11 @@ holds a torque at rest, and the body sticks within a band that widens with the a
 
 from __future__ import annotations
 
-from numba import njit
-
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 
 
-@njit
+@ports.friction
 def _friction(torque: float, theta: float, abc: Values, parameters: Values) -> tuple[float, float, float, float]:
     level = parameters[0] * abs(torque + parameters[1] * abc[1] * theta)
     return level, level, 0.0, 0.0

@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 from anglecam.effects.seen import Motion, Seen
 
 
-@njit
+@ports.load
 def _load(time: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     stiffness, stretch = parameters[0], theta - parameters[1]
     if stiffness * stretch <= 0.0:

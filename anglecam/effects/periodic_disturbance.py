@@ -12,9 +12,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from anglecam.data.typing import Floats
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 from anglecam.effects.seen import Motion, Seen, sines_and_cosines
 
@@ -29,7 +29,7 @@ BELOW_NYQUIST = 0.9
 """Share of half the frame rate up to which the residual is searched."""
 
 
-@njit
+@ports.load
 def _load(time: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     return parameters[0] * np.sin(math.tau * parameters[1] * time + parameters[2])
 

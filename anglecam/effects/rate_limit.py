@@ -21,7 +21,7 @@ def _limit(given: Knots, parameters: Floats) -> Knots:
     return given if parameters[0] <= 0.0 else Knots(*_follow(given.time, given.level, 1.0 / parameters[0]))
 
 
-@njit(nogil=True, cache=True)
+@njit("(float64[::1], float64[::1], float64)", nogil=True, cache=True)
 def _follow(time: Floats, level: Floats, rate: float) -> tuple[Floats, Floats, Floats]:
     knots = np.zeros((3, 2 * len(time)))
     n, at = 0, level[0]

@@ -13,13 +13,12 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 from anglecam.effects.seen import Seen
 
 
-@njit
+@ports.servo
 def _servo(torque: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     if parameters[0] <= 0.0:
         return torque

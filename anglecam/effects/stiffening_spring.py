@@ -7,12 +7,11 @@ The paper takes the spring for linear in the angle, Eqs. (18a) and (25); its Eqs
 
 from __future__ import annotations
 
-from numba import njit
-
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 
 
-@njit
+@ports.load
 def _load(time: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     return -parameters[0] * theta**3
 

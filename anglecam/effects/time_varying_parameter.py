@@ -12,12 +12,12 @@ recording, which is less than the change at first.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 
 
-@njit
+@ports.load
 def _load(time: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     rate, settling = parameters[0], parameters[1]
     passed = time if settling == 0.0 else (1.0 - np.exp(-max(time, 0.0) * settling)) / settling

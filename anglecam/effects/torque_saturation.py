@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
 
 
-@njit
+@ports.servo
 def _servo(torque: float, theta: float, omega: float, abc: Values, parameters: Values) -> float:
     inverse, share = parameters[0], parameters[1]
     if inverse <= 0.0:

@@ -13,13 +13,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
-from numba import njit
+from numba import njit, types
 
 from anglecam.data.command import NO_COMMAND, Command
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
-from anglecam.models.integrator import COMPILED, SOURCES, integrate
+from anglecam.models.array_types import READ_COUNTS, READ_MATRIX, READ_TABLE, READ_VECTOR, VECTOR
+from anglecam.models.integrator import integrate
 from anglecam.models.plant import MAX_STEP, Plant
+from anglecam.models.stepping import SCRATCH_ROWS
 
 SHARED = slice(2, 5)
 """Position of a, b, c in the state; the other states are nuisance parameters of the recording."""
@@ -28,7 +30,7 @@ _STEPS = np.array([0.1, 1.0, 1.0, 10.0, 10.0])
 _FARTHEST = 100.0 * Plant().upper
 """Magnitudes of a, b, c from which on the estimate has diverged; the integrator's steps are no longer than the plant's
 time constants, so that it would never end."""
-_NO_EFFECTS = COMPILED.table(())
+_NO_PIECES = (Plant().pieces.table, Plant().pieces.edges)
 
 
 @dataclass(frozen=True)
@@ -205,29 +207,29 @@ def _advance(state: Floats, span: Floats, command: Command) -> tuple[Floats, Flo
     """Return the state integrated over ``span`` (2,) and the derivative of its end with respect to its start."""
     reached, F = state.copy(), np.eye(len(state))
     steps = 1e-5 * np.maximum(np.abs(state[:5]), _STEPS)
-    reached[:2], F[:2, :5] = _flow(state[:5], span, command.knots, steps, _NO_EFFECTS, MAX_STEP)
+    reached[:2], F[:2, :5] = _flow(state[:5], span, command.knots, steps, *_NO_PIECES, MAX_STEP)
     return reached, F
 
 
-def _compile_once(code):  # type: ignore[no-untyped-def]  # compiled
-    """Return the flow of the plant and its derivative, compiled by the first process that runs it."""
-
-    @njit(cache=True)
-    def _flow(state, span, knots, steps, table, max_step):  # type: ignore[no-untyped-def]
-        assert len(code) > 0
-        slopes = np.empty((2, 5))
-        edges, spans, near = np.array([0, 2]), np.array([[0, knots.shape[1]]]), np.empty((0, 2))
-        for j in range(5):
-            low, high = state.copy(), state.copy()
-            low[j] -= steps[j]
-            high[j] += steps[j]
-            below = integrate(span, edges, low[None, :2], knots, spans, 0.0, low[2:], table, max_step, near)[1]
-            above = integrate(span, edges, high[None, :2], knots, spans, 0.0, high[2:], table, max_step, near)[1]
-            slopes[:, j] = (above - below) / (high[j] - low[j])
-        end = integrate(span, edges, state[None, :2], knots, spans, 0.0, state[2:], table, max_step, near)[1]
-        return end, slopes
-
-    return _flow
-
-
-_flow = _compile_once(SOURCES)
+@njit(
+    types.Tuple((VECTOR, types.Array(types.float64, 2, "C")))(
+        READ_VECTOR, READ_VECTOR, READ_MATRIX, READ_VECTOR, READ_TABLE, READ_COUNTS, types.float64
+    ),
+    cache=True,
+)
+def _flow(state, span, knots, steps, table, ports, max_step):  # type: ignore[no-untyped-def]  # compiled
+    """Return the state of the plant after a span and its derivative, by central difference quotients."""
+    slopes, none, memory = np.empty((2, 5)), np.empty(0), np.empty((1 + SCRATCH_ROWS, 0))
+    edges, spans, near = np.array([0, 2]), np.array([[0, knots.shape[1]]]), np.empty((0, 2))
+    ends = np.empty((11, 2))
+    for j in range(11):
+        moved = state.copy()
+        if j < 10:
+            moved[j // 2] += steps[j // 2] if j % 2 else -steps[j // 2]
+        ends[j] = integrate(
+            span, edges, moved[None, :2], knots, spans, 0.0, moved[2:], table, ports, none, memory, max_step, near
+        )[1]
+        if j % 2:
+            low, high = state[j // 2] - steps[j // 2], state[j // 2] + steps[j // 2]
+            slopes[:, j // 2] = (ends[j] - ends[j - 1]) / (high - low)
+    return ends[10], slopes

@@ -42,13 +42,14 @@ def added_acceleration(
     def evaluate(t: float, states: Floats) -> tuple[Floats, float]:
         v = 0.0 if command is None else float(command.at(np.array([t]))[0])
         theta, omega = float(np.interp(t, time, angle)), float(np.interp(t, time, rate))
-        derivatives, added = effect.dynamics(t, theta, omega, v, plant, tuple(map(float, states)), parameters)
-        return np.array(derivatives), added
+        derivatives = np.empty(effect.states)
+        added = effect.dynamics(t, theta, omega, v, plant, states, parameters, derivatives)
+        return derivatives, added
 
     states = np.zeros(effect.states)
     if effect.initial is not None:
         v = 0.0 if command is None else float(command.at(time[:1])[0])
-        states = np.array(effect.initial(float(angle[0]), float(rate[0]), v, plant, parameters))
+        effect.initial(float(angle[0]), float(rate[0]), v, plant, parameters, states)
     result = np.empty(len(time))
     result[0] = evaluate(time[0], states)[1]
     for i in range(1, len(time)):

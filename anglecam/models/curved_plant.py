@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -16,9 +17,9 @@ from anglecam.data.command import Command
 from anglecam.data.runs import Runs
 from anglecam.data.typing import Floats
 from anglecam.effects import Effect
-from anglecam.models.curved_integrator import WITH_LEDGER, WITHOUT_EFFECTS, table_with_curve
+from anglecam.models.pieces import Pieces
 from anglecam.models.plant import Plant
-from anglecam.models.torque_curve import NO_AXIS, Axis
+from anglecam.models.torque_curve import NO_AXIS, Axis, curve_torque
 
 UNBOUNDED = 1e9
 """rad/s²; no curve comes near it."""
@@ -137,10 +138,16 @@ class CurvedPlant(Plant):
             )
         return motion
 
-    def _table(self, parameters: Floats, pairs: Sequence[tuple[Effect, Floats]], runs: Runs) -> Floats:
+    @cached_property
+    def pieces(self) -> Pieces:
+        """What is inside the equation of motion, the curve included, compiled."""
+        return super().pieces.with_torque(curve_torque)
+
+    def _numbers(self, parameters: Floats, pairs: Sequence[tuple[Effect, Floats]], runs: Runs) -> Floats:
         coefficients = self.curve.basis @ parameters[len(parameters) - self.curve.count :]
-        curve = np.concatenate([self.curve.header(runs.commands[0]), coefficients])
-        return table_with_curve(super()._table(parameters, pairs, runs), curve)
+        return np.concatenate(
+            [super()._numbers(parameters, pairs, runs), self.curve.header(runs.commands[0]), coefficients]
+        )
 
     @property
     def _max_step(self) -> float:
@@ -149,5 +156,4 @@ class CurvedPlant(Plant):
 
 def curved(plant: Plant, curve: Curve) -> CurvedPlant:
     """Return a plant of the ledger's effects with a curve in addition."""
-    integrator = WITH_LEDGER if plant.effects else WITHOUT_EFFECTS
-    return CurvedPlant(plant.effects, plant.driven, integrator, plant.fastest, curve=curve)
+    return CurvedPlant(plant.effects, plant.driven, plant.fastest, curve=curve)

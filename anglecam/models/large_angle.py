@@ -21,7 +21,7 @@ NODES = 512
 and within 1° of a linkage's toggle below 2e-5 N·m."""
 
 
-@njit(cache=True)
+@njit
 def _accelerate(theta, omega, drive, low, step, torque, tangent, gamma, constants):  # type: ignore[no-untyped-def]
     """Return θ̈ of Eq. (31), with everything that depends on the angle alone interpolated from tables."""
     place = (theta - low) / step
@@ -39,7 +39,11 @@ def _accelerate(theta, omega, drive, low, step, torque, tangent, gamma, constant
     return (drive - back - moving) / (inertia + rotor * ratio)
 
 
-@njit(cache=True)
+@njit(
+    "float64[:, ::1](float64[::1], float64, float64, float64[::1], float64[::1], float64, float64,"
+    " float64[::1], float64[::1], float64[::1], UniTuple(float64, 4), float64)",
+    cache=True,
+)
 def _integrate(time, theta, omega, switches, drives, low, step, torque, tangent, gamma, constants, max_step):  # type: ignore[no-untyped-def]
     """Integrate by fourth-order Runge-Kutta from stop to stop: the requested instants and the command's switches."""
     states = np.empty((len(time), 2))
@@ -260,11 +264,11 @@ class LargeAngle:
         held = NO_COMMAND if command is None else command.held()
         constants = (p.head.inertia, p.servo.rotor_inertia, p.damping, p.servo.back_emf_damping)
         return _integrate(
-            time,
+            np.ascontiguousarray(time),
             float(state[0]),
             float(state[1]),
-            held.time,
-            p.servo.torque_gain * p.servo.command_gain * held.angle,
+            np.ascontiguousarray(held.time),
+            p.servo.torque_gain * p.servo.command_gain * np.ascontiguousarray(held.angle),
             nodes[0],
             nodes[1] - nodes[0],
             restoring_torque(neck, nodes),

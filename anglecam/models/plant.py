@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,7 +13,9 @@ from anglecam.data.command import Command
 from anglecam.data.runs import Runs, one_run
 from anglecam.data.typing import Floats
 from anglecam.effects import Effect, Knots
-from anglecam.models.integrator import INTEGRATOR, Integrator
+from anglecam.models.integrator import integrate
+from anglecam.models.pieces import Pieces, pieces_of
+from anglecam.models.stepping import SCRATCH_ROWS
 
 FASTEST = 40.0
 """Natural frequency, rad/s, up to which steps and bounds hold as they stand; for a faster plant they are scaled."""
@@ -38,8 +40,6 @@ class Plant:
     effects: tuple[Effect, ...] = ()
     driven: bool = True
     """Whether any recording has a command; a free swing does not determine c."""
-    integrator: Integrator = field(default=INTEGRATOR, repr=False)
-    """Compiled for a ledger that contains the plant's effects."""
     fastest: float = FASTEST
     """Natural frequency, rad/s, for which steps and bounds are set; at least `FASTEST`."""
 
@@ -177,7 +177,7 @@ class Plant:
         given, number = runs.played
         arrived = [_arrived(command, pairs) for command in given]
         edges = np.cumsum([0, *(each.shape[1] for each in arrived)])
-        return self.integrator.integrate(
+        return integrate(
             runs.time,
             runs.edges,
             np.ascontiguousarray(first, dtype=float),
@@ -185,14 +185,22 @@ class Plant:
             np.stack([edges[number], edges[number + 1]], axis=1),
             lag,
             abc,
-            self._table(parameters, pairs, runs),
+            self.pieces.table,
+            self.pieces.edges,
+            self._numbers(parameters, pairs, runs),
+            np.empty((1 + SCRATCH_ROWS, self.pieces.states)),
             self._max_step,
             _NOTHING_NEAR if near is None else near,
         )
 
-    def _table(self, parameters: Floats, pairs: Sequence[tuple[Effect, Floats]], runs: Runs) -> Floats:
-        """Return the parameter table for the integrator of runs."""
-        return self.integrator.effects.table(pairs)
+    @cached_property
+    def pieces(self) -> Pieces:
+        """What is inside the equation of motion, compiled."""
+        return pieces_of(self.effects)
+
+    def _numbers(self, parameters: Floats, pairs: Sequence[tuple[Effect, Floats]], runs: Runs) -> Floats:
+        """Return the parameters of `pieces`."""
+        return self.pieces.numbers(pairs)
 
     @property
     def smooth_step(self) -> float:

@@ -20,7 +20,10 @@ MAX_STEP = 0.004
 """Longest step of the series, s; `ThirdOrder.upper` keeps it stable."""
 
 
-@njit(cache=True)
+@njit(
+    "float64[::1](float64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64)",
+    cache=True,
+)
 def _integrate(time, state, switches, values, n, d, max_step):  # type: ignore[no-untyped-def]  # compiled
     x, y, z = state[0], state[1], state[2]
     angle = np.empty(len(time))
@@ -96,4 +99,5 @@ class ThirdOrder:
         """Return the (n,) angle, rad, of a free run; see `anglecam.models.plant.Plant.run`."""
         held = NO_COMMAND if command is None else command.held()
         numerator = parameters[3:] if self.driven else np.zeros(3)
-        return _integrate(time, state, held.time, held.angle, numerator, parameters[:3], MAX_STEP)
+        switches, values = np.ascontiguousarray(held.time), np.ascontiguousarray(held.angle)
+        return _integrate(np.ascontiguousarray(time), state, switches, values, numerator, parameters[:3], MAX_STEP)

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from anglecam.data.typing import Floats
+from anglecam.effects import ports
 
 QUANTITIES = ("angle", "velocity", "command", "phase", "time")
 """What a curve can be over; rad, rad/s, rad, share of the period from 0 to 1, s."""
@@ -95,8 +96,8 @@ def _place(axis, time, theta, omega, v, curve):  # type: ignore[no-untyped-def] 
     return int(first), at - first
 
 
-@njit
-def curve_at(time, theta, omega, v, curve):  # type: ignore[no-untyped-def]  # compiled
+@ports.dynamics
+def curve_torque(time, theta, omega, v, abc, states, curve, derivatives):  # type: ignore[no-untyped-def]
     """Return the angular acceleration of a curve, rad/s²; ``curve`` contains header and coefficients.
 
     A curve over the phase is zero where the command has no period.

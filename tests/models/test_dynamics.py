@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from numba import njit
 from scipy.integrate import solve_ivp
 
 from anglecam.data.command import Command
-from anglecam.effects import LEDGER, Effect, Parameter, effect, ledger_of
+from anglecam.effects import Effect, Parameter, effect, ports
 from anglecam.models.added_acceleration import added_acceleration
-from anglecam.models.integrator import integrator_of
 from anglecam.models.plant import Plant
-from support.starts import first_start
 
 A, B, C = 26.0, 524.0, 508.0
 TIME = np.arange(0.0, 5.0, 1 / 30)
@@ -23,27 +19,29 @@ COMMAND = Command(np.array([0.0, 0.51, 1.9, 3.2]), np.array([0.0, 0.3, -0.2, 0.0
 RATIO, FREQUENCY, DAMPING = 0.3, 40.0, 3.0
 
 
-@njit
-def _second_mass(time, theta, omega, v, abc, states, parameters):
-    """Return ÿ and the reaction on the load of a mass at y on a spring and a damper."""
+@ports.dynamics
+def _second_mass(time, theta, omega, v, abc, states, parameters, derivatives):
+    """Return the reaction on the load of a mass at y on a spring and a damper."""
     push = parameters[1] ** 2 * (theta - states[0]) + parameters[2] * (omega - states[1])
-    return (states[1], push), -parameters[0] * push
+    derivatives[0], derivatives[1] = states[1], push
+    return -parameters[0] * push
 
 
-@njit
-def _moves_along(theta, omega, v, abc, parameters):
-    return (theta, omega)
+@ports.initial
+def _moves_along(theta, omega, v, abc, parameters, states):
+    states[0], states[1] = theta, omega
 
 
-@njit
-def _lagging_drive(time, theta, omega, v, abc, states, parameters):
+@ports.dynamics
+def _lagging_drive(time, theta, omega, v, abc, states, parameters, derivatives):
     """Replace the drive c·v by c·x with τ·ẋ = v − x."""
-    return ((v - states[0]) / parameters[0],), abc[2] * (states[0] - v)
+    derivatives[0] = (v - states[0]) / parameters[0]
+    return abc[2] * (states[0] - v)
 
 
-@njit
-def _settled(theta, omega, v, abc, parameters):
-    return (v,)
+@ports.initial
+def _settled(theta, omega, v, abc, parameters, states):
+    states[0] = v
 
 
 def _entry(effect_id, states, dynamics, initial, *parameters):
@@ -62,13 +60,6 @@ EFFECT = _entry(
     Parameter("damping_per_s", "d", 0.0, 0.0, 500.0, (3.0,)),
 )
 LAGGING = _entry("drive_state", 1, _lagging_drive, _settled, Parameter("lag_s", "τ", 0.0, 0.0, 1.0, (0.05,)))
-
-
-@pytest.fixture(scope="module")
-def integrator():
-    """Compile the package's ledger, the effect of this module and one more."""
-    (mine,) = ledger_of([sys.modules[__name__]])
-    return integrator_of((*LEDGER, mine, LAGGING))
 
 
 def second_mass(state, u, sign):
@@ -107,59 +98,48 @@ def reference(first, friction=0.0):
 
 
 @pytest.mark.parametrize("first", [(0.0, 0.0), (0.1, 0.5)])
-def test_a_second_mass_behind_a_spring_moves_the_load_as_scipy_integrates_it(integrator, first):
-    plant = Plant((EFFECT,), integrator=integrator)
+def test_a_second_mass_behind_a_spring_moves_the_load_as_scipy_integrates_it(first):
+    plant = Plant((EFFECT,))
     predicted = plant.predict(np.array([A, B, C, RATIO, FREQUENCY, DAMPING]), TIME, COMMAND, np.array(first))
     assert np.degrees(predicted) == pytest.approx(np.degrees(reference([*first, *first])), abs=1e-4)
     without = Plant().predict(np.array([A, B, C]), TIME, COMMAND, np.array(first))
     assert np.max(np.abs(np.degrees(predicted - without))) > 1.0
 
 
-def test_states_go_on_while_dry_friction_holds_the_load(integrator):
-    plant = Plant((EFFECT, effect("coulomb_friction")), integrator=integrator)
+def test_states_go_on_while_dry_friction_holds_the_load():
+    plant = Plant((EFFECT, effect("coulomb_friction")))
     parameters = np.array([A, B, C, RATIO, FREQUENCY, DAMPING, 8.0, 0.0, 0.0, 0.0])
     predicted = plant.predict(parameters, TIME, COMMAND, np.zeros(2))
     assert np.degrees(predicted) == pytest.approx(np.degrees(reference(np.zeros(4), 8.0)), abs=2e-3)
 
 
-def test_a_lag_as_a_state_equals_the_lag_in_closed_form(integrator):
+def test_a_lag_as_a_state_equals_the_lag_in_closed_form():
     parameters, first = np.array([A, B, C, 0.05]), np.array([0.1, 0.5])
-    stepped = Plant((LAGGING,), integrator=integrator).predict(parameters, TIME, COMMAND, first)
+    stepped = Plant((LAGGING,)).predict(parameters, TIME, COMMAND, first)
     closed = Plant((effect("actuator_lag"),)).predict(parameters, TIME, COMMAND, first)
     assert np.degrees(stepped) == pytest.approx(np.degrees(closed), abs=1e-4)
 
 
-def test_two_effects_with_states_act_together(integrator):
+def test_two_effects_with_states_act_together():
     parameters = np.array([A, B, C, RATIO, FREQUENCY, DAMPING])
-    both = Plant((EFFECT, LAGGING), integrator=integrator)
-    mixed = Plant((EFFECT, effect("actuator_lag")), integrator=integrator)
+    both = Plant((EFFECT, LAGGING))
+    mixed = Plant((EFFECT, effect("actuator_lag")))
     first = np.array([0.1, 0.5])
     predicted = [p.predict(np.append(parameters, 0.05), TIME, COMMAND, first) for p in (both, mixed)]
     assert np.degrees(predicted[0]) == pytest.approx(np.degrees(predicted[1]), abs=1e-4)
 
 
-@pytest.mark.parametrize("effects", [(), ("coulomb_friction",), ("dead_zone", "quadratic_drag", "backlash"), LEDGER])
-def test_an_effect_added_to_the_ledger_leaves_every_other_prediction_bit_for_bit(integrator, effects):
-    entries = tuple(effect(e) if isinstance(e, str) else e for e in effects)
-    parameters = np.concatenate([[A, B, C], *(first_start(e) for e in entries)])
-    angles = [
-        plant.predict(parameters, TIME, COMMAND, np.array([0.1, 0.5]))
-        for plant in (Plant(entries), Plant(entries, integrator=integrator))
-    ]
-    assert np.array_equal(angles[0], angles[1], equal_nan=True)
-
-
-def test_an_effect_at_its_null_changes_nothing(integrator):
-    plant = Plant((EFFECT,), integrator=integrator)
+def test_an_effect_at_its_null_changes_nothing():
+    plant = Plant((EFFECT,))
     at_null = plant.predict(np.array([A, B, C, *EFFECT.null]), TIME, COMMAND, np.array([0.1, 0.5]))
     without = Plant((effect("dead_zone"),)).predict(np.array([A, B, C, 0.0]), TIME, COMMAND, np.array([0.1, 0.5]))
     assert at_null == pytest.approx(without, abs=1e-14)  # both in Runge-Kutta steps of one length
 
 
-def test_the_acceleration_added_along_a_motion_is_that_of_the_equation(integrator):
+def test_the_acceleration_added_along_a_motion_is_that_of_the_equation():
     time = np.arange(0.0, 2.0, 1e-3)
     values = np.array([RATIO, FREQUENCY, DAMPING])
-    plant = Plant((EFFECT,), integrator=integrator)
+    plant = Plant((EFFECT,))
     motion = plant.run(np.array([A, B, C, *values]), time, COMMAND, np.array([0.1, 0.5]))
     added = added_acceleration(EFFECT, values, np.array([A, B, C]), time, motion[:, 0], COMMAND)
     left = np.gradient(motion[:, 1], time) - (C * COMMAND.at(time) - A * motion[:, 1] - B * motion[:, 0])

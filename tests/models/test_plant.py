@@ -14,7 +14,7 @@ from anglecam.data.runs import runs_of
 from anglecam.effects import LEDGER, effect
 from anglecam.effects.effect import PORTS
 from anglecam.loop.screen import starts_of
-from anglecam.models.compiled_effects import STEPPED_PORTS
+from anglecam.models import pieces
 from anglecam.models.plant import Plant
 from support.motion import Plant as TruePlant
 from support.motion import Recording, command_rows, move
@@ -55,7 +55,7 @@ def test_effects_at_their_null_change_nothing():
     )
     assert full == pytest.approx(stepped, abs=1e-14)
     assert np.degrees(np.abs(base - full)).max() < 1e-4
-    outside = tuple(e for e in LEDGER if e.port not in STEPPED_PORTS)
+    outside = tuple(e for e in LEDGER if e.port not in pieces.PORTS)
     nulls = np.concatenate([e.null for e in outside])
     part = Plant(outside).predict(np.array([26.0, 524.0, 508.0, *nulls]), TIME, command, np.array([0.1, 0.5]))
     assert part == pytest.approx(base, abs=1e-14)
