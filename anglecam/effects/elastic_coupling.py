@@ -45,7 +45,8 @@ def _searched(seen: Seen) -> list[Floats]:
     """Return the torques of a small second mass that the model's motion moves, with either damping ratio."""
     torques = []
     for time, angle in zip(seen.times, seen.angles, strict=True):
-        each = [_push(angle, float(time[1] - time[0]), math.tau * TRIED_HZ, damping) for damping in DAMPINGS]
+        step, motion = float(time[1] - time[0]), np.ascontiguousarray(angle)
+        each = [_push(motion, step, math.tau * TRIED_HZ, damping) for damping in DAMPINGS]
         torques.append(np.stack(each, axis=2).reshape(len(time), -1))
     return torques
 
