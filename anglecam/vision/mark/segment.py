@@ -184,7 +184,7 @@ def measure(patch: Patch, model: ColourModel) -> Region | None:
     )
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _add_row(sums, y, one, x1, x2):  # type: ignore[no-untyped-def]
     sums[0, 0] += one
     sums[0, 1] += x1

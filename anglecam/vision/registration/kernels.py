@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _gain(gains, turn, x, y):  # type: ignore[no-untyped-def]
     total, power = 1.0, 1.0
     for p in range(gains.shape[0]):
@@ -18,7 +18,7 @@ def _gain(gains, turn, x, y):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _leaning(c, s, parallax, lean, across):  # type: ignore[no-untyped-def]
     """Write into ``across`` the displacement for each px along both axes of a tile whose height varies over it.
 

@@ -25,13 +25,13 @@ _FAST = {"contract", "reassoc", "nsz"}
 """What the compiler may do with sums: their order and rounding are free, NaN and infinity keep their meaning."""
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _weights(u):  # type: ignore[no-untyped-def]
     v = 1 - u
     return v * v * v / 6, ((3 * u - 6) * u * u + 4) / 6, ((3 * v - 6) * v * v + 4) / 6, u * u * u / 6
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _write_pairs(rows, first, k, weights, factor):  # type: ignore[no-untyped-def]
     """Write the products of two weights, the first one's number rising slowest."""
     a, b, c, d = weights
@@ -42,7 +42,7 @@ def _write_pairs(rows, first, k, weights, factor):  # type: ignore[no-untyped-de
     rows[first + 8, k], rows[first + 9, k] = factor * c * d, factor * d * d
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _write_four(rows, first, k, weights):  # type: ignore[no-untyped-def]
     rows[first, k], rows[first + 1, k], rows[first + 2, k], rows[first + 3, k] = weights
 

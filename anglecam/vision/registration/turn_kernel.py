@@ -31,25 +31,25 @@ _ONE, _TWO, _THREE, _FOUR, _SIX, _HALF, _SIXTH = (np.float32(c) for c in (1.0, 2
 """A constant of 64 bits would make everything that it is multiplied with as long."""
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _weights(u):  # type: ignore[no-untyped-def]
     v = _ONE - u
     near, far = (_THREE * u - _SIX) * u * u + _FOUR, (_THREE * v - _SIX) * v * v + _FOUR
     return v * v * v * _SIXTH, near * _SIXTH, far * _SIXTH, u * u * u * _SIXTH
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _slopes(u):  # type: ignore[no-untyped-def]
     v = _ONE - u
     return -v * v * _HALF, (_THREE * u - _FOUR) * u * _HALF, ((_TWO - _THREE * u) * u + _ONE) * _HALF, u * u * _HALF
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _bends(u):  # type: ignore[no-untyped-def]
     return _ONE - u, _THREE * u - _TWO, _ONE - _THREE * u, u
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _dot(w, block, row, k):  # type: ignore[no-untyped-def]
     at = row * _BLOCK + k
     return w[0] * block[at] + w[1] * block[at + _BLOCK] + w[2] * block[at + 2 * _BLOCK] + w[3] * block[at + 3 * _BLOCK]
@@ -134,7 +134,7 @@ def _new_block():  # type: ignore[no-untyped-def]
     return block
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _put(block, which, base, pixels, m, x, y, scale, side, n, gain, away_x, away_y):  # type: ignore[no-untyped-def]
     """Write the pixel with the number m, at (x, y) on its tile, into a block."""
     ix, iy = int(x * scale), int(y * scale)
@@ -145,14 +145,14 @@ def _put(block, which, base, pixels, m, x, y, scale, side, n, gain, away_x, away
     block[_RIGHT * _BLOCK + pixels], block[_DOWN * _BLOCK + pixels] = x - side / 2, y - side / 2
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _put_values(block, values, which, channel, pixels):  # type: ignore[no-untyped-def]
     """Write one plane of a block's pixels into the residual's row."""
     for q in range(pixels):
         block[(_DESIGN + 8) * _BLOCK + q] = values[which[q], channel]
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _columns(start, stop, first, slope, side):  # type: ignore[no-untyped-def]
     """Narrow a range of columns to those, and one more on each side, whose place first + slope·x is on a tile."""
     if abs(slope) < 1e-9:
