@@ -96,18 +96,20 @@ def _serve(
             module = waiting.get_nowait()
         except Empty:
             break
-        if process is None:
-            process = start()
-        assert process.stdin
-        assert process.stdout
+        line = ""
         try:
+            process = process or start()
+            assert process.stdin
+            assert process.stdout
             process.stdin.write(f"{module}\n")
             process.stdin.flush()
             line = process.stdout.readline()
         except OSError:
-            line = ""
-        answers.put((module, json.loads(line) if line else None))
-        if not line:
+            pass  # it could not be started, or has ended
+        whole = line.endswith("\n")
+        answers.put((module, json.loads(line) if whole else None))
+        if process is not None and not whole:
+            process.kill()
             process.communicate()
             process = None
     if process is not None:
@@ -158,8 +160,8 @@ class _LockedLoader(SourceFileLoader):
 
 def _folders_of(module: ModuleType) -> list[str]:
     """Return the folders in which Numba keeps the kernels of a module."""
-    caches = [getattr(value, "_cache", None) for value in vars(module).values()]
-    return sorted({str(cache.cache_path) for cache in caches if getattr(cache, "cache_path", None)})
+    paths = [getattr(getattr(value, "_cache", None), "cache_path", None) for value in vars(module).values()]
+    return sorted({str(path) for path in paths if path})
 
 
 def _work() -> None:

@@ -82,9 +82,9 @@ class Kernels:
     @cached_property
     def stamp(self) -> Path:
         """The file that says for what the kernels were compiled."""
-        made_by = [self.root, sys.version, sys.platform, _processor(), *(os.environ.get(name) for name in _OF_CODE)]
-        made_by += [_version_file(name) for name in ("numba", "llvmlite")]
-        digest = hashlib.sha256(repr(made_by).encode()).hexdigest()[:16]
+        versions = [sys.version, *(_version_file(name) for name in ("numba", "llvmlite"))]
+        processor = [sys.platform, _processor(), *(os.environ.get(name) for name in _OF_CODE)]
+        digest = hashlib.sha256(repr((self.root, versions, processor)).encode()).hexdigest()[:16]
         assert self.folder is not None
         return self.folder / f"{self.package}-kernels-{digest}.json"
 

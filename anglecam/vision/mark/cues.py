@@ -79,8 +79,8 @@ def closeness(lab: Image, rgb: tuple[int, int, int]) -> NDArray[Any]:
     """
     colour = (lab_of(rgb) / _SCALE + _OFFSET).astype(np.float32)
     found = np.empty(lab.shape[:2], np.float32)  # of NumPy, which asks for large pages of memory
-    planes = (np.ascontiguousarray(lab[..., k]) for k in range(3))
-    _minus_distance(*planes, colour, _SCALE.astype(np.float32), found)
+    lightness, a, b = (np.ascontiguousarray(lab[..., k]) for k in range(3))
+    _minus_distance(lightness, a, b, colour, _SCALE.astype(np.float32), found)
     return found
 
 
