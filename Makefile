@@ -34,7 +34,9 @@ system = @missing=""; \
 help: ## list what there is
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-8s %s\n", $$1, $$2}'
 
-setup: venv-module $(RUN) ## .venv with the packages that anglecam needs to run
+setup: venv-module $(RUN) ## .venv with the packages that anglecam needs to run, and its kernels compiled
+	@$(BIN)/python -m anglecam.prepare anglecam synth
+	@echo "setup: done; next: $(BIN)/anglecam doctor"
 
 # Debian's python3 comes without the module that makes virtual environments.
 VENV_MODULE := $(shell $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || echo python3-venv)
@@ -52,7 +54,6 @@ $(RUN): pyproject.toml requirements/build.lock requirements/run.lock
 	@$(INSTALL) --require-hashes -r requirements/run.lock
 	@$(INSTALL) --no-deps -e .
 	@touch $@
-	@echo "setup: done; next: $(BIN)/anglecam doctor"
 
 $(DEV): $(RUN) requirements/dev.lock
 	@echo "setup: adding the packages of requirements/dev.lock, which the tests need, to $(VENV)"

@@ -27,6 +27,8 @@ _HOME = {
     "Verdict": "anglecam.loop.verdict",
 }
 """Modules of the public names; each is loaded when one of its names is first used, to keep the start-up short."""
+_WITH_KERNELS = ("anglecam.api", "anglecam.effects", "anglecam.loop.verdict")
+"""Of these modules, those that load compiled functions."""
 
 __all__ = [
     "AngleSeries",
@@ -47,6 +49,10 @@ __version__ = version("anglecam")
 
 def __getattr__(name: str) -> Any:
     if name in _HOME:
+        if _HOME[name] in _WITH_KERNELS:
+            from anglecam.prepare import prepare_kernels
+
+            prepare_kernels(__name__)
         return getattr(import_module(_HOME[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 

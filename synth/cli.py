@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from anglecam.prepare import prepare_kernels
 from synth.errors import RenderError, SpecError
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
@@ -25,6 +26,7 @@ def render_command(
     truth: Annotated[Path, typer.Option(help="folder for the truth, apart from --out")],
 ) -> None:
     """Render a session of clips and write the true motion to a separate folder."""
+    prepare_kernels("synth")
     from synth.session import render
 
     render(spec, out, truth)
@@ -47,6 +49,7 @@ def gallery_command(
     specs: Annotated[list[Path] | None, typer.Argument(help="specs, YAML; all of configs/ by default")] = None,
 ) -> None:
     """Render one frame of every spec to a contact sheet."""
+    prepare_kernels("synth")
     from synth.gallery import gallery
 
     Console().print(str(gallery(specs or [], out)), soft_wrap=True)

@@ -83,7 +83,7 @@ def instants(shutter: Shutter, taken: float, path_px: float, step_px: float) -> 
     return Instants(times, (_below_hat(away + half) - _below_hat(away - half)) / (2 * half))
 
 
-@njit(cache=True, error_model="numpy")
+@njit("(float32[::1], float32[:, :, ::1], float32[:, :, ::1])", cache=True, error_model="numpy")
 def expose(weights: Light, drawn: Light, total: Light) -> None:
     """Add the drawing of one instant to the light of a frame; in one pass, as pictures are larger than caches.
 

@@ -86,7 +86,25 @@ def _layers() -> tuple[Singles, Words, Singles]:
 _WIDTHS, _ACCEPTED, _HEIGHTS = _layers()
 
 
-@njit(cache=True, error_model="numpy")
+@njit("(uint32,)", cache=True, error_model="numpy", forceinline=True)
+def _share(word: np.uint32) -> np.float32:
+    """Return a number from 0 to 1."""
+    return np.float32(word >> np.uint32(8)) * np.float32(1 / 2**24)
+
+
+@njit("(uint32[::1], int64)", cache=True, error_model="numpy")
+def _tail(words: Words, at: int) -> tuple[int, np.float32]:
+    """Return the next word's index, below zero if the words run out, and a number of the tail."""
+    while at + 2 <= len(words):
+        beyond = -np.float32(1 / _EDGE) * np.log1p(-_share(words[at]))
+        depth = -np.log1p(-_share(words[at + 1]))
+        at += 2
+        if depth + depth > beyond * beyond:
+            return at, np.float32(_EDGE) + beyond
+    return -1, np.float32(_EDGE)
+
+
+@njit("(uint32[::1], float32[::1], uint32[::1], float32[::1], float32[::1])", cache=True, error_model="numpy")
 def _fill(words: Words, widths: Singles, accepted: Words, heights: Singles, drawn: Singles) -> tuple[int, int]:
     """Write numbers until all are drawn or the words run out; return how many were drawn and how many words used."""
     at = 0
@@ -116,21 +134,3 @@ def _fill(words: Words, widths: Singles, accepted: Words, heights: Singles, draw
                 break
         drawn[n] = signed
     return len(drawn), at
-
-
-@njit(cache=True, error_model="numpy")
-def _tail(words: Words, at: int) -> tuple[int, np.float32]:
-    """Return the next word's index, below zero if the words run out, and a number of the tail."""
-    while at + 2 <= len(words):
-        beyond = -np.float32(1 / _EDGE) * np.log1p(-_share(words[at]))
-        depth = -np.log1p(-_share(words[at + 1]))
-        at += 2
-        if depth + depth > beyond * beyond:
-            return at, np.float32(_EDGE) + beyond
-    return -1, np.float32(_EDGE)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _share(word: np.uint32) -> np.float32:
-    """Return a number from 0 to 1."""
-    return np.float32(word >> np.uint32(8)) * np.float32(1 / 2**24)

@@ -18,6 +18,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from anglecam import end_with_parent
+from anglecam.prepare import prepare_kernels
 from anglecam.threads import ONE_THREAD
 
 _STARTER = ThreadPoolExecutor(1, thread_name_prefix="starter")
@@ -122,6 +123,7 @@ class MeasuringProcess:
 
 
 def _start() -> subprocess.Popen[bytes]:
+    prepare_kernels("anglecam")  # on a Dask worker of another machine, nobody has done it yet
     return subprocess.Popen(
         [sys.executable, "-P", end_with_parent.__file__, str(os.getpid()), "anglecam.batch.serve"],
         stdin=subprocess.PIPE,

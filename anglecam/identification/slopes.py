@@ -51,7 +51,7 @@ class Slopes:
     def own_change(self, values: Floats) -> Floats:
         """Return the (R, k) change of the nuisance parameters that follows (N,) whitened values best."""
         basis, factor = self._own
-        return _solve(basis, factor, self.edges, values)
+        return _solve(basis, factor, self.edges, np.ascontiguousarray(values))
 
     def without_own(self, values: Floats) -> Floats:
         """Return (N,) or (N, m) values less the part that the nuisance parameters can follow."""
@@ -66,7 +66,7 @@ class Slopes:
 
     @cached_property
     def _own(self) -> tuple[Floats, Floats]:
-        return _orthonormal(self.own, self.edges)
+        return _orthonormal(np.ascontiguousarray(self.own), self.edges)
 
     @property
     def _own_rank(self) -> int:
@@ -80,7 +80,7 @@ class Slopes:
         return basis
 
 
-@njit(nogil=True, cache=True)
+@njit("(float64[:, ::1], int64[::1])", nogil=True, cache=True)
 def _orthonormal(own: Floats, edges: NDArray[np.int64]) -> tuple[Floats, Floats]:
     """Return each recording's columns made orthonormal, (N, k), and the triangular factors, (R, k, k).
 
@@ -107,7 +107,7 @@ def _orthonormal(own: Floats, edges: NDArray[np.int64]) -> tuple[Floats, Floats]
     return basis, factor
 
 
-@njit(nogil=True, cache=True)
+@njit("(float64[:, ::1], float64[:, :, ::1], int64[::1], float64[::1])", nogil=True, cache=True)
 def _solve(basis: Floats, factor: Floats, edges: NDArray[np.int64], values: Floats) -> Floats:
     """Return each recording's coefficients of its own columns by least squares; zero for a dependent column."""
     runs, count = factor.shape[0], factor.shape[1]
@@ -123,7 +123,7 @@ def _solve(basis: Floats, factor: Floats, edges: NDArray[np.int64], values: Floa
     return change
 
 
-@njit(nogil=True, cache=True)
+@njit("(float64[:, ::1], int64[::1], float64[:, ::1])", nogil=True, cache=True)
 def _remove(basis: Floats, edges: NDArray[np.int64], values: Floats) -> Floats:
     """Return (N, m) values less their projection onto each recording's orthonormal columns."""
     left, width = values.copy(), values.shape[1]

@@ -184,14 +184,14 @@ def torque_response(time: Floats, torque: Floats, frames: Floats, a: float, b: f
     matrix = np.zeros((4, 4))
     matrix[0, 1], matrix[1, :3], matrix[2, 3] = 1.0, (-b, -a, 1.0), 1.0 / h
     with np.errstate(over="ignore", invalid="ignore"):
-        angle = _filtered(np.ascontiguousarray(expm(h * matrix)[:2]), torque)
+        angle = _filtered(np.ascontiguousarray(expm(h * matrix)[:2]), np.ascontiguousarray(torque))
     place = np.clip((frames - time[0]) / h, 0.0, len(time) - 1.0)
     i = np.minimum(place.astype(int), len(time) - 2)
     part = (place - i)[:, None]
     return (1.0 - part) * angle[i] + part * angle[i + 1]
 
 
-@njit(nogil=True, cache=True)
+@njit("(float64[:, ::1], float64[:, ::1])", nogil=True, cache=True)
 def _filtered(step: Floats, torque: Floats) -> Floats:
     """Return the angles, (m, k), from rest; ``step`` maps angle, rate, torque and its rise to the next two."""
     m, k = torque.shape

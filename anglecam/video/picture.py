@@ -177,7 +177,7 @@ def _jpeg_part(picture: av.VideoFrame, part: tuple[slice, slice]) -> Image:
     return np.asarray(_jpeg_colours(bright, of_blue, of_red, rows.start, rows.stop, columns.start, columns.stop))
 
 
-@njit(cache=True, nogil=True)
+@njit("(uint8[:, ::1], uint8[:, ::1], uint8[:, ::1], int64, int64, int64, int64)", cache=True, nogil=True)
 def _jpeg_colours(brightness, blueness, redness, top, bottom, left, right):  # type: ignore[no-untyped-def]
     """Convert a part of planes by JPEG's equations (ITU-T T.871), in integers of 14 binary places as OpenCV does."""
     width = right - left

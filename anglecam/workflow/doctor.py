@@ -18,6 +18,7 @@ import numpy as np
 
 from anglecam.errors import AnglecamError
 from anglecam.free_memory import free_memory
+from anglecam.prepare import Kernels
 from anglecam.threads import cores, native_threads
 from anglecam.workflow.self_test import FRAMES, self_test
 
@@ -93,18 +94,18 @@ def check_threads() -> Check:
 
 
 def check_kernel_cache() -> Check:
-    """Check that the folder where Numba keeps compiled kernels can be written to; otherwise every start compiles."""
-    from anglecam.vision.registration.kernels import place_on_tile as kernel
-
-    folder = Path(str(kernel.stats.cache_path))
-    writable = _can_write(folder)
-    problem = (
-        None
-        if writable
-        else f"kernel cache: {folder} cannot be written to, so every start compiles for up to a minute;"
-        " set NUMBA_CACHE_DIR to a folder that can"
-    )
-    return Check("kernel cache", str(folder), {"folder": str(folder), "writable": writable}, problem)
+    """Check that compiled kernels can be kept, without which every start compiles, and whether they have been."""
+    kernels = Kernels("anglecam")
+    folder = kernels.folder
+    if folder is None or not _can_write(folder):
+        problem = (
+            "kernel cache: no folder for compiled kernels can be written to, so every start compiles for up to a"
+            " minute; set NUMBA_CACHE_DIR to a folder that can"
+        )
+        return Check("kernel cache", "none", {"folder": None, "writable": False, "compiled": False}, problem)
+    compiled = kernels.prepared()
+    found = f"{folder}, {'compiled' if compiled else 'compiled by the first command that measures'}"
+    return Check("kernel cache", found, {"folder": str(folder), "writable": True, "compiled": compiled})
 
 
 def check_memory() -> Check:

@@ -30,7 +30,12 @@ _PIECES, _CORNERS = 256, 24
 """Capacity per pixel. Beyond it a piece is not divided but goes to the side on which its centre lies."""
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
+@njit(
+    "(int32, float64[:, ::1], float64, float64, int64, float64[:, :, ::1])",
+    cache=True,
+    error_model="numpy",
+    forceinline=True,
+)
 def _sides(t: int, shapes: Floats, x: float, y: float, at: int, lines: Floats) -> int:
     """Write to lines[at] (a, b, c) along a triangle's sides: a·(x' − x) + b·(y' − y) + c is positive inside.
 
@@ -46,7 +51,142 @@ def _sides(t: int, shapes: Floats, x: float, y: float, at: int, lines: Floats) -
     return count
 
 
-@njit(cache=True, error_model="numpy")
+@njit("(int32, int32, int32[::1], float64[:, ::1])", cache=True, error_model="numpy", forceinline=True)
+def _sort(begin: int, end: int, listed: Ints, depths: Floats) -> None:
+    """Sort a pixel's triangles, nearest first; of two equal ones the earlier stays first."""
+    for i in range(begin + 1, end):
+        t, high, low, at = listed[i], depths[i, 0], depths[i, 1], i
+        while at > begin and depths[at - 1, 0] < high:
+            listed[at], depths[at, 0], depths[at, 1] = listed[at - 1], depths[at - 1, 0], depths[at - 1, 1]
+            at -= 1
+        listed[at], depths[at, 0], depths[at, 1] = t, high, low
+
+
+@njit(
+    "(int64, float64[:, :, ::1], int64, int64, float64[:, ::1], float64[:, ::1], int64)",
+    cache=True,
+    error_model="numpy",
+    forceinline=True,
+)
+def _cutting(p: int, lines: Floats, at: int, sides: int, xs: Floats, ys: Floats, size: int) -> int:
+    """Return which of a triangle's sides cut piece p, one bit each; below zero if one separates the two."""
+    cutting, apart = 0, False
+    for e in range(sides):
+        a, b, c = lines[at, e, 0], lines[at, e, 1], lines[at, e, 2]
+        margin = _ON_LINE * (abs(a) + abs(b))
+        within = without = 0
+        for i in range(size):
+            distance = a * xs[p, i] + b * ys[p, i] + c
+            within += distance > margin
+            without += distance < -margin
+        apart |= within == 0
+        cutting |= (without > 0) << e
+    return _APART if apart else cutting
+
+
+@njit(
+    "(int64, int64, int32, float64[:, ::1], float64, float64, float64[:, ::1], float64[:, ::1], int64, "
+    "float64[:, :, ::1], int64, int64)",
+    cache=True,
+    error_model="numpy",
+    forceinline=True,
+)
+def _ahead(
+    p: int, owner: int, k: int, shapes: Floats, x: float, y: float, xs: Floats, ys: Floats, size: int,
+    lines: Floats, at: int, e: int,
+) -> int:  # fmt: skip
+    """Return the bit of the line in which the planes of triangle k and of a piece meet, 0 if k is nearer everywhere.
+
+    Below zero if the piece hides the triangle.
+    """
+    depth = shapes[owner, 6] * x + shapes[owner, 7] * y + shapes[owner, 8]
+    a, b = shapes[k, 6] - shapes[owner, 6], shapes[k, 7] - shapes[owner, 7]
+    c = shapes[k, 6] * x + shapes[k, 7] * y + shapes[k, 8] - depth
+    least, most = np.inf, -np.inf
+    for i in range(size):
+        gap = a * xs[p, i] + b * ys[p, i] + c
+        least, most = min(least, gap), max(most, gap)
+    if most <= _SAME_DEPTH * depth:
+        return _APART
+    if least >= 0.0:
+        return 0
+    lines[at, e, 0], lines[at, e, 1], lines[at, e, 2] = a, b, c
+    return 1
+
+
+@njit(
+    "(int64, int64, float64[:, :, ::1], int64, int64, float64[:, ::1], float64[:, ::1], int64, float64[:, ::1])",
+    cache=True,
+    error_model="numpy",
+    forceinline=True,
+)
+def _cut(
+    p: int, new: int, lines: Floats, at: int, e: int, xs: Floats, ys: Floats, size: int, spare: Floats
+) -> tuple[int, int]:
+    """Cut piece p along line e: what lies inside stays, what lies outside becomes piece `new`.
+
+    Return the number of corners of either; with none outside, or none inside, nothing has been cut.
+    """
+    a, b, c = lines[at, e, 0], lines[at, e, 1], lines[at, e, 2]
+    margin = _ON_LINE * (abs(a) + abs(b))
+    inner = outer = 0
+    total = 0.0
+    for i in range(size):
+        distance = a * xs[p, i] + b * ys[p, i] + c
+        spare[2, i] = distance
+        inner += distance > margin
+        outer += distance < -margin
+        total += distance
+    if new == _PIECES or size + 1 > _CORNERS:
+        inner, outer = size * (total > margin), size * (total < -margin)
+    if outer == 0:
+        return size, 0
+    if inner == 0:
+        return 0, size
+    within = without = 0
+    for i in range(size):
+        j = i + 1 if i + 1 < size else 0
+        here, there = spare[2, i], spare[2, j]
+        x, y = xs[p, i], ys[p, i]
+        # every corner is written to both pieces, and kept where it belongs: branches would take longer
+        spare[0, within], spare[1, within] = x, y
+        within += here >= -margin
+        xs[new, without], ys[new, without] = x, y
+        without += here <= margin
+        crossed = ((here > margin) & (there < -margin)) | ((here < -margin) & (there > margin))
+        share = here / (here - there)
+        x, y = x + share * (xs[p, j] - x), y + share * (ys[p, j] - y)
+        spare[0, within], spare[1, within] = x, y
+        within += crossed
+        xs[new, without], ys[new, without] = x, y
+        without += crossed
+    for i in range(within):
+        xs[p, i], ys[p, i] = spare[0, i], spare[1, i]
+    return within, without
+
+
+@njit("(int64, float64[:, ::1], float64[:, ::1], int64)", cache=True, error_model="numpy", forceinline=True)
+def _centroid(p: int, xs: Floats, ys: Floats, size: int) -> tuple[float, float, float]:
+    """Return the area of a convex polygon and its centre of mass; its first corner if the area is 0."""
+    x0, y0 = xs[p, 0], ys[p, 0]
+    area = u = v = 0.0
+    for i in range(1, size - 1):
+        xa, ya, xb, yb = xs[p, i] - x0, ys[p, i] - y0, xs[p, i + 1] - x0, ys[p, i + 1] - y0
+        twice = xa * yb - xb * ya
+        area += twice
+        u += twice * (xa + xb)
+        v += twice * (ya + yb)
+    if area <= 0.0:
+        return 0.0, x0, y0
+    return area / 2, x0 + u / (3 * area), y0 + v / (3 * area)
+
+
+@njit(
+    "(int32[:, ::1], int32[::1], int32[::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1], int64, "
+    "float32[:, :, ::1])",
+    cache=True,
+    error_model="numpy",
+)
 def cover(
     places: Ints,
     starts: Ints,
@@ -127,117 +267,3 @@ def cover(
         light[places[slot, 0], places[slot, 1], 0] = red
         light[places[slot, 0], places[slot, 1], 1] = green
         light[places[slot, 0], places[slot, 1], 2] = blue
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _sort(begin: int, end: int, listed: Ints, depths: Floats) -> None:
-    """Sort a pixel's triangles, nearest first; of two equal ones the earlier stays first."""
-    for i in range(begin + 1, end):
-        t, high, low, at = listed[i], depths[i, 0], depths[i, 1], i
-        while at > begin and depths[at - 1, 0] < high:
-            listed[at], depths[at, 0], depths[at, 1] = listed[at - 1], depths[at - 1, 0], depths[at - 1, 1]
-            at -= 1
-        listed[at], depths[at, 0], depths[at, 1] = t, high, low
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _cutting(p: int, lines: Floats, at: int, sides: int, xs: Floats, ys: Floats, size: int) -> int:
-    """Return which of a triangle's sides cut piece p, one bit each; below zero if one separates the two."""
-    cutting, apart = 0, False
-    for e in range(sides):
-        a, b, c = lines[at, e, 0], lines[at, e, 1], lines[at, e, 2]
-        margin = _ON_LINE * (abs(a) + abs(b))
-        within = without = 0
-        for i in range(size):
-            distance = a * xs[p, i] + b * ys[p, i] + c
-            within += distance > margin
-            without += distance < -margin
-        apart |= within == 0
-        cutting |= (without > 0) << e
-    return _APART if apart else cutting
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _ahead(
-    p: int, owner: int, k: int, shapes: Floats, x: float, y: float, xs: Floats, ys: Floats, size: int,
-    lines: Floats, at: int, e: int,
-) -> int:  # fmt: skip
-    """Return the bit of the line in which the planes of triangle k and of a piece meet, 0 if k is nearer everywhere.
-
-    Below zero if the piece hides the triangle.
-    """
-    depth = shapes[owner, 6] * x + shapes[owner, 7] * y + shapes[owner, 8]
-    a, b = shapes[k, 6] - shapes[owner, 6], shapes[k, 7] - shapes[owner, 7]
-    c = shapes[k, 6] * x + shapes[k, 7] * y + shapes[k, 8] - depth
-    least, most = np.inf, -np.inf
-    for i in range(size):
-        gap = a * xs[p, i] + b * ys[p, i] + c
-        least, most = min(least, gap), max(most, gap)
-    if most <= _SAME_DEPTH * depth:
-        return _APART
-    if least >= 0.0:
-        return 0
-    lines[at, e, 0], lines[at, e, 1], lines[at, e, 2] = a, b, c
-    return 1
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _cut(
-    p: int, new: int, lines: Floats, at: int, e: int, xs: Floats, ys: Floats, size: int, spare: Floats
-) -> tuple[int, int]:
-    """Cut piece p along line e: what lies inside stays, what lies outside becomes piece `new`.
-
-    Return the number of corners of either; with none outside, or none inside, nothing has been cut.
-    """
-    a, b, c = lines[at, e, 0], lines[at, e, 1], lines[at, e, 2]
-    margin = _ON_LINE * (abs(a) + abs(b))
-    inner = outer = 0
-    total = 0.0
-    for i in range(size):
-        distance = a * xs[p, i] + b * ys[p, i] + c
-        spare[2, i] = distance
-        inner += distance > margin
-        outer += distance < -margin
-        total += distance
-    if new == _PIECES or size + 1 > _CORNERS:
-        inner, outer = size * (total > margin), size * (total < -margin)
-    if outer == 0:
-        return size, 0
-    if inner == 0:
-        return 0, size
-    within = without = 0
-    for i in range(size):
-        j = i + 1 if i + 1 < size else 0
-        here, there = spare[2, i], spare[2, j]
-        x, y = xs[p, i], ys[p, i]
-        # every corner is written to both pieces, and kept where it belongs: branches would take longer
-        spare[0, within], spare[1, within] = x, y
-        within += here >= -margin
-        xs[new, without], ys[new, without] = x, y
-        without += here <= margin
-        crossed = ((here > margin) & (there < -margin)) | ((here < -margin) & (there > margin))
-        share = here / (here - there)
-        x, y = x + share * (xs[p, j] - x), y + share * (ys[p, j] - y)
-        spare[0, within], spare[1, within] = x, y
-        within += crossed
-        xs[new, without], ys[new, without] = x, y
-        without += crossed
-    for i in range(within):
-        xs[p, i], ys[p, i] = spare[0, i], spare[1, i]
-    return within, without
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _centroid(p: int, xs: Floats, ys: Floats, size: int) -> tuple[float, float, float]:
-    """Return the area of a convex polygon and its centre of mass; its first corner if the area is 0."""
-    x0, y0 = xs[p, 0], ys[p, 0]
-    area = u = v = 0.0
-    for i in range(1, size - 1):
-        xa, ya, xb, yb = xs[p, i] - x0, ys[p, i] - y0, xs[p, i + 1] - x0, ys[p, i + 1] - y0
-        twice = xa * yb - xb * ya
-        area += twice
-        u += twice * (xa + xb)
-        v += twice * (ya + yb)
-    if area <= 0.0:
-        return 0.0, x0, y0
-    return area / 2, x0 + u / (3 * area), y0 + v / (3 * area)

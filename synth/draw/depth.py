@@ -23,7 +23,12 @@ _SMALLEST = 1e-9
 """Twice the area, px², below which a triangle is seen edge-on and covers nothing."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    "(float64[:, ::1], int32[::1], float64[:, :, ::1], float64, float64, float64[::1], float64[::1], float64, "
+    "float64[:, ::1], float64[::1])",
+    cache=True,
+    error_model="numpy",
+)
 def project(
     vertices: Floats,
     body: Ints,
@@ -69,7 +74,12 @@ def project(
         inverse_depth[v] = inverse
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    "(int32[:, ::1], boolean[::1], float64[:, ::1], float64[::1], int64, float64, float64, boolean[::1], "
+    "int32[::1], int32[::1], boolean[::1])",
+    cache=True,
+    error_model="numpy",
+)
 def face_camera(
     faces: Ints,
     wanted: NDArray[np.bool_],
@@ -131,7 +141,11 @@ def face_camera(
     return faces_seen, vertices_used
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    "(int32[::1], int32[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1])",
+    cache=True,
+    error_model="numpy",
+)
 def lay_planes(
     seen: Ints, faces: Ints, pixels: Floats, inverse_depth: Floats, light: Floats, shapes: Floats, shades: Floats
 ) -> None:
@@ -171,7 +185,18 @@ def lay_planes(
             shapes[t, 2 * e], shapes[t, 2 * e + 1] = pixels[faces[t, e], 0], pixels[faces[t, e], 1]
 
 
-@njit(cache=True, error_model="numpy")
+@njit("(float64, float64, float64, float64)", cache=True, error_model="numpy", forceinline=True)
+def _edge(xa: float, ya: float, xb: float, yb: float) -> tuple[float, float, float, float]:
+    """Return the upper and lower end of an edge, and where it begins and its slope in px per row.
+
+    Both triangles at an edge compute from its upper end, so that rounding leaves no gap between them.
+    """
+    if ya > yb or (ya == yb and xa > xb):
+        xa, ya, xb, yb = xb, yb, xa, ya
+    return ya, yb, xa, (xb - xa) / (yb - ya) if yb > ya else 0.0
+
+
+@njit("(int32[::1], float64[:, ::1], int64, int32[:, ::1], float64[:, ::1])", cache=True, error_model="numpy")
 def find_nearest(seen: Ints, shapes: Floats, first: int, nearest: Ints, depths: Floats) -> None:
     """Find the nearest triangle at each pixel's centre; a centre on a common edge belongs to exactly one triangle.
 
@@ -220,18 +245,11 @@ def find_nearest(seen: Ints, shapes: Floats, first: int, nearest: Ints, depths: 
                     depths[row - first, x], nearest[row - first, x] = q, t
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _edge(xa: float, ya: float, xb: float, yb: float) -> tuple[float, float, float, float]:
-    """Return the upper and lower end of an edge, and where it begins and its slope in px per row.
-
-    Both triangles at an edge compute from its upper end, so that rounding leaves no gap between them.
-    """
-    if ya > yb or (ya == yb and xa > xb):
-        xa, ya, xb, yb = xb, yb, xa, ya
-    return ya, yb, xa, (xb - xa) / (yb - ya) if yb > ya else 0.0
-
-
-@njit(cache=True, error_model="numpy")
+@njit(
+    "(int32[:, ::1], float64[:, ::1], float64[:, :, ::1], int64, int32[:, ::1], float32[:, :, ::1])",
+    cache=True,
+    error_model="numpy",
+)
 def light_centres(
     nearest: Ints, shapes: Floats, shades: Floats, first: int, spans: Ints, light: NDArray[np.float32]
 ) -> None:

@@ -23,7 +23,27 @@ _BEHIND = 1e-9
 """Relative difference of 1/depth that counts as rounding."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    "(int32[:, ::1], float64[:, ::1], int32[::1], int64, int64, int32, float64)",
+    cache=True,
+    error_model="numpy",
+    forceinline=True,
+)
+def _visible(nearest: Ints, depths: Floats, part: Ints, row: int, x: int, mine: int, closest: float) -> bool:
+    for v in range(max(row - 1, 0), min(row + 2, nearest.shape[0])):
+        for u in range(max(x - 1, 0), min(x + 2, nearest.shape[1])):
+            # where there is nothing, the depth is 0
+            if depths[v, u] <= closest or part[nearest[v, u]] == mine:
+                return True
+    return False
+
+
+@njit(
+    "(int32[:, ::1], int32[:, ::1], boolean[::1], boolean[::1], int32[::1], float64[:, ::1], float64[::1], "
+    "boolean, int32[:, ::1], float64[:, ::1], int64, int64, int32[:, ::1], boolean[:, ::1])",
+    cache=True,
+    error_model="numpy",
+)
 def mark_edges(
     edges: Ints,
     sides: Ints,
@@ -102,17 +122,24 @@ def mark_edges(
                     )
 
 
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _visible(nearest: Ints, depths: Floats, part: Ints, row: int, x: int, mine: int, closest: float) -> bool:
-    for v in range(max(row - 1, 0), min(row + 2, nearest.shape[0])):
-        for u in range(max(x - 1, 0), min(x + 2, nearest.shape[1])):
-            # where there is nothing, the depth is 0
-            if depths[v, u] <= closest or part[nearest[v, u]] == mine:
-                return True
-    return False
+@njit("(float64[:, ::1], int32, int32, int64, int64, int64, int64)", cache=True, error_model="numpy", forceinline=True)
+def _pass(shapes: Floats, one: int, two: int, x: int, y: int, u: int, v: int) -> bool:
+    """Return whether triangle one is in front of triangle two at (x, y) and behind it at (u, v)."""
+    gx, gy, q0 = shapes[one, 6] - shapes[two, 6], shapes[one, 7] - shapes[two, 7], shapes[one, 8] - shapes[two, 8]
+    return gx * x + gy * y + q0 > 0.0 and gx * u + gy * v + q0 < 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit("(boolean[:, ::1], int64, int64)", cache=True, error_model="numpy", forceinline=True)
+def _mark(marked: Bools, row: int, x: int) -> None:
+    if 0 <= row < marked.shape[0]:
+        marked[row, x] = True
+
+
+@njit(
+    "(int32[:, ::1], int32[::1], float64[:, ::1], int64, int64, int32[:, ::1], boolean[:, ::1])",
+    cache=True,
+    error_model="numpy",
+)
 def mark_passages(
     nearest: Ints, part: Ints, shapes: Floats, margin: int, first: int, spans: Ints, marked: Bools
 ) -> None:
@@ -150,16 +177,3 @@ def mark_passages(
                 if _pass(shapes, one, two, x, y - margin + first, u, v - margin + first):
                     _mark(marked, y - margin, x)
                     _mark(marked, v - margin, u)
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _pass(shapes: Floats, one: int, two: int, x: int, y: int, u: int, v: int) -> bool:
-    """Return whether triangle one is in front of triangle two at (x, y) and behind it at (u, v)."""
-    gx, gy, q0 = shapes[one, 6] - shapes[two, 6], shapes[one, 7] - shapes[two, 7], shapes[one, 8] - shapes[two, 8]
-    return gx * x + gy * y + q0 > 0.0 and gx * u + gy * v + q0 < 0.0
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _mark(marked: Bools, row: int, x: int) -> None:
-    if 0 <= row < marked.shape[0]:
-        marked[row, x] = True

@@ -72,7 +72,12 @@ def light_vertices(
     _light_vertices(used, normals, albedo, body, turns, gamma / TONE, AMBIENT, _LAMPS, light)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    "(int32[::1], float64[:, ::1], float64[:, ::1], int32[::1], float64[:, :, ::1], float64, float64, "
+    "float64[:, ::1], float64[:, ::1])",
+    cache=True,
+    error_model="numpy",
+)
 def _light_vertices(
     used: NDArray[np.int32],
     normals: Floats,

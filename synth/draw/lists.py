@@ -19,7 +19,7 @@ _BLOCK = 3
 """Binary logarithm of the side of the blocks of pixels in which edges are looked for first."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit("(boolean[:, ::1],)", cache=True, error_model="numpy")
 def number(marked: NDArray[np.bool_]) -> tuple[Ints, Ints]:
     """Count the marked pixels row by row.
 
@@ -51,7 +51,14 @@ def number(marked: NDArray[np.bool_]) -> tuple[Ints, Ints]:
     return places, before
 
 
-@njit(cache=True, error_model="numpy")
+@njit("(float64, float64, float64, float64)", cache=True, error_model="numpy", forceinline=True)
+def _side(xa: float, ya: float, xb: float, yb: float) -> tuple[float, float, float]:
+    """Return (a, b, c): a·x + b·y + c is positive if the pixel at (x, y) reaches to the inner side of an edge."""
+    a, b = yb - ya, xa - xb
+    return a, b, (0.5 - _ON_LINE) * (abs(a) + abs(b)) - a * xa - b * ya
+
+
+@njit("(int32[::1], float64[:, ::1], int32[:, ::1], int32[:, ::1], int64)", cache=True, error_model="numpy")
 def gather(seen: Ints, shapes: Floats, places: Ints, before: Ints, first: int) -> tuple[Ints, Ints, Floats]:
     """List for each marked pixel the triangles that reach into it.
 
@@ -121,10 +128,3 @@ def gather(seen: Ints, shapes: Floats, places: Ints, before: Ints, first: int) -
         depths[at, 0], depths[at, 1] = min(middle + reach, shapes[t, 9]), max(middle - reach, shapes[t, 10])
         ends[slot] += 1
     return starts, listed, depths
-
-
-@njit(cache=True, error_model="numpy", forceinline=True)
-def _side(xa: float, ya: float, xb: float, yb: float) -> tuple[float, float, float]:
-    """Return (a, b, c): a·x + b·y + c is positive if the pixel at (x, y) reaches to the inner side of an edge."""
-    a, b = yb - ya, xa - xb
-    return a, b, (0.5 - _ON_LINE) * (abs(a) + abs(b)) - a * xa - b * ya

@@ -35,7 +35,7 @@ class Still:
     """(height, width, 3)."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit("(int32[::1], float64[:, ::1], int64, int32[:, ::1])", cache=True, error_model="numpy")
 def reach(moving: Ints, shapes: Floats, first: int, spans: Ints) -> None:
     """Find the pixels of each row whose light may depend on one of the triangles.
 
@@ -59,7 +59,11 @@ def reach(moving: Ints, shapes: Floats, first: int, spans: Ints) -> None:
             spans[row, 0], spans[row, 1] = min(spans[row, 0], left), max(spans[row, 1], right)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(
+    "(int32[:, ::1], int32[:, ::1], float64[:, ::1], int32[:, ::1], float64[:, ::1])",
+    cache=True,
+    error_model="numpy",
+)
 def restore(spans: Ints, drawn: Ints, at: Floats, nearest: Ints, depths: Floats) -> None:
     """Undo a drawing over the layer.
 
@@ -73,6 +77,5 @@ def restore(spans: Ints, drawn: Ints, at: Floats, nearest: Ints, depths: Floats)
         (height, width), written there.
     """
     for row in range(len(spans)):
-        begin, end = spans[row, 0], spans[row, 1]
-        nearest[row, begin:end] = drawn[row, begin:end]
-        depths[row, begin:end] = at[row, begin:end]
+        for x in range(spans[row, 0], spans[row, 1]):
+            nearest[row, x], depths[row, x] = drawn[row, x], at[row, x]

@@ -54,7 +54,21 @@ def score_circles(
     return _scored(blobs.frame, blobs.plane_px, blobs.area, blobs.contrast, *alike, draws, centres_px, radii_px, frames)
 
 
-@njit(cache=True, nogil=True)
+@njit("(float64[::1],)", cache=True, nogil=True)
+def _median(values):  # type: ignore[no-untyped-def]
+    """Return the median of a few numbers, sorted by insertion; NumPy's median takes a second to compile."""
+    ordered = values.copy()
+    for i in range(1, len(ordered)):
+        here, k = ordered[i], i
+        while k > 0 and ordered[k - 1] > here:
+            ordered[k] = ordered[k - 1]
+            k -= 1
+        ordered[k] = here
+    middle = len(ordered) // 2
+    return ordered[middle] if len(ordered) % 2 else (ordered[middle - 1] + ordered[middle]) / 2
+
+
+@njit("(float64[::1], float64[::1], float64, float64)", cache=True, nogil=True)
 def score_blobs(area: Floats, contrast: Floats, share: float, extent_px: float) -> float:
     """Score blobs whatever circle they lie on.
 
@@ -72,18 +86,35 @@ def score_blobs(area: Floats, contrast: Floats, share: float, extent_px: float) 
     float
         Larger is more like a mark.
     """
-    constancy = np.exp(-4.0 * np.std(np.log(area)))
+    sizes = np.log(area)
+    mean, square = sizes.sum() / len(sizes), 0.0
+    for size in sizes:
+        square += (size - mean) ** 2
+    constancy = np.exp(-4.0 * (square / len(sizes)) ** 0.5)
     travel = 1.0 - np.exp(-extent_px / 10.0)
-    return share**2 * np.median(contrast) * constancy * np.median(area) ** 0.25 * (0.1 + travel)
+    return share**2 * _median(contrast) * constancy * _median(area) ** 0.25 * (0.1 + travel)
 
 
-@njit(cache=True, nogil=True)
+@njit("(float64[::1], float64[::1])", cache=True, nogil=True)
+def _square_off_line(x, y):  # type: ignore[no-untyped-def]
+    """Return the mean square distance of places from the straight line that fits them best, px²."""
+    x, y, freedom = x - x.mean(), y - y.mean(), len(x) - 1
+    xx, yy, xy = (x * x).sum() / freedom, (y * y).sum() / freedom, (x * y).sum() / freedom
+    return max((xx + yy) / 2.0 - np.hypot((xx - yy) / 2.0, xy), 0.0)
+
+
+@njit(
+    "(int64[::1], float64[:, ::1], float64[::1], float64[::1], float64[::1], float64[::1], int64[:, ::1], "
+    "float64[:, ::1], float64[::1], int64)",
+    cache=True,
+    nogil=True,
+)
 def _scored(frame, place, area, contrast, log_area, log_contrast, draws, centres, radii, frames):  # type: ignore[no-untyped-def]
     scores, members = np.full(len(draws), -1.0), np.full((len(draws), frames), _NONE)
     unlike, off = np.empty(frames), np.empty(frames)
     for k in range(len(draws)):
         drawn = draws[k] if draws[k, 2] != _NONE else draws[k, :2]
-        size, standing_out = np.log(np.median(area[drawn])), np.log(np.median(contrast[drawn]))
+        size, standing_out = np.log(_median(area[drawn])), np.log(_median(contrast[drawn]))
         unlike[:] = np.inf
         for b in range(len(frame)):
             away = abs(np.hypot(place[b, 0] - centres[k, 0], place[b, 1] - centres[k, 1]) - radii[k])
@@ -107,11 +138,3 @@ def _scored(frame, place, area, contrast, log_area, log_contrast, draws, centres
         scores[k] = score_blobs(area[some], contrast[some], len(some) / frames, extent) * close
         scores[k] *= _STRAIGHT_WEIGHT + (1.0 - _STRAIGHT_WEIGHT) * bent
     return scores, members
-
-
-@njit(cache=True, nogil=True)
-def _square_off_line(x, y):  # type: ignore[no-untyped-def]
-    """Return the mean square distance of places from the straight line that fits them best, px²."""
-    x, y, freedom = x - x.mean(), y - y.mean(), len(x) - 1
-    xx, yy, xy = (x * x).sum() / freedom, (y * y).sum() / freedom, (x * y).sum() / freedom
-    return max((xx + yy) / 2.0 - np.hypot((xx - yy) / 2.0, xy), 0.0)

@@ -73,7 +73,7 @@ def connected_tail(smooth: Image, filled: Image, low: float) -> Image:
     return np.asarray(_with_label_in(labels, filled, count))
 
 
-@njit(cache=True, nogil=True)
+@njit("(uint8[:, :], uint8[:, ::1], uint8[:, ::1])", cache=True, nogil=True)
 def _known(fraction, core, near):  # type: ignore[no-untyped-def]
     """Return (h, w, 4) the sums and the weights of the known values inside, and of those outside."""
     height, width = fraction.shape
@@ -89,7 +89,7 @@ def _known(fraction, core, near):  # type: ignore[no-untyped-def]
     return known
 
 
-@njit(cache=True, nogil=True)
+@njit("(uint8[:, :], float32[:, :, ::1], uint8[:, ::1], float32, float32)", cache=True, nogil=True)
 def _weight(fraction, blurred, reach, low, span):  # type: ignore[no-untyped-def]
     height, width = fraction.shape
     weight = np.zeros((height, width), np.float32)
@@ -105,7 +105,7 @@ def _weight(fraction, blurred, reach, low, span):  # type: ignore[no-untyped-def
     return weight
 
 
-@njit(cache=True, nogil=True)
+@njit("(uint8[:, :], uint8[:, ::1], float64)", cache=True, nogil=True)
 def _from_level(smooth, filled, low):  # type: ignore[no-untyped-def]
     height, width = smooth.shape
     found = np.empty((height, width), np.uint8)
@@ -115,7 +115,7 @@ def _from_level(smooth, filled, low):  # type: ignore[no-untyped-def]
     return found
 
 
-@njit(cache=True, nogil=True)
+@njit("(int32[:, ::1], uint8[:, ::1], int64)", cache=True, nogil=True)
 def _with_label_in(labels, filled, count):  # type: ignore[no-untyped-def]
     """Return 1 where a label other than 0 is one that the filled pixels have."""
     height, width = labels.shape

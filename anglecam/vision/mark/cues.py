@@ -79,11 +79,14 @@ def closeness(lab: Image, rgb: tuple[int, int, int]) -> NDArray[Any]:
     """
     colour = (lab_of(rgb) / _SCALE + _OFFSET).astype(np.float32)
     found = np.empty(lab.shape[:2], np.float32)  # of NumPy, which asks for large pages of memory
-    _minus_distance(lab[..., 0], lab[..., 1], lab[..., 2], colour, _SCALE.astype(np.float32), found)
+    lightness, a, b = (np.ascontiguousarray(lab[..., k]) for k in range(3))
+    _minus_distance(lightness, a, b, colour, _SCALE.astype(np.float32), found)
     return found
 
 
-@njit(cache=True, nogil=True)
+@njit(
+    "(uint8[:, ::1], uint8[:, ::1], uint8[:, ::1], float32[::1], float32[::1], float32[:, ::1])", cache=True, nogil=True
+)
 def _minus_distance(lightness, a, b, colour, scale, found):  # type: ignore[no-untyped-def]
     for y in range(found.shape[0]):
         to, here, green_red, blue_yellow = found[y], lightness[y], a[y], b[y]
@@ -155,7 +158,7 @@ def moving_cues(images: Sequence[Image]) -> list[Cue]:
     ]
 
 
-@njit(cache=True, nogil=True)
+@njit("(uint8[:, :, :, ::1], float32[:, ::1])", cache=True, nogil=True)
 def _change(images, gain):  # type: ignore[no-untyped-def]
     """Return by how much each pixel of images (n, h, w, 3) changes, where a gain (n, 3) evens out their light."""
     count, height, width, planes = images.shape

@@ -67,7 +67,7 @@ def _near_coloured(contrast: NDArray[Any], level: float, part: tuple[slice, slic
     return near[top - above :, left - before :][: bottom - top, : right - left]
 
 
-@njit(cache=True, nogil=True)
+@njit("(float32[:, ::1], float32, int64, int64)", cache=True, nogil=True)
 def _near_coloured_every(contrast, level, step, reach):  # type: ignore[no-untyped-def]
     """Return for each ``step``-th pixel of each ``step``-th row whether one within reach is above the level."""
     height, width = contrast.shape

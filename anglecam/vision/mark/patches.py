@@ -64,7 +64,12 @@ def find_patches(values: NDArray[Any], levels: Sequence[float]) -> list[Patches]
     return found
 
 
-@njit(cache=True, nogil=True, fastmath={"nnan", "nsz"})  # so that several pixels are compared at once
+@njit(
+    "(float32[:, ::1],)",
+    cache=True,
+    nogil=True,
+    fastmath={"nnan", "nsz"},  # so that several pixels are compared at once
+)
 def _highest_of_strips(values):  # type: ignore[no-untyped-def]
     """Return the highest value of each strip of each row."""
     height, width = values.shape
@@ -80,7 +85,25 @@ def _highest_of_strips(values):  # type: ignore[no-untyped-def]
     return highest
 
 
-@njit(cache=True, nogil=True)
+@njit("(int32[::1], int64)", cache=True, nogil=True)
+def _root(parent, k):  # type: ignore[no-untyped-def]
+    """Return the first run of a patch; shorten the way to it."""
+    while parent[k] != k:
+        parent[k] = parent[parent[k]]
+        k = parent[k]
+    return k
+
+
+@njit("(int32[::1], int64, int64)", cache=True, nogil=True)
+def _join(parent, one, other):  # type: ignore[no-untyped-def]
+    a, b = _root(parent, one), _root(parent, other)
+    if a < b:
+        parent[b] = a
+    else:
+        parent[a] = b
+
+
+@njit("(float32[:, ::1], float32[:, ::1], float32)", cache=True, nogil=True)
 def _joined_runs(values, highest, level):  # type: ignore[no-untyped-def]
     """Return a row for each patch, in the order of their first pixels, and the sums of its columns and rows."""
     height, width = values.shape
@@ -143,21 +166,3 @@ def _joined_runs(values, highest, level):  # type: ignore[no-untyped-def]
             sums[p, 0] += (begin + end - 1) * (end - begin) // 2
             sums[p, 1] += y * (end - begin)
     return table, sums
-
-
-@njit(cache=True, nogil=True)
-def _root(parent, k):  # type: ignore[no-untyped-def]
-    """Return the first run of a patch; shorten the way to it."""
-    while parent[k] != k:
-        parent[k] = parent[parent[k]]
-        k = parent[k]
-    return k
-
-
-@njit(cache=True, nogil=True)
-def _join(parent, one, other):  # type: ignore[no-untyped-def]
-    a, b = _root(parent, one), _root(parent, other)
-    if a < b:
-        parent[b] = a
-    else:
-        parent[a] = b

@@ -184,7 +184,17 @@ def measure(patch: Patch, model: ColourModel) -> Region | None:
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(inline="always")
+def _add_row(sums, y, one, x1, x2):  # type: ignore[no-untyped-def]
+    sums[0, 0] += one
+    sums[0, 1] += x1
+    sums[1, 1] += x2
+    sums[0, 2] += one * y
+    sums[1, 2] += x1 * y
+    sums[2, 2] += one * y * y
+
+
+@njit("(float32[:, ::1],)", cache=True, nogil=True)
 def _sums(weight):  # type: ignore[no-untyped-def]
     """Return the sums of weights (h, w) by the products of 1, x and y, and those of the pixels between 0 and 1.
 
@@ -202,16 +212,6 @@ def _sums(weight):  # type: ignore[no-untyped-def]
         _add_row(of_weight, y, one, x1, x2)
         _add_row(of_edge, y, edge, edge_x1, edge_x2)
     return of_weight, of_edge
-
-
-@njit(cache=True, inline="always")
-def _add_row(sums, y, one, x1, x2):  # type: ignore[no-untyped-def]
-    sums[0, 0] += one
-    sums[0, 1] += x1
-    sums[1, 1] += x2
-    sums[0, 2] += one * y
-    sums[1, 2] += x1 * y
-    sums[2, 2] += one * y * y
 
 
 def _about(centre: Floats, sums: Floats) -> Floats:

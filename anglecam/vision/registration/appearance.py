@@ -232,7 +232,7 @@ def compare_tiles(tiles: TileAppearance, views: TileViews, turns: Floats, pivots
         views.offsets,
         views.starts,
         turns,
-        pivots,
+        np.array(pivots, order="C"),  # one pivot may stand for all
         tiles.corners,
         tiles.side,
         tiles.gains,

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _gain(gains, turn, x, y):  # type: ignore[no-untyped-def]
     total, power = 1.0, 1.0
     for p in range(gains.shape[0]):
@@ -18,7 +18,7 @@ def _gain(gains, turn, x, y):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _leaning(c, s, parallax, lean, across):  # type: ignore[no-untyped-def]
     """Write into ``across`` the displacement for each px along both axes of a tile whose height varies over it.
 
@@ -30,7 +30,12 @@ def _leaning(c, s, parallax, lean, across):  # type: ignore[no-untyped-def]
     across[2], across[3] = lean[0] / rest, lean[1] / rest
 
 
-@njit(cache=True, nogil=True)
+@njit(
+    "(float64[:, ::1], int64[::1], float64[::1], float64[:, ::1], float64[:, ::1], int64, float64[:, :, ::1], "
+    "float64[::1], float64[:, ::1])",
+    cache=True,
+    nogil=True,
+)
 def place_on_tiles(offsets, starts, turns, pivots, corners, side, all_gains, parallax, leans):  # type: ignore[no-untyped-def]
     """Rotate the pixels of views onto their tiles.
 
@@ -59,7 +64,7 @@ def place_on_tiles(offsets, starts, turns, pivots, corners, side, all_gains, par
         c, s = np.cos(turns[k]), np.sin(turns[k])
         p = k if len(pivots) > 1 else 0
         _leaning(c, s, parallax, leans[p], across)
-        rises[k] = across[:2]
+        rises[k, 0], rises[k, 1] = across[0], across[1]
         for m in range(starts[k], starts[k + 1]):
             away[m, 0] = c * offsets[m, 0] - s * offsets[m, 1]
             away[m, 1] = s * offsets[m, 0] + c * offsets[m, 1]
@@ -70,7 +75,13 @@ def place_on_tiles(offsets, starts, turns, pivots, corners, side, all_gains, par
     return places, away, gains, rises
 
 
-@njit(cache=True, nogil=True, fastmath={"contract"})
+@njit(
+    "(float64[:, ::1], int64[::1], float64[::1], float64[::1], float64[::1], int64, float64[:, ::1], "
+    "float64[::1], float64[::1])",
+    cache=True,
+    nogil=True,
+    fastmath={"contract"},
+)
 def place_on_tile(offsets, starts, turns, pivot, corner, side, gains, parallax, lean):  # type: ignore[no-untyped-def]
     """Rotate the pixels of views onto one tile.
 
@@ -120,7 +131,7 @@ def place_on_tile(offsets, starts, turns, pivot, corner, side, gains, parallax, 
     return placed
 
 
-@njit(cache=True, nogil=True)
+@njit("(float64[:, ::1], int64, int64)", cache=True, nogil=True)
 def sort_by_cell(placed, side, cells):  # type: ignore[no-untyped-def]
     """Sort the pixels on a tile by the knots between which they lie.
 
@@ -156,7 +167,7 @@ def sort_by_cell(placed, side, cells):  # type: ignore[no-untyped-def]
     return order, begins
 
 
-@njit(cache=True, nogil=True)
+@njit("(float32[:, ::1], int64[::1], float64[:, :], float64[:, :])", cache=True, nogil=True)
 def relight(values, starts, gains, offsets):  # type: ignore[no-untyped-def]
     """Remove from each view a relative gain and an offset of brightness.
 

@@ -25,13 +25,13 @@ _FAST = {"contract", "reassoc", "nsz"}
 """What the compiler may do with sums: their order and rounding are free, NaN and infinity keep their meaning."""
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _weights(u):  # type: ignore[no-untyped-def]
     v = 1 - u
     return v * v * v / 6, ((3 * u - 6) * u * u + 4) / 6, ((3 * v - 6) * v * v + 4) / 6, u * u * u / 6
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _write_pairs(rows, first, k, weights, factor):  # type: ignore[no-untyped-def]
     """Write the products of two weights, the first one's number rising slowest."""
     a, b, c, d = weights
@@ -42,12 +42,12 @@ def _write_pairs(rows, first, k, weights, factor):  # type: ignore[no-untyped-de
     rows[first + 8, k], rows[first + 9, k] = factor * c * d, factor * d * d
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _write_four(rows, first, k, weights):  # type: ignore[no-untyped-def]
     rows[first, k], rows[first + 1, k], rows[first + 2, k], rows[first + 3, k] = weights
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit("(float64[:, ::1], int64, float64[:, ::1])", cache=True, fastmath=_FAST)
 def _add_products(rows, pixels, products):  # type: ignore[no-untyped-def]
     """Add the sums over pixels of every row along x times every row along y."""
     for p in range(_PAIRS):
@@ -69,7 +69,7 @@ def _add_products(rows, pixels, products):  # type: ignore[no-untyped-def]
             products[p, q + 4] += s4
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit("(float64[:, ::1], int64, float64[:, ::1])", cache=True, fastmath=_FAST)
 def _add_values(rows, pixels, values):  # type: ignore[no-untyped-def]
     """Add the sums over pixels of the value times each of the 4 × 4 weights, y first."""
     y0, y1, y2, y3 = rows[_FACTORS_Y], rows[_FACTORS_Y + 1], rows[_FACTORS_Y + 2], rows[_FACTORS_Y + 3]
@@ -87,7 +87,7 @@ def _add_values(rows, pixels, values):  # type: ignore[no-untyped-def]
         values[3, i] += s3
 
 
-@njit(cache=True)
+@njit("(float64[:, ::1], int64, int64, float64[:, ::1])", cache=True)
 def _add_to_band(products, first, n, band):  # type: ignore[no-untyped-def]
     """Add the products of the 4 × 4 coefficients around a cell, the first of which is ``first``."""
     r = 0
@@ -103,7 +103,12 @@ def _add_to_band(products, first, n, band):  # type: ignore[no-untyped-def]
             r += 1
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(
+    "(float32[:, ::1], float64[:, ::1], int64[::1], int64[::1], int64, int64)",
+    cache=True,
+    nogil=True,
+    fastmath=_FAST,
+)
 def spline_equations(values, placed, order, begins, side, n):  # type: ignore[no-untyped-def]
     """Accumulate the normal equations for a tile's coefficients.
 
@@ -165,7 +170,12 @@ def spline_equations(values, placed, order, begins, side, n):  # type: ignore[no
     return band, right
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(
+    "(float32[:, ::1], float64[:, ::1], int64[::1], int64[::1], int64, float64[:, :, ::1])",
+    cache=True,
+    nogil=True,
+    fastmath=_FAST,
+)
 def _compare(values, placed, order, begins, side, coefficients):  # type: ignore[no-untyped-def]
     """Return (2, m) of each pixel, summed over the planes: the spline's square, and the spline times the residual."""
     planes, n = coefficients.shape[0], coefficients.shape[1]
@@ -200,7 +210,12 @@ def _compare(values, placed, order, begins, side, coefficients):  # type: ignore
     return compared
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(
+    "(float32[:, ::1], float64[:, ::1], int64[::1], int64[::1], int64[::1], float64[::1], int64, float64[:, :, ::1])",
+    cache=True,
+    nogil=True,
+    fastmath=_FAST,
+)
 def gain_equations(values, placed, order, begins, starts, turns, side, coefficients):  # type: ignore[no-untyped-def]
     """Accumulate the normal equations for a tile's gain, with the coefficients given.
 
@@ -222,6 +237,7 @@ def gain_equations(values, placed, order, begins, starts, turns, side, coefficie
     """
     compared = _compare(values, placed, order, begins, side, coefficients)
     normal, gradient, half = np.zeros((9, 9)), np.zeros(9), side / 2
+    squares, products = np.empty((3, 3)), np.empty(3)
     for view in range(len(turns)):
         one = by_x = by_y = xx = xy = yy = rest = rest_x = rest_y = 0.0
         for m in range(starts[view], starts[view + 1]):
@@ -235,11 +251,18 @@ def gain_equations(values, placed, order, begins, starts, turns, side, coefficie
             rest += product
             rest_x += product * x
             rest_y += product * y
-        squares = np.array([[one, by_x, by_y], [by_x, xx, xy], [by_y, xy, yy]])
-        products = np.array([rest, rest_x, rest_y])
+        squares[0, 0], squares[0, 1], squares[0, 2] = one, by_x, by_y
+        squares[1, 0], squares[1, 1], squares[1, 2] = by_x, xx, xy
+        squares[2, 0], squares[2, 1], squares[2, 2] = by_y, xy, yy
+        products[0], products[1], products[2] = rest, rest_x, rest_y
         for p in range(3):
             power = turns[view] ** (p + 1)
-            gradient[3 * p : 3 * p + 3] += power * products
+            scaled = power * products
+            for a in range(3):
+                gradient[3 * p + a] += scaled[a]
             for q in range(3):
-                normal[3 * p : 3 * p + 3, 3 * q : 3 * q + 3] += power * turns[view] ** (q + 1) * squares
+                both = power * turns[view] ** (q + 1) * squares
+                for a in range(3):
+                    for b in range(3):
+                        normal[3 * p + a, 3 * q + b] += both[a, b]
     return normal, gradient

@@ -189,7 +189,7 @@ def _by_tile(part: Image, side: int = TILE_SIDE_PX) -> Image:
     return part[: rows * side, : columns * side].reshape(rows, side, columns, side)
 
 
-@njit(cache=True, nogil=True, fastmath={"contract"})
+@njit("(float64[:, ::1], float64, float64[:, ::1])", cache=True, nogil=True, fastmath={"contract"})
 def _turned(arms, turn, centres):  # type: ignore[no-untyped-def]
     """Return places (m, 2) whose arms (m, 2) are rotated about centres (m, 2) or about one (1, 2)."""
     places = np.empty_like(arms)
@@ -201,7 +201,7 @@ def _turned(arms, turn, centres):  # type: ignore[no-untyped-def]
     return places
 
 
-@njit(cache=True, nogil=True)
+@njit("(float32[:, :, ::1], int64, int64, boolean[:, ::1])", cache=True, nogil=True)
 def _exclude_outside(places, width, height, whole):  # type: ignore[no-untyped-def]
     """Mark in ``whole`` (h, w) the places (h, w, 2) that are outside the picture."""
     for y in range(places.shape[0]):

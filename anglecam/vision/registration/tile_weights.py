@@ -6,7 +6,12 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True, nogil=True)
+@njit(
+    "(float64[:, :, ::1], float64[:, ::1], float64[::1], int64[::1], float64[:, :, ::1], float64[::1], "
+    "float64[::1], float64, float64)",
+    cache=True,
+    nogil=True,
+)
 def weigh_tiles(normal, gradient, squares, count, light, variance, excess, hidden, most_light):  # type: ignore[no-untyped-def]
     """Weigh the tiles of a frame, and find those that are visible.
 
@@ -41,18 +46,29 @@ def weigh_tiles(normal, gradient, squares, count, light, variance, excess, hidde
     for t in range(tiles):
         if count[t] > 0:
             misfit[t] = squares[t] / count[t] / variance[t]
-    ordered = np.sort(misfit)
+    ordered = misfit.copy()
+    for t in range(1, tiles):  # by insertion, which compiles in a tenth of the time that NumPy's sort takes
+        here, k = ordered[t], t
+        while k > 0 and (ordered[k - 1] > here or np.isnan(ordered[k - 1])):
+            ordered[k] = ordered[k - 1]
+            k -= 1
+        ordered[k] = here
     usual = (ordered[(tiles - 1) // 2] + ordered[tiles // 2]) / 2
     scale = max(usual, 1.0)
     for t in range(tiles):
-        clear[t] = misfit[t] < hidden * scale and np.abs(light[t, :, 0]).max() <= most_light
+        clear[t] = misfit[t] < hidden * scale
+        for plane in range(light.shape[1]):
+            clear[t] &= abs(light[t, plane, 0]) <= most_light
         if clear[t]:
-            normals[t] = normal[t, :3, :3] / (variance[t] * scale * excess[t])
-            gradients[t] = gradient[t, :3] / (variance[t] * scale * excess[t])
+            usual_square = variance[t] * scale * excess[t]
+            for a in range(3):
+                for b in range(3):
+                    normals[t, a, b] = normal[t, a, b] / usual_square
+                gradients[t, a] = gradient[t, a] / usual_square
     return usual, clear, normals, gradients
 
 
-@njit(cache=True, nogil=True)
+@njit("(uint8[:, :, ::1], uint8[:, :, ::1], int64[:, ::1], int64)", cache=True, nogil=True)
 def copied_share(image, before, middles, half):  # type: ignore[no-untyped-def]
     """Return the share of the tiles' pixels that equal those of the previous frame, the mean over the tiles.
 

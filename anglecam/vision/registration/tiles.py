@@ -185,7 +185,12 @@ def collect_tiles(
     return [of_tile(t) for t in range(len(corners))]
 
 
-@njit(cache=True, nogil=True)
+@njit(
+    "(uint8[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64, float64[:, ::1], float64, float64, "
+    "float64, float64[:, ::1], int64, float64[:, ::1])",
+    cache=True,
+    nogil=True,
+)
 def _gather(image, ground, middles, reach, pivots_here, turn, per_row, row, corners, side, pivots):  # type: ignore[no-untyped-def]
     """Collect the tiles' pixels: offsets from their pivots in this frame, values, and how many each tile has."""
     most = len(corners) * (int(2 * reach) + 4) ** 2

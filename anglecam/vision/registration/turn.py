@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,18 +101,18 @@ class BodyAppearance:
         tiles = self.tiles
         some = replace(
             tiles,
-            corners=tiles.corners[::_SOME],
-            coefficients=tiles.coefficients[::_SOME],
-            gains=tiles.gains[::_SOME],
-            leans=tiles.leans[::_SOME],
+            corners=_some(tiles.corners),
+            coefficients=_some(tiles.coefficients),
+            gains=_some(tiles.gains),
+            leans=_some(tiles.leans),
         )
         return replace(
             self,
             tiles=some,
-            heights=self.heights[::_SOME],
-            variance=self.variance[::_SOME],
-            excess=self.excess[::_SOME],
-            groups=self.groups[::_SOME],
+            heights=_some(self.heights),
+            variance=_some(self.variance),
+            excess=_some(self.excess),
+            groups=_some(self.groups),
         )
 
     @property
@@ -229,7 +230,7 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
     """
     turn = view.turn
     middles = body.middles_in(view)
-    approach = _step(body.some_tiles, view, turn, middles[::_SOME])
+    approach = _step(body.some_tiles, view, turn, _some(middles))
     if approach is not None and abs(approach.step) * body.lever_px < _APPROACH_PX:
         turn += approach.step
     for _ in range(_MAX_STEPS):
@@ -257,6 +258,11 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
         share = copied_share(view.image, before, middles[clear].round().astype(np.int64), TILE_SIDE_PX // 2)
         pose2 += (_COPY * share * misfit) ** 2
     return TurnEstimate(float(turn), noise, float(np.sqrt(pose2)), pivot_sensitivity, last.usual, clear)
+
+
+def _some(of_tiles: NDArray[Any]) -> NDArray[Any]:
+    """Return every `_SOME`-th row, one after the other in memory, as the compiled functions require."""
+    return np.ascontiguousarray(of_tiles[::_SOME])
 
 
 @dataclass(frozen=True)

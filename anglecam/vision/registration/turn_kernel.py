@@ -31,31 +31,31 @@ _ONE, _TWO, _THREE, _FOUR, _SIX, _HALF, _SIXTH = (np.float32(c) for c in (1.0, 2
 """A constant of 64 bits would make everything that it is multiplied with as long."""
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _weights(u):  # type: ignore[no-untyped-def]
     v = _ONE - u
     near, far = (_THREE * u - _SIX) * u * u + _FOUR, (_THREE * v - _SIX) * v * v + _FOUR
     return v * v * v * _SIXTH, near * _SIXTH, far * _SIXTH, u * u * u * _SIXTH
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _slopes(u):  # type: ignore[no-untyped-def]
     v = _ONE - u
     return -v * v * _HALF, (_THREE * u - _FOUR) * u * _HALF, ((_TWO - _THREE * u) * u + _ONE) * _HALF, u * u * _HALF
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _bends(u):  # type: ignore[no-untyped-def]
     return _ONE - u, _THREE * u - _TWO, _ONE - _THREE * u, u
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _dot(w, block, row, k):  # type: ignore[no-untyped-def]
     at = row * _BLOCK + k
     return w[0] * block[at] + w[1] * block[at + _BLOCK] + w[2] * block[at + 2 * _BLOCK] + w[3] * block[at + 3 * _BLOCK]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit("(float32[::1], int64, int64[::1], int64, float32[::1], int64)", cache=True, fastmath=_FAST)
 def _evaluate(splines, first, base, n, block, pixels):  # type: ignore[no-untyped-def]
     """Write the spline that starts at ``first`` and its derivatives; ``base`` is each pixel's first coefficient."""
     for k in range(pixels):
@@ -79,7 +79,7 @@ def _evaluate(splines, first, base, n, block, pixels):  # type: ignore[no-untype
         block[_YY * _BLOCK + k] = by[0] * w0 + by[1] * w1 + by[2] * w2 + by[3] * w3
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit("(float32[::1], float32, float32, float32, int64)", cache=True, fastmath=_FAST)
 def _differentiate(block, across_x, across_y, scale, pixels):  # type: ignore[no-untyped-def]
     """Write the derivatives and subtract the level from the values, which are in the residual's row."""
     for k in range(pixels):
@@ -98,7 +98,7 @@ def _differentiate(block, across_x, across_y, scale, pixels):  # type: ignore[no
         block[(_DESIGN + 8) * _BLOCK + k] -= g * block[_LEVEL * _BLOCK + k]
 
 
-@njit(cache=True, fastmath=_FAST)
+@njit("(float32[::1], float32[::1], int64)", cache=True, fastmath=_FAST)
 def _product(one, other, pixels):  # type: ignore[no-untyped-def]
     total = _ONE - _ONE
     for k in range(pixels):
@@ -106,7 +106,7 @@ def _product(one, other, pixels):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, nogil=True)
+@njit("(float64[:, ::1], float64[::1])", cache=True, fastmath=_FAST)
 def _eliminate_light(product, light):  # type: ignore[no-untyped-def]
     """Eliminate brightness, offset and blur from the upper triangle of normal equations (9, 9); write them."""
     for a in range(9):
@@ -127,14 +127,14 @@ def _eliminate_light(product, light):  # type: ignore[no-untyped-def]
         light[p - 5] = rest / product[p, p]
 
 
-@njit(cache=True)
+@njit("()", cache=True)
 def _new_block():  # type: ignore[no-untyped-def]
     block = np.zeros(_ROWS * _BLOCK, np.float32)
     block[(_DESIGN + 6) * _BLOCK : (_DESIGN + 7) * _BLOCK] = 1.0
     return block
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
 def _put(block, which, base, pixels, m, x, y, scale, side, n, gain, away_x, away_y):  # type: ignore[no-untyped-def]
     """Write the pixel with the number m, at (x, y) on its tile, into a block."""
     ix, iy = int(x * scale), int(y * scale)
@@ -145,7 +145,14 @@ def _put(block, which, base, pixels, m, x, y, scale, side, n, gain, away_x, away
     block[_RIGHT * _BLOCK + pixels], block[_DOWN * _BLOCK + pixels] = x - side / 2, y - side / 2
 
 
-@njit(cache=True, inline="always")
+@njit(inline="always")
+def _put_values(block, values, which, channel, pixels):  # type: ignore[no-untyped-def]
+    """Write one plane of a block's pixels into the residual's row."""
+    for q in range(pixels):
+        block[(_DESIGN + 8) * _BLOCK + q] = values[which[q], channel]
+
+
+@njit(inline="always")
 def _columns(start, stop, first, slope, side):  # type: ignore[no-untyped-def]
     """Narrow a range of columns to those, and one more on each side, whose place first + slope·x is on a tile."""
     if abs(slope) < 1e-9:
@@ -155,13 +162,15 @@ def _columns(start, stop, first, slope, side):  # type: ignore[no-untyped-def]
     return max(start, int(max(low, 0.0)) - 1), min(stop, int(max(high, 0.0)) + 2)
 
 
-@njit(cache=True, fastmath=_FAST)
-def _add_products(flat, first, base, n, block, which, values, channel, rise, scale, products, pixels):  # type: ignore[no-untyped-def]
-    """Add one plane of a block of pixels to the products of derivatives and residuals."""
+@njit(
+    "(float32[::1], int64, int64[::1], int64, float32[::1], float64[::1], float64, float64[:, :, ::1], int64, int64)",
+    cache=True,
+    fastmath=_FAST,
+)
+def _add_products(flat, first, base, n, block, rise, scale, products, channel, pixels):  # type: ignore[no-untyped-def]
+    """Add one plane of a block of pixels, whose values `_put_values` has written, to the products of derivatives."""
     design = block[_DESIGN * _BLOCK :].reshape(9, _BLOCK)
     _evaluate(flat, first, base, n, block, pixels)
-    for q in range(pixels):
-        design[8, q] = values[which[q], channel]
     _differentiate(block, np.float32(rise[0]), np.float32(rise[1]), np.float32(scale), pixels)
     leans = rise[0] != 0.0 or rise[1] != 0.0  # else all derivatives by them are zero
     for a in range(9):
@@ -170,20 +179,28 @@ def _add_products(flat, first, base, n, block, which, values, channel, rise, sca
                 products[channel, a, b] += _product(design[a], design[b], pixels)
 
 
-@njit(cache=True, nogil=True)
+@njit("(float64[:, :, ::1], float64[:, ::1], float64[::1], float64[:, ::1])", cache=True, fastmath=_FAST)
 def _sum_planes(products, normal, gradient, lights):  # type: ignore[no-untyped-def]
     """Eliminate the light of each plane, add the planes' normal equations, and return the sum of squares."""
     squares = 0.0
     for channel in range(len(products)):
         product = products[channel]
         _eliminate_light(product, lights[channel])
-        normal += product[:5, :5]
-        gradient += product[:5, 8]
+        for a in range(5):
+            for b in range(5):
+                normal[a, b] += product[a, b]
+            gradient[a] += product[a, 8]
         squares += product[8, 8]
     return squares
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(
+    "(float32[:, ::1], int64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], int64, "
+    "float64[:, :, :, ::1])",
+    cache=True,
+    nogil=True,
+    fastmath=_FAST,
+)
 def turn_equations(values, starts, places, away, gains, rises, side, splines):  # type: ignore[no-untyped-def]
     """Accumulate each view's normal equations for its turn, its centre's place and its lean, given the appearance.
 
@@ -229,7 +246,8 @@ def turn_equations(values, starts, places, away, gains, rises, side, splines):  
             count += pixels
             for channel in range(planes):
                 first = (p * planes + channel) * n * n
-                _add_products(flat, first, base, n, block, which, values, channel, rises[k], scale, products, pixels)
+                _put_values(block, values, which, channel, pixels)
+                _add_products(flat, first, base, n, block, rises[k], scale, products, channel, pixels)
         if count * planes < _FEWEST:
             continue
         counts[k] = count * planes
@@ -237,7 +255,14 @@ def turn_equations(values, starts, places, away, gains, rises, side, splines):  
     return normals, gradients, squares, counts, lights
 
 
-@njit(cache=True, nogil=True, fastmath=_FAST)
+@njit(
+    "(uint8[:, :, ::1], float64[:, :, ::1], float64[:, ::1], float64, float64, float64, float64, "
+    "float64[:, ::1], float64[:, ::1], float64[:, ::1], int64, float32[:, :, :, ::1], float64[:, :, ::1], "
+    "float64[::1], float64[:, ::1])",
+    cache=True,
+    nogil=True,
+    fastmath=_FAST,
+)
 def frame_equations(  # type: ignore[no-untyped-def]
     image,
     ground,
@@ -347,13 +372,13 @@ def frame_equations(  # type: ignore[no-untyped-def]
                 if pixels == _BLOCK:
                     for channel in range(planes):
                         first = (t * planes + channel) * n * n
-                        _add_products(
-                            flat, first, base, n, block, which, values, channel, rise, scale, products, pixels
-                        )
+                        _put_values(block, values, which, channel, pixels)
+                        _add_products(flat, first, base, n, block, rise, scale, products, channel, pixels)
                     count, pixels = count + pixels, 0
         for channel in range(planes):
             first = (t * planes + channel) * n * n
-            _add_products(flat, first, base, n, block, which, values, channel, rise, scale, products, pixels)
+            _put_values(block, values, which, channel, pixels)
+            _add_products(flat, first, base, n, block, rise, scale, products, channel, pixels)
         count += pixels
         if count * planes < _FEWEST:
             continue
