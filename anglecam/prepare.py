@@ -24,8 +24,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from shutil import rmtree
 
-_LOADS_NUMBA = re.compile(rb"^(from numba |import numba)", re.MULTILINE)
-"""In the source of a module with kernels."""
+_LOADS_NUMBA = re.compile(rb"^(from numba |import numba|from anglecam\.effects import ports$)", re.MULTILINE)
+"""In the source of a module with kernels; the ports compile the functions of effects."""
 _OF_CODE = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
 """Settings that change for which processor Numba compiles."""
 _OF_PROCESSOR = re.compile(
