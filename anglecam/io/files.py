@@ -1,4 +1,4 @@
-"""Write files atomically, and read text files within limits of size."""
+"""Write files atomically, read text files within limits of size, and see whether a film is there."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any, BinaryIO
+
+from anglecam.errors import InputError
 
 _NAME_CHARACTERS = 40
 """Characters of a file's name that its temporary file's name begins with; a longer name could exceed the limit."""
@@ -45,6 +47,16 @@ def open_regular(path: Path) -> Iterator[BinaryIO]:
         if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
             raise OSError(errno.EINVAL, "not an ordinary file", str(path))
         yield stream
+
+
+def require_film_file(path: Path) -> None:
+    """Raise `InputError` where a film is missing, empty or no file, before anything is loaded that could open it."""
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if not path.is_file():
+        raise InputError(f"{path}: not a file")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: empty file")
 
 
 @contextlib.contextmanager
