@@ -13,8 +13,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import fsspec
-
 from anglecam.errors import AnglecamError, InputError, RigError
 
 _IN_MEMORY = ("memory",)
@@ -66,6 +64,8 @@ def store(address: str) -> tuple[Any, str]:
     """
     protocol = address.partition("://")[0]
     try:
+        import fsspec  # takes longer to load than a wrong call may
+
         return fsspec.core.url_to_fs(address)
     except ImportError as error:
         extra = "; pip install 'anglecam[s3]'" if protocol in ("s3", "s3a") else ""

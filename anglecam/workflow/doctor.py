@@ -18,6 +18,7 @@ import numpy as np
 
 from anglecam.errors import AnglecamError
 from anglecam.free_memory import free_memory
+from anglecam.progress import Progress, Stage, unseen
 from anglecam.threads import cores, native_threads
 from anglecam.workflow.self_test import FRAMES, self_test
 
@@ -45,14 +46,22 @@ class Check:
     """What is wrong and what to do, in one line; ``None`` if nothing is."""
 
 
-def checks() -> Iterator[Check]:
-    """Yield the results of all checks, the self-test last, because it takes seconds."""
+def checks(progress: Progress = unseen) -> Iterator[Check]:
+    """Yield the results of all checks, the self-test last, because it takes seconds.
+
+    Parameters
+    ----------
+    progress : Progress
+        Called with each stage.
+    """
+    progress(Stage("checking packages, codecs, threads, memory and disk"))
     yield check_versions()
     yield check_codecs()
     yield check_threads()
     yield check_kernel_cache()
     yield check_memory()
     yield check_disk()
+    progress(Stage("measuring a drawn film; the first time, kernels are compiled for up to a minute"))
     yield check_self_test()
 
 
