@@ -29,7 +29,12 @@ def normalised(address: str) -> str:
         address = address.partition("://")[2] or "/"
     if is_remote(address):
         return address.rstrip("/") if not address.endswith("://") else address
-    return os.path.abspath(address)  # noqa: PTH100  (a symbolic link keeps its own name)
+    return with_slashes(os.path.abspath(address))  # noqa: PTH100  (a symbolic link keeps its own name)
+
+
+def with_slashes(path: str) -> str:
+    """Return a local path with slashes between its parts, as every system reads it and addresses have them."""
+    return path.replace(os.sep, "/")
 
 
 def is_remote(address: str) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import typer
-from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bars
 
 from anglecam.cli.json_output import report
@@ -68,15 +68,17 @@ class _Shown:
     def __init__(self, bars: Bars, *, lines: bool) -> None:
         self._bars, self._lines = bars, lines
         self._began = self._printed = time.monotonic()
-        self._title, self._bar = "", bars.add_task("", total=None, count="")
+        self._title: str | None = None
+        self._bar: TaskID | None = None
         self._start = bars.get_time()
 
     def show(self, stage: Stage) -> None:
         """Show a stage, and the time since the first one began."""
         title = printable(stage.title)
-        if title != self._title:
+        if self._bar is None or title != self._title:
             self._title = title
-            self._bars.remove_task(self._bar)  # a task cannot go back to a total that is not known
+            if self._bar is not None:
+                self._bars.remove_task(self._bar)  # a task cannot go back to a total that is not known
             self._bar = self._bars.add_task(title, total=stage.total, count="")
             self._bars.tasks[-1].start_time = self._start
             self._print(title)

@@ -18,6 +18,10 @@ from anglecam.errors import InputError
 
 _NAME_CHARACTERS = 40
 """Characters of a file's name that its temporary file's name begins with; a longer name could exceed the limit."""
+_READ = os.O_RDONLY
+# each system has some of them: not to wait at a pipe, to close the file in child processes, to leave line ends as they are
+for _flag in ("O_NONBLOCK", "O_CLOEXEC", "O_BINARY"):
+    _READ |= getattr(os, _flag, 0)
 _MOST_JSON = 64 * 2**20
 """Size above which JSON is not read, bytes; files that anglecam writes have a hundredth of it."""
 
@@ -43,7 +47,7 @@ def open_regular(path: Path) -> Iterator[BinaryIO]:
     """
     if "\0" in str(path):
         raise OSError(errno.EINVAL, "no file can be called that", str(path))
-    with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as stream:
+    with os.fdopen(os.open(path, _READ), "rb") as stream:
         if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
             raise OSError(errno.EINVAL, "not an ordinary file", str(path))
         yield stream
