@@ -19,8 +19,7 @@ from anglecam.errors import InputError
 _NAME_CHARACTERS = 40
 """Characters of a file's name that its temporary file's name begins with; a longer name could exceed the limit."""
 _READ = os.O_RDONLY
-# each system has some of them: not to wait at a pipe, to close the file in child processes, to leave line ends as they are
-for _flag in ("O_NONBLOCK", "O_CLOEXEC", "O_BINARY"):
+for _flag in ("O_NONBLOCK", "O_CLOEXEC", "O_BINARY"):  # each system has some: not to wait at a pipe, to keep line ends
     _READ |= getattr(os, _flag, 0)
 _MOST_JSON = 64 * 2**20
 """Size above which JSON is not read, bytes; files that anglecam writes have a hundredth of it."""

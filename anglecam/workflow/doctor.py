@@ -77,7 +77,7 @@ def check_versions() -> Check:
             found[name] = version(name)
         except PackageNotFoundError:
             missing.append(name)
-    problem = f"versions: {', '.join(missing)} not installed; run make setup again" if missing else None
+    problem = f"versions: {', '.join(missing)} not installed; install anglecam again" if missing else None
     shown = ("python", "anglecam", "numpy", "scipy", "av", "opencv-python-headless", "numba")
     return Check("versions", ", ".join(f"{name} {found[name]}" for name in shown if name in found), found, problem)
 
