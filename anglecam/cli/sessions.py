@@ -80,7 +80,7 @@ def close(
 def close_and_report(session: Path, out: Path, hold_out: Sequence[str]) -> tuple[MeasuredSession, Verdict]:
     """Measure a session, close the loop, write the files of `close` and print its tables."""
     opened = _open(session, out, hold_out)
-    with stages(lines=True) as progress:
+    with stages() as progress:
         progress(LOADING)
         from anglecam.report.session_tables import loop_table, model_table
         from anglecam.workflow.session import loop_input
@@ -93,6 +93,7 @@ def close_and_report(session: Path, out: Path, hold_out: Sequence[str]) -> tuple
                 "measuring corrected an effect of the camera (lens, slanted view, or a marker off the axis); the loop "
                 "starts from the uncorrected angles and reports the effect if its size exceeds the stated uncertainty"
             )
+    with stages(lines=True) as progress:
         closed = write_closed(measured, shown, out, hold_out=hold_out, progress=progress, run=this_run())
     report_file("loop", out / "loop.json")
     report(report=str(out / REPORT) if (out / REPORT).exists() else None, notes=list(measured.notes))
