@@ -100,7 +100,7 @@ def budget(
     """Write the budget of the angle's uncertainty: NAME.budget.json and a page for each clip."""
     run = this_run(rig)
     declared = read_rig(rig) if rig else None
-    asked, problems = _read_files(clips, out, declared, (first, last), find_clips)
+    asked, problems = _read_files(clips, out, declared, (first, last), find_clips, _require_film)
     with stages() as progress:
         progress(LOADING)
         from anglecam.budget.clip import budget_as_dict
@@ -111,10 +111,9 @@ def budget(
 
         def budget_one(files: ClipFiles, progress: Progress) -> Measurement | MeasuredTracks:
             source = open_files(files)
-            if source.is_tracks or source.film is None:
-                raise InputError(f"{files.path}: a budget needs the pictures; give the clip")
             measurement = _measure(source, progress)
             assert isinstance(measurement, Measurement)
+            assert source.film is not None
             made = origin_of(inputs_of(files.path, source.rig, run), run)
             progress(Stage("working out the budget and writing its page"))
             found = write_budget(source.film, measurement, source.rig, out, made)
@@ -165,6 +164,7 @@ def _read_files(
     rig: Rig | None,
     frames: FrameRange,
     list_folder: Callable[[Path], list[Path]],
+    require: Callable[[ClipFiles], None] = lambda files: None,
 ) -> tuple[list[ClipFiles], list[AnglecamError]]:
     """Return the clips whose files are as they should be, and what is wrong with the others; leave where none is.
 
@@ -183,12 +183,19 @@ def _read_files(
             raise RigError(f"{clip}: {other} has the same name; measure them to separate folders")
     for clip in names.values():
         try:
-            asked.append(read_clip_files(clip, rig, frames))
+            files = read_clip_files(clip, rig, frames)
+            require(files)
+            asked.append(files)
         except AnglecamError as problem:
             problems.append(problem)
     if not asked:
         end(problems)
     return asked, problems
+
+
+def _require_film(files: ClipFiles) -> None:
+    if files.is_tracks:
+        raise InputError(f"{files.path}: a budget needs the pictures; give the clip")
 
 
 def _for_each(

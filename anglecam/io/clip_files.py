@@ -30,6 +30,11 @@ class ClipFiles:
     film: Path | None
     """The clip; of tracks the clip that they were made from, ``None`` where it is not in the same folder."""
 
+    @property
+    def is_tracks(self) -> bool:
+        """Whether another program has found the points already."""
+        return self.path.suffix.lower() in TRACKS_ENDINGS
+
 
 def read_clip_files(path: Path, rig: Rig | None = None, frames: FrameRange = (None, None)) -> ClipFiles:
     """Read what is declared about a clip or tracks in the same folder, and check that they can be read.

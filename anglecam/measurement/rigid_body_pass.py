@@ -68,8 +68,9 @@ def detect_rigid_body(film: Film, rig: Rig, progress: Progress = unseen) -> Dete
 def detect_outline(film: Film, rig: Rig, progress: Progress = unseen) -> Detections | str:
     """Follow the outline of what moves before a still background; arguments and result as of `detect_rigid_body`."""
     sample = film.sample(frames_to_keep(film))
-    frames = watched(film.frames(), progress, "learning the outline of what moves", film.count)
-    learnt = learn_outline(sample.frames, frames)
+    learnt = learn_outline(
+        sample.frames, watched(film.frames(), progress, "learning the outline of what moves", film.count)
+    )
     if isinstance(learnt, str):
         return learnt
     outline = follow_outline(watched(film.frames(), progress, "following the outline", film.count), learnt)
