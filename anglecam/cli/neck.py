@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
+from anglecam.cli.progress import stages
 from anglecam.errors import RigError
 from anglecam.io.files import json_text, write_json
 from anglecam.io.model_json import read_model_file
 from anglecam.io.series_csv import read_series
+from anglecam.progress import Stage
 from anglecam.terminal import make_folder, screen
 
 if TYPE_CHECKING:
@@ -257,13 +259,14 @@ def power(
     from anglecam.io.power_csv import read_power_log
 
     spans = [_span(text) for text in nod or ()]
-    measured = read_power_log(log)
-    from anglecam.neck.power import power_use
-    from anglecam.neck_design.figures.power import power_figure
-    from anglecam.neck_design.results.power import power_of
+    with _call(None):
+        measured = read_power_log(log)
+        from anglecam.neck.power import power_use
+        from anglecam.neck_design.figures.power import power_figure
+        from anglecam.neck_design.results.power import power_of
 
-    result = power_of(measured, power_use(measured, spans or None))
-    _show("power", result, {"power": power_figure}, out, as_json)
+        result = power_of(measured, power_use(measured, spans or None))
+        _show("power", result, {"power": power_figure}, out, as_json)
 
 
 def _show(
@@ -295,11 +298,13 @@ def _show(
 
 @contextmanager
 def _call(neck: Path | None) -> Iterator[None]:
-    """Report a ValueError of a calculation as a fault of the call or of the neck file."""
-    try:
-        yield
-    except ValueError as refusal:
-        raise RigError(f"{neck or 'anglecam neck'}: {refusal}") from refusal
+    """Show that something is calculated, and report a ValueError as a fault of the call or of the neck file."""
+    with stages() as progress:
+        progress(Stage("calculating and drawing"))
+        try:
+            yield
+        except ValueError as refusal:
+            raise RigError(f"{neck or 'anglecam neck'}: {refusal}") from refusal
 
 
 def _declared(neck: Path | None) -> DeclaredNeck:
