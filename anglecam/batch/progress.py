@@ -44,8 +44,8 @@ class ProgressDisplay:
         self._clips, self._sessions = clips, sessions
         self._began = self._last_line = time.monotonic()
         self.begin("measuring")
-        self._bars.reset(self._clip_bar, total=clips, visible=True, count=f"0 of {clips}")
-        self._bars.reset(self._session_bar, total=sessions, visible=sessions > 0, count=f"0 of {sessions}")
+        self._bars.reset(self._clip_bar, total=clips, visible=True, count=f"0 of {clips}", rate="")
+        self._bars.reset(self._session_bar, total=sessions, visible=sessions > 0, count=f"0 of {sessions}", rate="")
 
     def add_clip(self, record: ClipRecord, *, unchanged: bool) -> None:
         """Count a clip and show its outcome."""

@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from anglecam.batch import progress as batch
+from anglecam.batch.records import ClipRecord
+from anglecam.batch.row import Row
 from anglecam.cli import app, progress
 from anglecam.progress import Stage
 from anglecam.workflow.clip import measure_source, open_source
@@ -64,6 +67,19 @@ def test_the_terminal_shows_each_stage_from_loading_to_the_last_file(clip, tmp_p
     assert "loading" in text
     assert "drawing the overlay" in text
     assert "0/?" not in text
+
+
+def test_a_batch_shows_what_it_does_before_and_after_its_clips(monkeypatch):
+    terminal = Console(file=StringIO(), force_terminal=True, width=160)
+    monkeypatch.setattr(batch, "errors", terminal)
+    with batch.show_progress(quiet=False) as display:
+        display.begin("reading the records of earlier batches")
+        display.begin_jobs(3, 1)
+        terminal.print("between")  # draws the bars anew
+        display.add_clip(ClipRecord("a.avi", Row("a.avi"), "a"), unchanged=False)
+        display.begin("writing the index")
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", terminal.file.getvalue())
+    assert re.search(r"looking for clips.*measuring.*0 of 3.*writing the index.*1 of 3", text, re.DOTALL)
 
 
 def _recorded(monkeypatch, terminal: Console) -> list[str]:
