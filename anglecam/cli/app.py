@@ -6,8 +6,6 @@ problem with the call or a rig file is one line and exit status 2. Progress is s
 
 from __future__ import annotations
 
-import atexit
-import gc
 import io
 import sys
 from pathlib import Path
@@ -67,7 +65,6 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a file's name may be bytes that are not text
             stream.reconfigure(errors="backslashreplace")
-    atexit.register(gc.freeze)  # else the interpreter searches all that was loaded for garbage, for half a second
     try:
         with blame(Path("anglecam")):
             app()
