@@ -30,6 +30,8 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
         measurement = measure_source(source, progress=within(_progress, clip.name))
         _progress(Stage("writing the series and its plot", of=clip.name))
         write_measurement(measurement, source.command, out)
+        frames = len(measurement.series.time)
+        _progress(Stage("done", frames, frames, clip.name))
     if measurement.doubt:
         raise InputError(f"{clip}: {measurement.doubt}")
     return {"by": measurement.by, "pivot": measurement.pivot, "notes": list(measurement.notes)}
