@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from anglecam.errors import AnglecamError, InputError, RigError
@@ -15,6 +14,8 @@ if TYPE_CHECKING:
     from anglecam.io.rig import Rig
     from anglecam.io.session import Session
     from anglecam.loop.verdict import Verdict
+
+    __version__: str
 
 _HOME = {
     "measure": "anglecam.api",
@@ -44,7 +45,6 @@ __all__ = [
     "identify",
     "measure",
 ]
-__version__ = version("anglecam")
 
 
 def __getattr__(name: str) -> Any:
@@ -54,6 +54,10 @@ def __getattr__(name: str) -> Any:
 
             prepare_kernels(__name__)
         return getattr(import_module(_HOME[name]), name)
+    if name == "__version__":
+        from importlib.metadata import version  # reads the whole library of e-mail headers
+
+        return version("anglecam")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import psutil
 
-def free_memory() -> int | None:
-    """Return what the machine and the control group leave, bytes; ``None`` where the system does not tell."""
-    left = []
-    meminfo = Path("/proc/meminfo")
-    if meminfo.exists():
-        lines = dict(line.split(":", 1) for line in meminfo.read_text().splitlines())
-        left.append(int(lines["MemAvailable"].split()[0]) * 1024)
+
+def free_memory() -> int:
+    """Return what the machine and, on Linux, the control group leave, bytes."""
+    left = int(psutil.virtual_memory().available)
     group = Path("/sys/fs/cgroup")
     limit, used = group / "memory.max", group / "memory.current"
-    if limit.exists() and used.exists() and (text := limit.read_text().strip()) != "max":
-        left.append(int(text) - int(used.read_text()))
-    return min(left, default=None)
+    if limit.exists() and used.exists() and (text := limit.read_text(encoding="ascii").strip()) != "max":
+        left = min(left, int(text) - int(used.read_text(encoding="ascii")))
+    return left

@@ -9,8 +9,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Generic, TypeVar
 
-import cv2
-
 T = TypeVar("T")
 R = TypeVar("R")
 ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMBA")}
@@ -52,6 +50,8 @@ def map_in_threads(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
 @contextmanager
 def one_opencv_thread() -> Iterator[None]:
     """Let OpenCV use one thread while the block runs: for small pictures, starting others costs more than it saves."""
+    import cv2  # what counts the cores need not load it
+
     before = cv2.getNumThreads()
     cv2.setNumThreads(1)
     try:

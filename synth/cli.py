@@ -1,6 +1,6 @@
 """The command ``synth``: render a session, score anglecam's results against the truth, show the shipped specs.
 
-Each command imports its modules when it is called, so that help and usage errors appear at once.
+Each command reads its spec first and then imports what draws, so that help and errors appear at once.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ def render_command(
     truth: Annotated[Path, typer.Option(help="folder for the truth, apart from --out")],
 ) -> None:
     """Render a session of clips and write the true motion to a separate folder."""
-    prepare_kernels("synth")
     from synth.session import render
 
     render(spec, out, truth)
@@ -49,10 +48,13 @@ def gallery_command(
     specs: Annotated[list[Path] | None, typer.Argument(help="specs, YAML; all of configs/ by default")] = None,
 ) -> None:
     """Render one frame of every spec to a contact sheet."""
+    from synth.spec import read_spec
+
+    read = {path: read_spec(path) for path in specs or []}
     prepare_kernels("synth")
     from synth.gallery import gallery
 
-    Console().print(str(gallery(specs or [], out)), soft_wrap=True)
+    Console().print(str(gallery(read, out)), soft_wrap=True)
 
 
 def main() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -25,13 +25,13 @@ _LABEL = 24
 """Height of the caption under a picture, px."""
 
 
-def gallery(specs: Sequence[Path], out: Path) -> Path:
+def gallery(specs: Mapping[Path, Spec], out: Path) -> Path:
     """Render one frame of each spec to ``gallery.png``.
 
     Parameters
     ----------
-    specs : sequence of Path
-        The specs; empty for all shipped specs.
+    specs : mapping of Path to Spec
+        The specs and their files; empty for all shipped specs.
     out : Path
         Folder, created if it does not exist.
 
@@ -47,13 +47,14 @@ def gallery(specs: Sequence[Path], out: Path) -> Path:
     RenderError
         If this machine cannot draw off-screen.
     """
-    paths = list(specs) or sorted(SHIPPED.glob("*.yaml"))
-    if not paths:
+    shown = specs or {path: read_spec(path) for path in sorted(SHIPPED.glob("*.yaml"))}
+    if not shown:
         raise SpecError(f"{SHIPPED}: no specs there; name some")
     out.mkdir(parents=True, exist_ok=True)
     with progress_bar() as progress, ThreadPoolExecutor(workers()) as side_by_side:
-        drawn = progress.track(side_by_side.map(_one_frame, paths), total=len(paths), description="gallery")
-        tiles = [_labelled(picture, path.stem) for picture, path in zip(drawn, paths, strict=True)]
+        pictures = side_by_side.map(_one_frame, shown.keys(), shown.values())
+        drawn = progress.track(pictures, total=len(shown), description="gallery")
+        tiles = [_labelled(picture, path.stem) for picture, path in zip(drawn, shown, strict=True)]
     columns = min(len(tiles), math.ceil(math.sqrt(1.5 * len(tiles))))
     tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % columns)
     sheet = np.vstack([np.hstack(tiles[start : start + columns]) for start in range(0, len(tiles), columns)])
@@ -63,9 +64,8 @@ def gallery(specs: Sequence[Path], out: Path) -> Path:
     return written
 
 
-def _one_frame(path: Path) -> NDArray[np.uint8]:
+def _one_frame(path: Path, spec: Spec) -> NDArray[np.uint8]:
     """Draw the frame with the head farthest from neutral."""
-    spec: Spec = read_spec(path)
     seen = view(spec)
     try:
         take = perform(spec, seen)[0]

@@ -49,7 +49,7 @@ _EGL = "Mesa's EGL is needed: apt-get install libegl1 libgl1 libgl1-mesa-dri; or
 
 def workers() -> int:
     """Count the cores that this process may use."""
-    return len(os.sched_getaffinity(0))
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def studio(spec: Spec, seen: View, frames: int) -> Studio | Solo:

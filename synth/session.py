@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import asdict
 from pathlib import Path
 
-import numpy as np
-import yaml
-from numpy.typing import NDArray
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, ProgressColumn, SpinnerColumn, Task, TextColumn, TimeElapsedColumn
+from rich.text import Text
 
-from synth.clip import UNFINISHED, clip_writer, file_name
+from anglecam.prepare import prepare_kernels
 from synth.errors import SpecError
-from synth.render import Solo, Studio, studio
 from synth.spec import read_spec
-from synth.take import Take, perform, view
-from synth.truth import fingerprint, write_facts, write_take
 
 
 def render(path: Path, out: Path, truth: Path) -> None:
@@ -40,52 +33,13 @@ def render(path: Path, out: Path, truth: Path) -> None:
         If this machine cannot draw off-screen.
     """
     spec = read_spec(path)
-    seen = view(spec)
-    try:
-        takes = perform(spec, seen)
-    except SpecError as error:
-        raise SpecError(f"{path}: {error}") from error
-    session = {"rig.yaml"} | {file_name(take.recording.name, spec.camera) for take in takes}
-    session |= {f"{take.recording.name}.command.csv" for take in takes if take.command is not None}
-    secret = {"truth.json"} | {f"{take.recording.name}.truth.csv" for take in takes}
     _apart(out, truth)
-    for folder, ours in ((out, session), (truth, secret)):
-        _free(folder, ours)
+    prepare_kernels("synth")
+    with progress_bar() as progress:
+        bar = progress.add_task("loading", total=None)
+        from synth.draw_session import draw_session  # loads what simulates and draws, longer than a wrong call may take
 
-    (out / "rig.yaml").write_text(yaml.safe_dump(spec.declare, sort_keys=False), encoding="utf-8")
-    for take in takes:
-        if take.command is not None:
-            _write_command(out / f"{take.recording.name}.command.csv", take)
-
-    total = sum(len(take.table.stamps) for take in takes)
-    with progress_bar() as progress, studio(spec, seen, total) as drawing:
-        bar = progress.add_task("render", total=total)
-        write_facts(truth, spec, seen, asdict(drawing.edge_error()))
-        for take in takes:
-            progress.update(bar, description=f"render {take.recording.name}")
-            fingerprints = []
-            with clip_writer(out / file_name(take.recording.name, spec.camera), spec.camera, take.table) as write:
-                for frame in _with_duplicates(take, drawing):
-                    write(frame)
-                    fingerprints.append(fingerprint(frame))
-                    progress.advance(bar)
-            write_take(truth, seen, take, fingerprints)
-
-
-def _with_duplicates(take: Take, drawing: Studio | Solo) -> Iterator[NDArray[np.uint8]]:
-    """Yield every frame of the file; a duplicate repeats the previous picture, including its noise."""
-    drawn = drawing.film(take, np.flatnonzero(~take.table.repeats).tolist())
-    frame = next(drawn)
-    yield frame
-    for repeats in take.table.repeats[1:]:
-        frame = frame if repeats else next(drawn)
-        yield frame
-
-
-def _write_command(path: Path, take: Take) -> None:
-    assert take.command is not None
-    lines = [f"{time:.6f},{level:.6f}" for time, level in np.asarray(take.command)]
-    path.write_text("\n".join(["time_s,command_deg", *lines]) + "\n", encoding="utf-8")
+        draw_session(path, spec, out, truth, progress, bar)
 
 
 def _apart(out: Path, truth: Path) -> None:
@@ -94,25 +48,23 @@ def _apart(out: Path, truth: Path) -> None:
         raise SpecError(f"--truth {truth}: must not be --out, inside it or around it, or the truth leaks")
 
 
-def _free(folder: Path, ours: set[str]) -> None:
-    """Create a folder; raise `SpecError` if it holds files that are not of this session."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        there = {path.name for path in folder.iterdir() if not path.name.startswith(UNFINISHED)}
-    except OSError as error:
-        raise SpecError(f"{folder}: cannot be used ({error.strerror})") from error
-    if foreign := sorted(there - ours):
-        raise SpecError(f"{folder}: contains {foreign[0]}, which is not part of this session; give an empty folder")
-
-
 def progress_bar() -> Progress:
-    """Return a progress bar on standard error."""
+    """Return a progress bar on standard error, which is shown on a terminal only."""
+    console = Console(stderr=True)
     return Progress(
+        SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("frames"),
+        _Frames(),
         TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=console,
+        disable=not console.is_terminal,
     )
+
+
+class _Frames(ProgressColumn):
+    """How many frames are done, where their number is known."""
+
+    def render(self, task: Task) -> Text:
+        """Return the column's text."""
+        return Text("" if task.total is None else f"{task.completed:.0f} of {task.total:.0f} frames")

@@ -13,8 +13,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import fsspec
-
 from anglecam.errors import AnglecamError, InputError, RigError
 
 _IN_MEMORY = ("memory",)
@@ -31,7 +29,12 @@ def normalised(address: str) -> str:
         address = address.partition("://")[2] or "/"
     if is_remote(address):
         return address.rstrip("/") if not address.endswith("://") else address
-    return os.path.abspath(address)  # noqa: PTH100  (a symbolic link keeps its own name)
+    return with_slashes(os.path.abspath(address))  # noqa: PTH100  (a symbolic link keeps its own name)
+
+
+def with_slashes(path: str) -> str:
+    """Return a local path with slashes between its parts, as every system reads it and addresses have them."""
+    return path.replace(os.sep, "/")
 
 
 def is_remote(address: str) -> bool:
@@ -66,6 +69,8 @@ def store(address: str) -> tuple[Any, str]:
     """
     protocol = address.partition("://")[0]
     try:
+        import fsspec  # takes longer to load than a wrong call may
+
         return fsspec.core.url_to_fs(address)
     except ImportError as error:
         extra = "; pip install 'anglecam[s3]'" if protocol in ("s3", "s3a") else ""

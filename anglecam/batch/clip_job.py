@@ -17,7 +17,9 @@ from anglecam.batch.row import DOUBTFUL, OK, TRUNCATED, Row
 from anglecam.batch.trouble import Trouble, TroubleError, not_written
 from anglecam.batch.worker import Settings, clip_time_limit, fetch_beside, message_of, require_same_batch
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
+from anglecam.io.clip_files import read_clip_files
 from anglecam.io.command_csv import COMMAND_ENDING
+from anglecam.io.rig import read_rig
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,10 @@ def _measured(
         "into": str(into),
         "series_file": str(cached) if job.in_session else None,
     }
+    try:  # before a process is started that measures
+        read_clip_files(clip, None if settings.rig is None else read_rig(Path(settings.rig)))
+    except RigError as problem:
+        raise _unreadable(problem.one_line, job, work) from problem
     try:
         answer = process.ask(request, clip_time_limit(record.row.size_bytes or 0, settings))
     except ProcessLost as loss:
@@ -148,8 +154,7 @@ def _measured(
     if not is_remote(record.address) and stamp(record.address) != record.stamp:
         return record.failed("it changed while it was being measured", transient=True), {}
     if "unreadable" in answer:
-        file, _, cause = message_of(answer["unreadable"], job.address, work).partition(": ")
-        raise TroubleError(Trouble(file, cause, call_is_wrong=True))
+        raise _unreadable(answer["unreadable"], job, work)
     if "not_written" in answer:
         raise TroubleError(not_written(OSError(*answer["not_written"]), job.address, settings.out))
     if "cause" in answer:
@@ -165,3 +170,9 @@ def _measured(
         series=printable(f"{job.output_path}.angles.csv"),
     )
     return replace(record, row=row), made
+
+
+def _unreadable(message: str, job: ClipJob, work: Path) -> TroubleError:
+    """Return the trouble of a rig file, or its calibration, that cannot be read."""
+    file, _, cause = message_of(message, job.address, work).partition(": ")
+    return TroubleError(Trouble(file, cause, call_is_wrong=True))

@@ -90,7 +90,7 @@ def _write_run(folder: OutputFolder, run: str) -> None:
     """Write the run file: a line that names this process, and one that names a run."""
     made = folder.run_file.with_name("run.unfinished")
     try:
-        made.write_text(f"process {os.getpid()} on {socket.gethostname()}\n{run}\n")
+        made.write_text(f"process {os.getpid()} on {socket.gethostname()}\n{run}\n", encoding="utf-8")
         made.replace(folder.run_file)
     except OSError as problem:
         raise RigError(f"--out {folder.path}: cannot be written to ({problem.strerror})") from problem
@@ -98,6 +98,6 @@ def _write_run(folder: OutputFolder, run: str) -> None:
 
 def _lines(file: Path) -> list[str]:
     try:
-        return file.read_text().splitlines()
+        return file.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError):
         return []

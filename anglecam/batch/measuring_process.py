@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import json
 import os
-import selectors
+import queue
 import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import IO, Any
 
 from anglecam import end_with_parent
 from anglecam.prepare import prepare_kernels
@@ -73,12 +74,11 @@ class MeasuringProcess:
             process.stdin.flush()
         except OSError:
             raise ProcessLost(self._ended()) from None
-        with selectors.DefaultSelector() as ready:
-            ready.register(process.stdout, selectors.EVENT_READ)
-            if not ready.select(max(until - time.monotonic(), 0.0)):
-                self._end()
-                raise ProcessLost(f"took longer than its time limit of {time_limit:g} s")
-        line = process.stdout.readline()
+        try:
+            line = _next_line(process.stdout, max(until - time.monotonic(), 0.0))
+        except queue.Empty:
+            self._end()
+            raise ProcessLost(f"took longer than its time limit of {time_limit:g} s") from None
         if not line.endswith(b"\n"):
             raise ProcessLost(self._ended())
         answer: dict[str, Any] = json.loads(line)
@@ -120,6 +120,13 @@ class MeasuringProcess:
         if code >= 0:
             return f"the process that measured it ended with status {code}"
         return f"the process that measured it died of signal {-code} ({signal.Signals(-code).name})"
+
+
+def _next_line(stream: IO[bytes], patience_s: float) -> bytes:
+    """Return the next line; raise `queue.Empty` if it takes too long. A thread waits: Windows cannot poll a pipe."""
+    lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    threading.Thread(target=lambda: lines.put(stream.readline()), daemon=True).start()
+    return lines.get(timeout=patience_s)
 
 
 def _start() -> subprocess.Popen[bytes]:

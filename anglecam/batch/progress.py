@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO
 
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from anglecam.batch.records import ClipRecord, SessionRecord
 from anglecam.batch.row import FAILED, OK, STALE
@@ -25,14 +25,27 @@ _LINE_EVERY_S = 10.0
 class ProgressDisplay:
     """Shows on standard error how many clips are done and have failed, the rate, and the time left."""
 
-    def __init__(self, clips: int, sessions: int, bars: Progress, *, quiet: bool) -> None:
-        self._clips = clips
+    def __init__(self, bars: Progress, *, quiet: bool) -> None:
+        self._clips = self._sessions = self._sessions_done = 0
         self._bars = bars
         self._plain = not quiet and not errors.is_terminal
         self._done = self._failed = 0
         self._began = self._last_line = time.monotonic()
-        self._clip_bar = bars.add_task("clips", total=clips, rate="")
-        self._session_bar = bars.add_task("sessions", total=sessions, visible=sessions > 0, rate="")
+        self._stage = bars.add_task("looking for clips", total=None, count="", rate="")
+        self._clip_bar = bars.add_task("clips", total=None, visible=False, count="", rate="")
+        self._session_bar = bars.add_task("sessions", total=None, visible=False, count="", rate="")
+
+    def begin(self, stage: str) -> None:
+        """Show what is being done."""
+        self._bars.update(self._stage, description=stage)
+
+    def begin_jobs(self, clips: int, sessions: int) -> None:
+        """Show the numbers of clips to measure and of sessions to fit."""
+        self._clips, self._sessions = clips, sessions
+        self._began = self._last_line = time.monotonic()
+        self.begin("measuring")
+        self._bars.reset(self._clip_bar, total=clips, visible=True, count=f"0 of {clips}", rate="")
+        self._bars.reset(self._session_bar, total=sessions, visible=sessions > 0, count=f"0 of {sessions}", rate="")
 
     def add_clip(self, record: ClipRecord, *, unchanged: bool) -> None:
         """Count a clip and show its outcome."""
@@ -41,7 +54,7 @@ class ProgressDisplay:
         elapsed = time.monotonic() - self._began
         rate = self._done / elapsed if elapsed > 0.0 else 0.0
         figures = f"{rate:.3g}/s, {self._failed} failed"
-        self._bars.update(self._clip_bar, advance=1, rate=figures)
+        self._bars.update(self._clip_bar, advance=1, count=f"{self._done} of {self._clips}", rate=figures)
         if not self._plain:
             return
         if self._clips <= _LINE_PER_CLIP_UP_TO:
@@ -54,7 +67,8 @@ class ProgressDisplay:
 
     def add_session(self, record: SessionRecord, *, unchanged: bool) -> None:
         """Count a session and show its outcome."""
-        self._bars.update(self._session_bar, advance=1, rate="")
+        self._sessions_done += 1
+        self._bars.update(self._session_bar, advance=1, count=f"{self._sessions_done} of {self._sessions}")
         if self._plain and self._clips <= _LINE_PER_CLIP_UP_TO:
             errors.print(f"session {record.address}: {_session_outcome(record, unchanged=unchanged)}")
 
@@ -78,13 +92,11 @@ def _session_outcome(record: SessionRecord, *, unchanged: bool) -> str:
 
 
 @contextmanager
-def show_progress(clips: int, sessions: int, *, quiet: bool) -> Iterator[ProgressDisplay]:
+def show_progress(*, quiet: bool) -> Iterator[ProgressDisplay]:
     """Show progress while the block runs.
 
     Parameters
     ----------
-    clips, sessions : int
-        Their numbers.
     quiet : bool
         Show nothing.
 
@@ -94,15 +106,16 @@ def show_progress(clips: int, sessions: int, *, quiet: bool) -> Iterator[Progres
         To which the outcomes are added.
     """
     columns = (
+        SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
-        MofNCompleteColumn(),
+        TextColumn("{task.fields[count]}"),
         TextColumn("{task.fields[rate]}"),
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
     with Progress(*columns, console=errors, disable=quiet or not errors.is_terminal) as bars:
-        yield ProgressDisplay(clips, sessions, bars, quiet=quiet)
+        yield ProgressDisplay(bars, quiet=quiet)
 
 
 class Log:

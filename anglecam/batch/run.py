@@ -115,43 +115,46 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
         read_rig(options.rig)
     make_folder(out)
     folder = OutputFolder(out.resolve())
-    sources, search, problems = find_sources(asked, folder.path)
-    if options.dask is not None:
-        _require_shared(sources)
     pruned: list[Pruned] = []
-    with (
-        open_log(options.log) as log,
-        locked(folder) as interrupted,
-        RecordDatabase(folder.database_file) as database,
-    ):
-        earlier = database.read_all(ClipRecord)  # before anything is written: what cannot be read must not be replaced
-        if interrupted is not None:
-            recover(interrupted, folder, database)
-            earlier = database.read_all(ClipRecord)
-        folder.clear_unfinished()
-        run = start_run(folder)
-        settings = Settings(
-            out=str(folder.path),
-            run=run,
-            rig=None if options.rig is None else str(options.rig.resolve()),
-            retry_failed=options.retry_failed,
-            time_limit=options.time_limit,
-        )
-        plan = plan_jobs(sources, search, earlier, database.read_all(SessionRecord), close=options.close)
-        with contextlib.suppress(OSError):  # such as a full disk
-            database.save(*plan.removed)
-        summary = Summary(folder, run, plan.earlier, plan.earlier_sessions, plan.sessions)
+    with show_progress(quiet=options.quiet) as display:
+        sources, search, problems = find_sources(asked, folder.path)
+        if options.dask is not None:
+            _require_shared(sources)
+        display.begin("reading the records of earlier batches")
         with (
-            _worker_pool(settings, options) as pool,
-            show_progress(len(sources), len(plan.sessions), quiet=options.quiet) as display,
+            open_log(options.log) as log,
+            locked(folder) as interrupted,
+            RecordDatabase(folder.database_file) as database,
         ):
-            try:
-                _do_jobs(plan, pool, partial(publish, folder=folder, database=database), summary, display, log)
-                if options.prune:
-                    pruned = _prune(plan, search, folder, database, summary)
-            finally:
-                summary.write_index()
-        folder.clear_unfinished()
+            # before anything is written: what cannot be read must not be replaced
+            earlier = database.read_all(ClipRecord)
+            if interrupted is not None:
+                recover(interrupted, folder, database)
+                earlier = database.read_all(ClipRecord)
+            folder.clear_unfinished()
+            run = start_run(folder)
+            settings = Settings(
+                out=str(folder.path),
+                run=run,
+                rig=None if options.rig is None else str(options.rig.resolve()),
+                retry_failed=options.retry_failed,
+                time_limit=options.time_limit,
+            )
+            plan = plan_jobs(sources, search, earlier, database.read_all(SessionRecord), close=options.close)
+            with contextlib.suppress(OSError):  # such as a full disk
+                database.save(*plan.removed)
+            summary = Summary(folder, run, plan.earlier, plan.earlier_sessions, plan.sessions)
+            display.begin_jobs(len(sources), len(plan.sessions))
+            with _worker_pool(settings, options) as pool:
+                try:
+                    _do_jobs(plan, pool, partial(publish, folder=folder, database=database), summary, display, log)
+                    if options.prune:
+                        display.begin("removing stale results")
+                        pruned = _prune(plan, search, folder, database, summary)
+                finally:
+                    display.begin("writing the index")
+                    summary.write_index()
+            folder.clear_unfinished()
     return Result(summary.rows(), (*problems, *out_of_reach(search, earlier), *summary.problems()), tuple(pruned))
 
 

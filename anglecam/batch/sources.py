@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from anglecam.batch.address import asking, is_remote, join, name, normalised, parent, store
+from anglecam.batch.address import asking, is_remote, join, name, normalised, parent, store, with_slashes
 from anglecam.errors import AnglecamError, InputError, RigError
 from anglecam.io.session import CLIP_ENDINGS
 
@@ -149,7 +149,8 @@ def _kind(address: str) -> tuple[bool, bool]:
 
 def _matches(pattern: str, root: str) -> list[str]:
     if not is_remote(pattern):
-        return glob.glob(pattern, recursive=True)  # noqa: PTH207  (Path.glob takes no absolute pattern)
+        found = glob.glob(pattern, recursive=True)  # noqa: PTH207  (Path.glob takes no absolute pattern)
+        return [with_slashes(match) for match in found]
     with asking(pattern) as (fs, path):
         return _below(root, fs.glob(path))
 
@@ -169,14 +170,14 @@ def _search(folder: str, out: Path, search: Search, problems: list[AnglecamError
 
     def denied(problem: OSError) -> None:
         problems.append(InputError(f"{problem.filename}: cannot be searched ({problem.strerror})"))
-        search.unreachable.append(problem.filename)
+        search.unreachable.append(with_slashes(problem.filename))
 
     clips = []
     for here, below, files in os.walk(folder, onerror=denied):
         if here != folder and not below and not files:
-            search.empty.append(here)
+            search.empty.append(with_slashes(here))
         below[:] = [d for d in below if not d.startswith(".") and Path(here, d).resolve() != out]
-        clips += [join(here, file) for file in files if _is_clip(file) and not file.startswith(".")]
+        clips += [join(with_slashes(here), file) for file in files if _is_clip(file) and not file.startswith(".")]
     return sorted(clips)
 
 

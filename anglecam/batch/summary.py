@@ -7,7 +7,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from anglecam.batch.address import name, parent
-from anglecam.batch.index import write_index
 from anglecam.batch.output_folder import OutputFolder
 from anglecam.batch.prune import Pruned
 from anglecam.batch.records import ClipRecord, SessionRecord
@@ -108,6 +107,8 @@ class Summary:
 
     def write_index(self) -> None:
         """Write the index. A failure is kept and reported at the end, unless a later attempt succeeds."""
+        from anglecam.batch.index import write_index  # pyarrow takes longer to load than a wrong call may
+
         try:
             write_index(self.rows(), self._folder, self._run)
             self._index_problem = None

@@ -17,6 +17,7 @@ from anglecam.camera.calibration import Calibration
 from anglecam.camera.chessboard import find_corners
 from anglecam.data.typing import Floats
 from anglecam.errors import InputError
+from anglecam.progress import Progress, Stage, unseen, watched
 from anglecam.video.film import Film
 
 _STRETCHES = 120
@@ -94,7 +95,9 @@ class _Fit:
     per_view: Floats
 
 
-def calibrate_clip(film: Film, board: tuple[int, int], square_m: float = 1.0) -> BoardCalibration:
+def calibrate_clip(
+    film: Film, board: tuple[int, int], square_m: float = 1.0, *, progress: Progress = unseen
+) -> BoardCalibration:
     """Calibrate a camera from a clip that shows a chessboard in many poses.
 
     Parameters
@@ -105,6 +108,8 @@ def calibrate_clip(film: Film, board: tuple[int, int], square_m: float = 1.0) ->
         Number of inner corners, columns and rows: a board of 10 by 7 squares has (9, 6).
     square_m : float
         Side of a square, m. It scales the distances to the board and does not affect the calibration.
+    progress : Progress
+        Called with each stage, and after each frame.
 
     Returns
     -------
@@ -121,7 +126,7 @@ def calibrate_clip(film: Film, board: tuple[int, int], square_m: float = 1.0) ->
         raise InputError(f"{clip}: a board needs at least 3×3 inner corners and squares larger than zero")
     size = film.size
     name = f"chessboard of {board[0]}×{board[1]} inner corners"
-    seen, searched = _search(film, board)
+    seen, searched = _search(film, board, progress)
     if not seen:
         raise InputError(
             f"{clip}: {name} not found in any of {searched} frames searched; count the corners where four squares"
@@ -133,6 +138,7 @@ def calibrate_clip(film: Film, board: tuple[int, int], square_m: float = 1.0) ->
             f"{clip}: {name} found in {len(seen)} of {searched} frames searched, but in only {len(found)} different"
             f" poses; at least {_FEWEST_VIEWS} are needed, 15 are good: move and lean the board"
         )
+    progress(Stage("fitting the camera"))
     X = np.zeros((board[0] * board[1], 3))
     X[:, :2] = square_m * np.mgrid[: board[0], : board[1]].T.reshape(-1, 2)
     kept = _without_bad_views(X, [(view.frame, view.corners) for view in found], size)
@@ -171,16 +177,16 @@ def calibrate_clip(film: Film, board: tuple[int, int], square_m: float = 1.0) ->
     )
 
 
-def _search(film: Film, board: tuple[int, int]) -> tuple[list[_Seen], int]:
+def _search(film: Film, board: tuple[int, int], progress: Progress) -> tuple[list[_Seen], int]:
     """Find the board in the sharpest frame of each stretch of a clip; also return how many frames were searched."""
     sharpness = [
         -1.0 if f.image is None else float(cv2.Laplacian(cv2.cvtColor(f.image, cv2.COLOR_BGR2GRAY), cv2.CV_32F).var())
-        for f in film.frames()
+        for f in watched(film.frames(), progress, "looking for sharp pictures", film.rows.declared)
     ]
     stretches = np.array_split(np.arange(len(sharpness)), min(_STRETCHES, len(sharpness)))
     chosen = {int(part[np.argmax(np.array(sharpness)[part])]) for part in stretches}
     found: list[_Seen] = []
-    for frame in film.frames():
+    for frame in watched(film.frames(), progress, "looking for the chessboard", len(sharpness)):
         if frame.index in chosen and frame.image is not None:
             corners = find_corners(cv2.cvtColor(frame.image, cv2.COLOR_BGR2GRAY), board)
             if corners is not None:

@@ -9,7 +9,7 @@ at a time, and covers all of these intervals. Otherwise it would hold only if th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +27,7 @@ from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.loop.stepwise import applicable
 from anglecam.loop.verdict import Accepted, Verdict
 from anglecam.models.plant import FASTEST, Plant
+from anglecam.progress import Progress, Stage, unseen
 from anglecam.threads import map_in_threads
 
 BREAKAWAY_STARTS = 6
@@ -106,9 +107,7 @@ class Certificate:
         return self.holds or (self.is_certified and (one.accepted or one.state != "measured"))
 
 
-def certify(
-    verdict: Verdict, clock: Clock = NO_LAMP, progress: Callable[[str], None] = lambda stage: None
-) -> Certificate:
+def certify(verdict: Verdict, clock: Clock = NO_LAMP, progress: Progress = unseen) -> Certificate:
     """Compute the certificate of the servo in a session's recordings.
 
     Parameters
@@ -117,8 +116,8 @@ def certify(
         From `anglecam.loop.close.close_records`; its fitted recordings are used.
     clock : Clock
         Of the session.
-    progress : callable
-        Receives the name of each stage as it begins.
+    progress : Progress
+        Called with each stage.
 
     Returns
     -------
@@ -127,10 +126,10 @@ def certify(
     """
     rate = plant_of(verdict.after).fastest / FASTEST
     ledger = {e.id: e for e in applicable([*verdict.fitted, *verdict.held_out], rate)}
-    progress("intervals")
+    progress(Stage("working out the servo's intervals"))
     with threadpool_limits(1, "blas"):
         found = map_in_threads(lambda one: _certified(verdict, one, ledger.get(one.effect_id), clock), QUANTITIES)
-        progress("experiments")
+        progress(Stage("designing experiments"))
         whole = tuple(_with_experiment(verdict, one) if one.state == "not_determined" else one for one in found)
     return Certificate(verdict, whole, clock)
 

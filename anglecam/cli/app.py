@@ -13,7 +13,6 @@ from typing import Annotated
 
 import typer
 
-from anglecam import __version__
 from anglecam.cli.batch import batch
 from anglecam.cli.certify import certify
 from anglecam.cli.check import check
@@ -40,6 +39,8 @@ app = typer.Typer(
 
 def _version(wanted: bool) -> None:
     if wanted:
+        from anglecam import __version__
+
         print(f"anglecam {__version__}")
         raise typer.Exit
 

@@ -15,13 +15,13 @@ def certify(
     hold_out: HoldOut = None,
 ) -> None:
     """Certify a servo: all that `close` writes, and a page with 95 % intervals of its backlash, friction and limits."""
-    from anglecam.certificate.statement import doubt
-    from anglecam.report.certificate_page import certificate_table
-    from anglecam.workflow.certified import FILE, PAGE, write_certificate
-
     measured, verdict = close_and_report(session, out, hold_out or ())
-    with stages() as begin:
-        certificate = write_certificate(measured, verdict, out, progress=begin)
+    with stages(lines=True) as progress:
+        from anglecam.certificate.statement import doubt
+        from anglecam.report.certificate_page import certificate_table
+        from anglecam.workflow.certified import FILE, PAGE, write_certificate
+
+        certificate = write_certificate(measured, verdict, out, progress=progress)
     report_file("certificate", out / FILE)
     if (why := doubt(certificate)) is not None:
         screen.print(why, soft_wrap=True, highlight=False)

@@ -9,11 +9,13 @@ import typer
 
 from anglecam.cli.json_output import report
 from anglecam.cli.options import FirstFrame, RigFile
-from anglecam.cli.progress import progress_bars
+from anglecam.cli.progress import begin_loading, stages
 from anglecam.errors import printable
+from anglecam.io.clip_files import read_clip_files
 from anglecam.io.files import write_json
 from anglecam.io.rig import Rig, read_rig
 from anglecam.io.session import command_of
+from anglecam.progress import within
 from anglecam.terminal import make_folder, screen
 
 
@@ -27,22 +29,17 @@ def check(
     out: Annotated[Path | None, typer.Option("--out", help="Folder for NAME.check.json; made if missing.")] = None,
 ) -> None:
     """Predict from a few seconds of film how sure the angle will be, what could be seen, and what would help."""
-    from anglecam.report.check_tables import advice_table, prediction_table, smallest_table
-    from anglecam.workflow.check import check_clip
-
     declared = read_rig(rig) if rig else None
     play = None if command is None else command_of(command, declared or Rig())
     if out is not None:
         make_folder(out)
-    with progress_bars() as bars:
-        bar = bars.add_task(clip.name, total=None)
-        found = check_clip(
-            clip,
-            declared,
-            play,
-            first,
-            progress=lambda n, total: bars.update(bar, completed=n, total=total or None),
-        )
+    read_clip_files(clip, declared)
+    with stages() as progress:
+        begin_loading(progress)
+        from anglecam.report.check_tables import advice_table, prediction_table, smallest_table
+        from anglecam.workflow.check import check_clip
+
+        found = check_clip(clip, declared, play, first, progress=within(progress, clip.name))
     for note in found.notes:
         screen.print(printable(f"{clip}: {note}"), soft_wrap=True, highlight=False, markup=False)
     report(check=found.as_dict())

@@ -1,6 +1,6 @@
 """The commands that work on single clips: `measure`, `budget`, `calibrate`.
 
-The modules that a command needs are imported inside it: loading all of them takes longer than many a call.
+What is wrong with a call is found before the modules that measure are loaded, which takes longer than many a call.
 """
 
 from __future__ import annotations
@@ -14,9 +14,11 @@ import typer
 from anglecam.cli.documents import calibration_as_dict, clip_as_dict
 from anglecam.cli.json_output import report
 from anglecam.cli.options import FirstFrame, LastFrame, Out, RigFile
-from anglecam.cli.progress import end, progress_bars
+from anglecam.cli.progress import begin_loading, end, stages
 from anglecam.cli.this_run import this_run
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
+from anglecam.io.clip_files import ClipFiles, FrameRange, read_clip_files
+from anglecam.io.files import require_film_file
 from anglecam.io.netcdf_parquet import Also
 from anglecam.io.rig import Rig, RigFrames, read_rig
 from anglecam.io.session import (
@@ -28,11 +30,10 @@ from anglecam.io.session import (
     rig_beside,
 )
 from anglecam.io.tracks.files import tracker_names
+from anglecam.progress import Progress, Stage, within
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from anglecam.measurement.clip import Measurement
     from anglecam.measurement.tracks import MeasuredTracks
     from anglecam.workflow.clip import Source
@@ -53,34 +54,35 @@ def measure(
     ] = None,
 ) -> None:
     """Measure the angle in every frame: NAME.angles.csv, a plot and a page with the film for each clip."""
-    from anglecam.measurement.step_response import responses_as_dicts
-    from anglecam.report.clip_tables import response_table, series_table
-    from anglecam.workflow.clip import open_source, write_clip_overlay, write_clip_page, write_measurement
-
     run = this_run(rig)
     declared = read_rig(rig) if rig else None
-    names: dict[str, Path] = {}
-    measured, tables = [], []
+    asked, problems = _read_files(clips, out, declared, (first, last), lambda f: _clips_and_tracks(f, declared))
+    with stages() as progress:
+        begin_loading(progress)
+        from anglecam.measurement.step_response import responses_as_dicts
+        from anglecam.report.clip_tables import response_table, series_table
+        from anglecam.workflow.clip import open_files, write_clip_overlay, write_clip_page, write_measurement
 
-    def measure_one(clip: Path, bars: Progress) -> Measurement | MeasuredTracks:
-        name = recording_name(clip)
-        if name in names:
-            raise InputError(f"{clip}: {names[name]} has the same name; measure them to separate folders")
-        names[name] = clip
-        source = open_source(clip, declared, (first, last))
-        measurement = _measure(source, bars)
-        answers = write_measurement(measurement, source.command, out, also or ())
-        write_clip_page(source, measurement, answers, out, run)
-        if answers:
-            tables.append(response_table(clip.name, answers))
-        if overlay:
-            write_clip_overlay(source, measurement, out)
-        measured.append(measurement)
-        written = {"series": str(out / f"{name}{SERIES_ENDING}"), "responses": responses_as_dicts(answers)}
-        report(clips=[clip_as_dict(clip, measurement) | written])
-        return measurement
+        measured, tables = [], []
 
-    problems = _for_each(clips, out, lambda folder: _clips_and_tracks(folder, declared), measure_one)
+        def measure_one(files: ClipFiles, progress: Progress) -> Measurement | MeasuredTracks:
+            source = open_files(files)
+            measurement = _measure(source, progress)
+            name = measurement.series.name
+            progress(Stage("writing the series and its plot"))
+            answers = write_measurement(measurement, source.command, out, also or ())
+            progress(Stage("writing the page"))
+            write_clip_page(source, measurement, answers, out, run)
+            if answers:
+                tables.append(response_table(files.path.name, answers))
+            if overlay:
+                write_clip_overlay(source, measurement, out, progress)
+            measured.append(measurement)
+            written = {"series": str(out / f"{name}{SERIES_ENDING}"), "responses": responses_as_dicts(answers)}
+            report(clips=[clip_as_dict(files.path, measurement) | written])
+            return measurement
+
+        problems += _for_each(asked, progress, measure_one)
     if measured:
         screen.print(series_table(measured))
     for table in tables:
@@ -96,28 +98,31 @@ def budget(
     last: LastFrame = None,
 ) -> None:
     """Write the budget of the angle's uncertainty: NAME.budget.json and a page for each clip."""
-    from anglecam.budget.clip import budget_as_dict
-    from anglecam.measurement.clip import Measurement
-    from anglecam.report.budget_page import budget_table, write_budget
-    from anglecam.report.origin import origin_of
-    from anglecam.workflow.clip import inputs_of, open_source
-
     run = this_run(rig)
     declared = read_rig(rig) if rig else None
+    asked, problems = _read_files(clips, out, declared, (first, last), find_clips, _require_film)
+    with stages() as progress:
+        begin_loading(progress)
+        from anglecam.budget.clip import budget_as_dict
+        from anglecam.measurement.clip import Measurement
+        from anglecam.report.budget_page import budget_table, write_budget
+        from anglecam.report.origin import origin_of
+        from anglecam.workflow.clip import inputs_of, open_files
 
-    def budget_one(clip: Path, bars: Progress) -> Measurement | MeasuredTracks:
-        source = open_source(clip, declared, (first, last))
-        if source.is_tracks or source.film is None:
-            raise InputError(f"{clip}: a budget needs the pictures; give the clip")
-        measurement = _measure(source, bars)
-        assert isinstance(measurement, Measurement)
-        made = origin_of(inputs_of(clip, source.rig, run), run)
-        found = write_budget(source.film, measurement, source.rig, out, made)
-        screen.print(budget_table(found))
-        report(budgets=[budget_as_dict(found)])
-        return measurement
+        def budget_one(files: ClipFiles, progress: Progress) -> Measurement | MeasuredTracks:
+            source = open_files(files)
+            measurement = _measure(source, progress)
+            assert isinstance(measurement, Measurement)
+            assert source.film is not None
+            made = origin_of(inputs_of(files.path, source.rig, run), run)
+            progress(Stage("working out the budget and writing its page"))
+            found = write_budget(source.film, measurement, source.rig, out, made)
+            screen.print(budget_table(found))
+            report(budgets=[budget_as_dict(found)])
+            return measurement
 
-    end(_for_each(clips, out, find_clips, budget_one))
+        problems += _for_each(asked, progress, budget_one)
+    end(problems)
 
 
 def calibrate(
@@ -126,20 +131,23 @@ def calibrate(
     board: Annotated[str, typer.Option("--board", help="Inner corners, COLUMNSxROWS.")] = "9x6",
 ) -> None:
     """Find camera matrix and lens distortion from a chessboard: NAME.calibration.yaml and a figure."""
-    from anglecam.camera.calibrate import calibrate_clip
-    from anglecam.camera.calibration import write_calibration
-    from anglecam.report.calibration_figure import plot_calibration
-    from anglecam.video.open_film import open_film
-
     try:
         columns, rows = (int(side) for side in board.lower().split("x"))
     except ValueError:
         raise RigError(f"--board {board}: give the number of inner corners, such as 9x6") from None
     make_folder(out)
-    with blame(clip):
+    if not clip.is_dir():
+        require_film_file(clip)
+    with stages() as progress, blame(clip):
+        begin_loading(progress)
+        from anglecam.camera.calibrate import calibrate_clip
+        from anglecam.camera.calibration import write_calibration
+        from anglecam.report.calibration_figure import plot_calibration
+        from anglecam.video.open_film import open_film
+
         # the times of photographs of the board do not matter
         film = open_film(clip, RigFrames(rate_hz=1.0) if clip.is_dir() else None)
-        found = calibrate_clip(film, (columns, rows))
+        found = calibrate_clip(film, (columns, rows), progress=progress)
     path = out / f"{clip.stem}.calibration.yaml"
     write_calibration(found.calibration, path)
     report(calibration=calibration_as_dict(path, found))
@@ -150,25 +158,62 @@ def calibrate(
         errors.print(printable(note))
 
 
-def _for_each(
+def _read_files(
     paths: list[Path],
     out: Path,
+    rig: Rig | None,
+    frames: FrameRange,
     list_folder: Callable[[Path], list[Path]],
-    work: Callable[[Path, Progress], Measurement | MeasuredTracks],
+    require: Callable[[ClipFiles], None] = lambda files: None,
+) -> tuple[list[ClipFiles], list[AnglecamError]]:
+    """Return the clips whose files are as they should be, and what is wrong with the others; leave where none is.
+
+    Raises
+    ------
+    RigError
+        Where the results cannot be written to ``out``, or those of one clip would replace another's.
+    """
+    make_folder(out)
+    asked: list[ClipFiles] = []
+    problems: list[AnglecamError] = []
+    names: dict[str, Path] = {}
+    for clip in [*_expand(paths, problems, list_folder)]:
+        other = names.setdefault(recording_name(clip), clip)
+        if other is not clip:
+            raise RigError(f"{clip}: {other} has the same name; measure them to separate folders")
+    for clip in names.values():
+        try:
+            files = read_clip_files(clip, rig, frames)
+            require(files)
+            asked.append(files)
+        except AnglecamError as problem:
+            problems.append(problem)
+    if not asked:
+        end(problems)
+    return asked, problems
+
+
+def _require_film(files: ClipFiles) -> None:
+    if files.is_tracks:
+        raise InputError(f"{files.path}: a budget needs the pictures; give the clip")
+
+
+def _for_each(
+    asked: list[ClipFiles],
+    progress: Progress,
+    work: Callable[[ClipFiles, Progress], Measurement | MeasuredTracks],
 ) -> list[AnglecamError]:
     """Do the work for each clip and return the problems; a problem with one clip does not stop the others."""
-    make_folder(out)
     problems: list[AnglecamError] = []
-    with progress_bars() as bars:
-        for clip in _expand(paths, problems, list_folder):
-            try:
-                measurement = work(clip, bars)
-                if measurement.doubt:
-                    raise InputError(f"{clip}: {measurement.doubt}")
-            except AnglecamError as problem:
-                problems.append(problem)
-            except OSError as problem:
-                problems.append(InputError(f"{clip}: its results cannot be written ({problem.strerror or problem})"))
+    for files in asked:
+        try:
+            measurement = work(files, within(progress, files.path.name))
+            if measurement.doubt:
+                raise InputError(f"{files.path}: {measurement.doubt}")
+        except AnglecamError as problem:
+            problems.append(problem)
+        except OSError as problem:
+            problems.append(InputError(f"{files.path}: its results cannot be written ({problem.strerror or problem})"))
     return problems
 
 
@@ -195,11 +240,10 @@ def _clips_and_tracks(folder: Path, rig: Rig | None) -> list[Path]:
     return found
 
 
-def _measure(source: Source, bars: Progress) -> Measurement | MeasuredTracks:
+def _measure(source: Source, progress: Progress) -> Measurement | MeasuredTracks:
     from anglecam.workflow.clip import measure_source
 
-    bar = bars.add_task(source.path.name, total=None)
-    measurement = measure_source(source, progress=lambda n, total: bars.update(bar, completed=n, total=total or None))
+    measurement = measure_source(source, progress=progress)
     for note in measurement.notes:
         screen.print(printable(f"{source.path}: {note}"), soft_wrap=True, highlight=False, markup=False)
     return measurement

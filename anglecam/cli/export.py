@@ -8,7 +8,10 @@ from typing import Annotated
 import typer
 
 from anglecam.cli.json_output import report
+from anglecam.cli.progress import begin_loading, stages
 from anglecam.errors import RigError
+from anglecam.io.files import write_atomically
+from anglecam.io.model_json import model_file, read_model_file
 from anglecam.terminal import make_folder, screen
 
 ENDINGS = {"mujoco": ".xml", "urdf": ".urdf", "matlab": ".mat"}
@@ -25,20 +28,22 @@ def export(
     ] = 1.0,
 ) -> None:
     """Write a model for MuJoCo, as URDF or for MATLAB, and say what that format cannot express."""
-    from anglecam.identification.export import write_mat
-    from anglecam.identification.simulators.mechanism import linear_model, model_file, read_mechanism
-    from anglecam.identification.simulators.mjcf import mjcf_of
-    from anglecam.identification.simulators.urdf import urdf_of
-    from anglecam.io.files import write_atomically
-
     if to not in ENDINGS:
         raise RigError(f"--to {to}: choose one of {', '.join(ENDINGS)}")
     if not inertia > 0.0:
         raise RigError(f"--inertia {inertia:g}: must be above 0")
     source = model_file(model)
+    read_model_file(source)
     folder = source.parent if out is None else out
     path = folder / f"{source.stem}{ENDINGS[to]}"
     make_folder(folder)
+    with stages() as progress:
+        begin_loading(progress)
+        from anglecam.identification.export import write_mat
+        from anglecam.identification.simulators.mechanism import linear_model, read_mechanism
+        from anglecam.identification.simulators.mjcf import mjcf_of
+        from anglecam.identification.simulators.urdf import urdf_of
+
     if to == "matlab":
         linear, left_out = linear_model(source)
         write_mat(linear, path)

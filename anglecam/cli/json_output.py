@@ -40,7 +40,7 @@ def report(**content: Any) -> None:
 def report_file(key: str, path: Path) -> None:
     """Add the content of a JSON file that the command has written."""
     if _document.get() is not None and path.exists():
-        report(**{key: json.loads(path.read_text())})
+        report(**{key: json.loads(path.read_text(encoding="utf-8"))})
 
 
 def with_json(command: Callable[..., None]) -> Callable[..., None]:

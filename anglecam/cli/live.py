@@ -17,17 +17,19 @@ import typer
 from anglecam.cli.documents import clip_as_dict, live_as_dict
 from anglecam.cli.json_output import report
 from anglecam.cli.options import Out
-from anglecam.cli.progress import end, progress_bars
+from anglecam.cli.progress import begin_loading, end, stages
 from anglecam.data.rounding import with_uncertainty
 from anglecam.data.series import OK
 from anglecam.errors import AnglecamError, InputError, printable
+from anglecam.io.command_csv import COMMAND_ENDING
+from anglecam.io.files import require_film_file
 from anglecam.io.live_csv import LiveRow
 from anglecam.io.rig import read_rig
+from anglecam.io.session import command_of, recording_name, rig_beside
+from anglecam.progress import Progress, Stage
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from anglecam.video.live_source import LiveSource
     from anglecam.workflow.live import LiveResult
 
@@ -56,11 +58,6 @@ def live(
     ] = None,
 ) -> None:
     """Measure while filming: each angle as it comes, the recording, and the files that `measure` makes of it."""
-    from anglecam.io.command_csv import COMMAND_ENDING
-    from anglecam.io.session import command_of, recording_name, rig_beside
-    from anglecam.video.live_source import open_live
-    from anglecam.workflow.live import measure_live
-
     try:
         film = Path(source) if Path(source).is_file() else None
         make_folder(out)
@@ -69,10 +66,17 @@ def live(
             beside = film.with_name(recording_name(film) + COMMAND_ENDING)
             command = beside if beside.is_file() else None
         commanded = None if command is None else command_of(command, declared)
-        opened = open_live(source)
-        with progress_bars() as bars, _stopped_by_signals(opened):
-            display = _Display(bars)
-            result = measure_live(opened, out, declared, commanded, display.show, display.progress)
+        _require_source(source)
+        with stages() as progress:
+            begin_loading(progress)
+            from anglecam.video.live_source import open_live
+            from anglecam.workflow.live import measure_live
+
+            progress(Stage("opening the source"))
+            opened = open_live(source)
+            with _stopped_by_signals(opened):
+                display = _Display(progress)
+                result = measure_live(opened, out, declared, commanded, display.show, progress)
         if command is not None:
             _copy(command, out / (recording_name(result.film) + COMMAND_ENDING))
     except AnglecamError as problem:
@@ -84,12 +88,19 @@ def live(
     end([InputError(f"{result.film}: {doubt}")] if doubt else [])
 
 
+def _require_source(source: str) -> None:
+    """Raise `InputError` where a source that can only be a film is missing, empty or no file."""
+    path = Path(source)
+    is_camera = source.isdecimal() and not path.exists()
+    if not (source == "-" or "://" in source or is_camera or path.is_char_device() or path.is_fifo()):
+        require_film_file(path)
+
+
 class _Display:
     """Shows the last angle: on a terminal in one line that changes, elsewhere a line every second."""
 
-    def __init__(self, bars: Progress) -> None:
-        self._bars, self._on_terminal = bars, errors.is_terminal
-        self._bar = bars.add_task("learning", total=None)
+    def __init__(self, progress: Progress) -> None:
+        self._progress, self._on_terminal = progress, errors.is_terminal
         self._next = 0.0
         self._latencies: deque[float] = deque(maxlen=_RECENT)
         self._last: LiveRow | None = None
@@ -110,13 +121,9 @@ class _Display:
         self._next = now + (_TERMINAL_S if self._on_terminal else _LINES_S)
         line = _line(row, self._latencies, self._late)
         if self._on_terminal:
-            self._bars.update(self._bar, description=line)
+            self._progress(Stage(line))
         else:
             screen.print(line, soft_wrap=True, highlight=False)
-
-    def progress(self, done: int, total: int) -> None:
-        """Show how far the recording is measured."""
-        self._bars.update(self._bar, description="recording", completed=done, total=total or None)
 
 
 def _line(row: LiveRow, latencies: deque[float], late: int) -> str:

@@ -1,7 +1,7 @@
 """`anglecam neck`: the paper's design calculations, a verb each.
 
 Every verb prints tables, or with ``--json`` one JSON object and nothing else; with ``--out`` it writes the JSON and the
-figures. A verb imports what it needs when it is called, because python-control takes long to load.
+figures. A verb reads its files first and then imports what calculates and draws, which takes long to load.
 """
 
 from __future__ import annotations
@@ -14,11 +14,17 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
+from anglecam.cli.progress import stages
 from anglecam.errors import RigError
 from anglecam.io.files import json_text, write_json
+from anglecam.io.model_json import read_model_file
+from anglecam.io.series_csv import read_series
+from anglecam.prepare import prepare_kernels
+from anglecam.progress import Stage
 from anglecam.terminal import make_folder, screen
 
 if TYPE_CHECKING:
+    from anglecam.io.neck_file import DeclaredNeck
     from anglecam.neck_design.render import Result
 
 app = typer.Typer(
@@ -48,14 +54,14 @@ def kinematics(
     as_json: Json = False,
 ) -> None:
     """Compute four-bar and turning mechanism: Table 3, limits, commands of wanted nods."""
-    from anglecam.io.neck_file import read_neck
-    from anglecam.neck_design.figures.mechanism import linkage_figure, turning_figure
-    from anglecam.neck_design.results.kinematics import kinematics_of
-
     if any(math.isnan(a) for a in angle or ()):
         raise RigError("--angle nan: not a number")
     with _call(neck):
-        result = kinematics_of(read_neck(neck), [math.radians(a) for a in angle or ()])
+        declared = _declared(neck)
+        from anglecam.neck_design.figures.mechanism import linkage_figure, turning_figure
+        from anglecam.neck_design.results.kinematics import kinematics_of
+
+        result = kinematics_of(declared, [math.radians(a) for a in angle or ()])
         _show("kinematics", result, {"linkage": linkage_figure, "turning": turning_figure}, out, as_json)
 
 
@@ -70,12 +76,12 @@ def statics(
     as_json: Json = False,
 ) -> None:
     """Compare spring and weight: balance, pretension, the servo's torque."""
-    from anglecam.io.neck_file import read_neck
-    from anglecam.neck_design.figures.mechanism import statics_figure
-    from anglecam.neck_design.results.statics import statics_of
-
     with _call(neck):
-        result = statics_of(read_neck(neck), None if pretension is None else math.radians(pretension))
+        declared = _declared(neck)
+        from anglecam.neck_design.figures.mechanism import statics_figure
+        from anglecam.neck_design.results.statics import statics_of
+
+        result = statics_of(declared, None if pretension is None else math.radians(pretension))
         _show("statics", result, {"statics": statics_figure}, out, as_json)
 
 
@@ -95,16 +101,18 @@ def response(
 
     The models are Eqs. (28) and (31), SYS1 and SYS2, as in Figs. 10, 11, 14 and 15.
     """
-    from anglecam.identification.export import read_model
-    from anglecam.io.neck_file import read_neck
-    from anglecam.neck_design.figures.response import series_figure, step_figure
-    from anglecam.neck_design.results.response import response_of
-    from anglecam.neck_design.systems import driven_record, first_step, fitted_system, paper_systems, side_by_side
-
     with _call(neck):
         if not 0.0 < abs(step) < 180.0:
             raise ValueError(f"--step {step:g}: a step has a height, below 180°")
-        declared = read_neck(neck)
+        declared = _declared(neck)
+        _require_model(model)
+        if measured is not None:
+            read_series(measured)
+        from anglecam.identification.export import read_model
+        from anglecam.neck_design.figures.response import series_figure, step_figure
+        from anglecam.neck_design.results.response import response_of
+        from anglecam.neck_design.systems import driven_record, first_step, fitted_system, paper_systems, side_by_side
+
         systems = list(paper_systems(declared.large_angle))
         if model is not None:
             systems.append(fitted_system(read_model(model)))
@@ -145,15 +153,15 @@ def design(
 
     It computes the neck's quantities from a, b and c, and another neck from a wish.
     """
-    from anglecam.io.neck_file import read_neck
-    from anglecam.neck.pd_tuning import ADULT
-    from anglecam.neck.synthesis import Wish, synthesise
-    from anglecam.neck_design.figures.design import design_figure, synthesis_figure
-    from anglecam.neck_design.procedure import explain, identified_motion, routes_of, wish_of
-    from anglecam.neck_design.results.design import design_of
-
     with _call(neck):
-        declared = read_neck(neck)
+        declared = _declared(neck)
+        _require_model(model)
+        from anglecam.neck.pd_tuning import ADULT
+        from anglecam.neck.synthesis import Wish, synthesise
+        from anglecam.neck_design.figures.design import design_figure, synthesis_figure
+        from anglecam.neck_design.procedure import explain, identified_motion, routes_of, wish_of
+        from anglecam.neck_design.results.design import design_of
+
         found = identified_motion((a, b, c), sigma, model, declared.parameters.servo.command_gain)
         routes = routes_of(found, declared.known)
         explained = explain(routes, declared.example)
@@ -197,17 +205,17 @@ def pd(
 
     As in Eq. (37) and Fig. 16, for SYS2, for a fitted model, or with --neck for that neck.
     """
-    from anglecam.io.neck_file import read_neck
-    from anglecam.neck_design.figures.pd import pd_figure, tuning_figure
-    from anglecam.neck_design.procedure import chosen_plant, default_gains, wanted_nod
-    from anglecam.neck_design.results.pd import pd_of
-
     with _call(neck):
         if model is not None and neck is not None:
             raise ValueError("--model and --neck are two plants: give one of them")
         if not all(math.isfinite(gain) for gain in [*(proportional or ()), *(derivative or ())]):
             raise ValueError("--kp and --kd: a gain is a finite number")
-        declared = None if neck is None else read_neck(neck)
+        declared = None if neck is None else _declared(neck)
+        _require_model(model)
+        from anglecam.neck_design.figures.pd import pd_figure, tuning_figure
+        from anglecam.neck_design.procedure import chosen_plant, default_gains, wanted_nod
+        from anglecam.neck_design.results.pd import pd_of
+
         plant = chosen_plant(model, declared)
         K_p, K_d = default_gains(plant.transfer)
         target = wanted_nod(tune, like, rise, overshoot)
@@ -222,13 +230,12 @@ def sensitivity(neck: NeckFile = None, out: Out = None, as_json: Json = False) -
 
     It prints normalised sensitivities and draws Fig. 9 a-f.
     """
-    from anglecam.io.neck_file import read_neck
-    from anglecam.neck.sensitivity import figure_9, sensitivities
-    from anglecam.neck_design.figures.sensitivity import sensitivity_figure
-    from anglecam.neck_design.results.sensitivity import sensitivities_of
-
     with _call(neck):
-        parameters = read_neck(neck).parameters
+        parameters = _declared(neck).parameters
+        from anglecam.neck.sensitivity import figure_9, sensitivities
+        from anglecam.neck_design.figures.sensitivity import sensitivity_figure
+        from anglecam.neck_design.results.sensitivity import sensitivities_of
+
         figure = figure_9(parameters)
         result = sensitivities_of(sensitivities(parameters), figure)
         _show("sensitivity", result, {"sensitivity": sensitivity_figure}, out, as_json)
@@ -251,14 +258,16 @@ def power(
     As in Figs. 12 and 13.
     """
     from anglecam.io.power_csv import read_power_log
-    from anglecam.neck.power import power_use
-    from anglecam.neck_design.figures.power import power_figure
-    from anglecam.neck_design.results.power import power_of
 
     spans = [_span(text) for text in nod or ()]
-    measured = read_power_log(log)
-    result = power_of(measured, power_use(measured, spans or None))
-    _show("power", result, {"power": power_figure}, out, as_json)
+    with _call(None):
+        measured = read_power_log(log)
+        from anglecam.neck.power import power_use
+        from anglecam.neck_design.figures.power import power_figure
+        from anglecam.neck_design.results.power import power_of
+
+        result = power_of(measured, power_use(measured, spans or None))
+        _show("power", result, {"power": power_figure}, out, as_json)
 
 
 def _show(
@@ -290,11 +299,28 @@ def _show(
 
 @contextmanager
 def _call(neck: Path | None) -> Iterator[None]:
-    """Report a ValueError of a calculation as a fault of the call or of the neck file."""
-    try:
-        yield
-    except ValueError as refusal:
-        raise RigError(f"{neck or 'anglecam neck'}: {refusal}") from refusal
+    """Show that something is calculated, and report a ValueError as a fault of the call or of the neck file."""
+    with stages() as progress:
+        progress(Stage("calculating and drawing"))
+        try:
+            yield
+        except ValueError as refusal:
+            raise RigError(f"{neck or 'anglecam neck'}: {refusal}") from refusal
+
+
+def _declared(neck: Path | None) -> DeclaredNeck:
+    """Read a neck file before what calculates and draws is loaded; without one, the paper's neck."""
+    from anglecam.io.neck_file import read_neck
+
+    declared = read_neck(neck)
+    prepare_kernels("anglecam")
+    return declared
+
+
+def _require_model(model: Path | None) -> None:
+    """Raise `InputError` where the file of a model cannot be read."""
+    if model is not None:
+        read_model_file(model)
 
 
 def _span(text: str) -> tuple[float, float]:

@@ -1,16 +1,20 @@
-"""Progress bars, and how a command ends."""
+"""Progress on a terminal, and how a command ends."""
 
 from __future__ import annotations
 
+import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as Bars
 
 from anglecam.cli.json_output import report
-from anglecam.errors import AnglecamError, RigError
+from anglecam.errors import AnglecamError, RigError, printable
+from anglecam.prepare import prepare_kernels
+from anglecam.progress import Progress, Stage
 from anglecam.terminal import errors
 
 QUIET_S = 20.0
@@ -18,43 +22,82 @@ QUIET_S = 20.0
 
 
 @contextmanager
-def progress_bars() -> Iterator[Progress]:
-    """Show progress bars on standard error while the block runs, on a terminal only."""
+def progress_bars() -> Iterator[Bars]:
+    """Show what is being done on standard error while the block runs, on a terminal only."""
     columns = (
+        SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
-        TaskProgressColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
+        TextColumn("{task.fields[count]}"),
+        TimeElapsedColumn(),
     )
-    with Progress(*columns, console=errors, disable=not errors.is_terminal) as bars:
+    # tables that are printed meanwhile go to standard output, also where that is a file
+    with Bars(
+        *columns,
+        console=errors,
+        disable=not errors.is_terminal,
+        transient=True,
+        redirect_stdout=sys.stdout.isatty(),
+    ) as bars:
         yield bars
 
 
 @contextmanager
-def stages() -> Iterator[Callable[[str], None]]:
-    """Show the stage of a long computation on standard error while the block runs.
+def stages(*, lines: bool = False) -> Iterator[Progress]:
+    """Show the stage of a long computation, and how far it is, while the block runs.
+
+    Parameters
+    ----------
+    lines : bool
+        Whether, without a terminal, the name of a stage is a line: at most one in `QUIET_S`, so that a short
+        computation prints nothing.
 
     Yields
     ------
-    callable
-        Takes the name of each stage as it begins. Without a terminal a name is a line, at most one in `QUIET_S`, so
-        that a short computation prints nothing.
+    Progress
+        Takes each stage.
     """
     with progress_bars() as bars:
-        bar, began = bars.add_task("", total=None), time.monotonic()
-        printed = began
+        yield _Shown(bars, lines=lines).show
 
-        def begin(stage: str) -> None:
-            nonlocal printed
-            bars.update(bar, description=stage)
-            now = time.monotonic()
-            if not errors.is_terminal and now - printed >= QUIET_S:
-                printed = now
-                errors.print(f"after {now - began:.0f} s: {stage}")
 
-        yield begin
-        bars.update(bar, description="done", completed=1, total=1)
+def begin_loading(progress: Progress) -> None:
+    """Begin what every command does before it measures or fits: its libraries take a second or more to load.
+
+    On a new machine the numerical kernels are compiled first.
+    """
+    prepare_kernels("anglecam")
+    progress(Stage("loading"))
+
+
+class _Shown:
+    """The stage that is shown."""
+
+    def __init__(self, bars: Bars, *, lines: bool) -> None:
+        self._bars, self._lines = bars, lines
+        self._began = self._printed = time.monotonic()
+        self._title: str | None = None
+        self._bar: TaskID | None = None
+        self._start = bars.get_time()
+
+    def show(self, stage: Stage) -> None:
+        """Show a stage, and the time since the first one began."""
+        title = printable(stage.title)
+        if self._bar is None or title != self._title:
+            self._title = title
+            if self._bar is not None:
+                self._bars.remove_task(self._bar)  # a task cannot go back to a total that is not known
+            self._bar = self._bars.add_task(title, total=stage.total, count="")
+            self._bars.tasks[-1].start_time = self._start
+            self._print(title)
+        count = "" if stage.total is None else f"{stage.done} of {stage.total}"
+        self._bars.update(self._bar, completed=stage.done, count=count)
+
+    def _print(self, title: str) -> None:
+        now = time.monotonic()
+        if self._lines and not errors.is_terminal and now - self._printed >= QUIET_S:
+            self._printed = now
+            errors.print(f"after {now - self._began:.0f} s: {title}")
 
 
 def tell(problems: Sequence[AnglecamError]) -> None:

@@ -1,6 +1,7 @@
 """The commands that work on a session: `identify` and `close`.
 
-The modules that a command needs are imported inside it: loading all of them takes longer than many a call.
+What is wrong with a call is found before the modules that measure and fit are loaded, which takes longer than many a
+call.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ import typer
 
 from anglecam.cli.json_output import report, report_file
 from anglecam.cli.options import HoldOut, Out, SessionFolder
-from anglecam.cli.progress import leave, progress_bars, stages, tell
+from anglecam.cli.progress import begin_loading, leave, stages, tell
 from anglecam.cli.this_run import this_run
 from anglecam.errors import InputError, RigError, printable
-from anglecam.io.session import Session, read_session
+from anglecam.io.session import Session, read_session, require_recordings
+from anglecam.progress import Progress, Stage
 from anglecam.terminal import errors, make_folder, screen
 
 if TYPE_CHECKING:
@@ -34,19 +36,27 @@ def identify(
 ) -> None:
     """Fit a model to a session: model.json, and model.mat for MATLAB."""
     from anglecam.identification.estimators import ESTIMATORS
-    from anglecam.io.neck_file import read_neck
-    from anglecam.report.session_tables import model_table
-    from anglecam.workflow.session_results import write_identified
 
-    if estimator not in ESTIMATORS:  # before any clip is measured
+    if estimator not in ESTIMATORS:
         raise RigError(f"--estimator {estimator}: choose one of {', '.join(ESTIMATORS)}")
     takes_neck = ESTIMATORS[estimator].takes_neck
     if neck is not None and not takes_neck:
         users = " or ".join(f"--estimator {entry.id}" for entry in ESTIMATORS.values() if entry.takes_neck)
         raise RigError(f"--neck {neck}: used by {users} only")
-    declared = read_neck(neck).large_angle if takes_neck else None
-    measured = measure_recordings(read_session(session), out)
-    model = write_identified(measured, out, estimator, declared)
+    declared = None
+    if takes_neck:
+        from anglecam.io.neck_file import read_neck
+
+        declared = read_neck(neck).large_angle
+    opened = _open(session, out)
+    with stages() as progress:
+        begin_loading(progress)
+        from anglecam.report.session_tables import model_table
+        from anglecam.workflow.session_results import write_identified
+
+        measured = measure_recordings(opened, out, progress)
+        progress(Stage(f"fitting a model by {ESTIMATORS[estimator].summary}"))
+        model = write_identified(measured, out, estimator, declared)
     screen.print(model_table([model]))
     report_file("model", out / "model.json")
     report(doubts=list(model.doubts), notes=list(measured.notes))
@@ -69,21 +79,22 @@ def close(
 
 def close_and_report(session: Path, out: Path, hold_out: Sequence[str]) -> tuple[MeasuredSession, Verdict]:
     """Measure a session, close the loop, write the files of `close` and print its tables."""
-    from anglecam.report.session_tables import loop_table, model_table
-    from anglecam.workflow.session import loop_input, require_recordings
-    from anglecam.workflow.session_results import REPORT, write_closed
+    opened = _open(session, out, hold_out)
+    with stages() as progress:
+        begin_loading(progress)
+        from anglecam.report.session_tables import loop_table, model_table
+        from anglecam.workflow.session import loop_input
+        from anglecam.workflow.session_results import REPORT, write_closed
 
-    opened = read_session(session)
-    require_recordings(opened, hold_out)
-    measured = measure_recordings(opened, out)
-    shown = loop_input(measured)
-    if shown.differs:
-        errors.print(
-            "measuring corrected an effect of the camera (lens, slanted view, or a marker off the axis); the loop "
-            "starts from the uncorrected angles and reports the effect if its size exceeds the stated uncertainty"
-        )
-    with stages() as begin:
-        closed = write_closed(measured, shown, out, hold_out=hold_out, progress=begin, run=this_run())
+        measured = measure_recordings(opened, out, progress)
+        shown = loop_input(measured)
+        if shown.differs:
+            errors.print(
+                "measuring corrected an effect of the camera (lens, slanted view, or a marker off the axis); the loop "
+                "starts from the uncorrected angles and reports the effect if its size exceeds the stated uncertainty"
+            )
+    with stages(lines=True) as progress:
+        closed = write_closed(measured, shown, out, hold_out=hold_out, progress=progress, run=this_run())
     report_file("loop", out / "loop.json")
     report(report=str(out / REPORT) if (out / REPORT).exists() else None, notes=list(measured.notes))
     screen.print(model_table(closed.models))
@@ -95,18 +106,21 @@ def close_and_report(session: Path, out: Path, hold_out: Sequence[str]) -> tuple
     return measured, closed.verdict
 
 
-def measure_recordings(opened: Session, out: Path) -> MeasuredSession:
-    """Measure a session's clips and write their series to ``out``."""
-    from anglecam.workflow.session import measure_session
-
+def _open(session: Path, out: Path, hold_out: Sequence[str] = ()) -> Session:
+    """Read what is declared about a session, and check that its results can be written."""
+    opened = read_session(session)
+    require_recordings(opened, hold_out)
     make_folder(out)
     for note in opened.notes:
         errors.print(printable(note))
-    with progress_bars() as bars:
-        tasks = {r.name: bars.add_task(r.source.name, total=None) for r in opened.recordings if r.is_clip}
-        measured = measure_session(
-            opened, out=out, progress=lambda name, n, total: bars.update(tasks[name], completed=n, total=total or None)
-        )
+    return opened
+
+
+def measure_recordings(opened: Session, out: Path, progress: Progress) -> MeasuredSession:
+    """Measure a session's clips and write their series to ``out``."""
+    from anglecam.workflow.session import measure_session
+
+    measured = measure_session(opened, out=out, progress=progress)
     for note in measured.notes:
         screen.print(printable(note), soft_wrap=True, highlight=False, markup=False)
     tell(measured.problems)

@@ -10,7 +10,9 @@ from typing import Annotated
 
 import typer
 
+from anglecam.cli.progress import begin_loading, stages
 from anglecam.terminal import screen
+from anglecam.view.folder import open_folder
 
 
 def view(
@@ -21,8 +23,10 @@ def view(
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Print the address only.")] = False,
 ) -> None:
     """See, click and save: a page on this machine with frames, angles, the mark search and rig.yaml."""
-    from anglecam.view.folder import open_folder
-    from anglecam.view.serve import serve
+    folder = open_folder(path)
+    with stages() as progress:
+        begin_loading(progress)
+        from anglecam.view.serve import serve
 
     def ready(address: str) -> None:
         screen.print(f"anglecam view: {address}", soft_wrap=True, highlight=False)
@@ -30,7 +34,7 @@ def view(
         if not no_browser and _has_screen():
             webbrowser.open(address)
 
-    serve(open_folder(path), port, ready)
+    serve(folder, port, ready)
     os._exit(0)  # a search for the mark may be under way in a thread; nothing waits for its result
 
 

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import io
 
 from anglecam.data.typing import Floats
 from anglecam.errors import InputError
@@ -236,6 +235,8 @@ def write_mat(model: FittedModel, path: Path) -> None:
         "output": "angle",
         "output_unit": "deg",
     }
+    from scipy import io  # SciPy takes most of a second to load
+
     path.parent.mkdir(parents=True, exist_ok=True)
     made = BytesIO()
     io.savemat(made, {"model": content}, oned_as="column")

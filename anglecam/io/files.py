@@ -1,4 +1,4 @@
-"""Write files atomically, and read text files within limits of size."""
+"""Write files atomically, read text files within limits of size, and see whether a film is there."""
 
 from __future__ import annotations
 
@@ -14,8 +14,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any, BinaryIO
 
+from anglecam.errors import InputError
+
 _NAME_CHARACTERS = 40
 """Characters of a file's name that its temporary file's name begins with; a longer name could exceed the limit."""
+_READ = os.O_RDONLY
+for _flag in ("O_NONBLOCK", "O_CLOEXEC", "O_BINARY"):  # each system has some: not to wait at a pipe, to keep line ends
+    _READ |= getattr(os, _flag, 0)
 _MOST_JSON = 64 * 2**20
 """Size above which JSON is not read, bytes; files that anglecam writes have a hundredth of it."""
 
@@ -41,10 +46,20 @@ def open_regular(path: Path) -> Iterator[BinaryIO]:
     """
     if "\0" in str(path):
         raise OSError(errno.EINVAL, "no file can be called that", str(path))
-    with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as stream:
+    with os.fdopen(os.open(path, _READ), "rb") as stream:
         if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
             raise OSError(errno.EINVAL, "not an ordinary file", str(path))
         yield stream
+
+
+def require_film_file(path: Path) -> None:
+    """Raise `InputError` where a film is missing, empty or no file, before anything is loaded that could open it."""
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if not path.is_file():
+        raise InputError(f"{path}: not a file")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path}: empty file")
 
 
 @contextlib.contextmanager

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam import __version__
+import anglecam
 from anglecam.data.camera_evidence import CameraEvidence
 from anglecam.data.series import AngleSeries
 from anglecam.data.tables import UNITS
@@ -80,7 +80,7 @@ def write_netcdf(series: AngleSeries, path: Path) -> None:
         file.attrs.update(
             {
                 "source_software": "anglecam",
-                "source_software_version": __version__,
+                "source_software_version": anglecam.__version__,
                 "source_file": printable(series.name),
                 "ds_type": "poses",
                 "time_unit": "seconds",
@@ -210,7 +210,7 @@ def write_parquet(series: AngleSeries, path: Path) -> None:
         array = pa.array(values, from_pandas=True)  # NaN becomes null
         schema.append(pa.field(name, array.type, metadata=None if unit is None else {"unit": unit}))
         arrays.append(array)
-    metadata = {"source_software": f"anglecam {__version__}", "name": printable(series.name)}
+    metadata = {"source_software": f"anglecam {anglecam.__version__}", "name": printable(series.name)}
     with write_whole(path) as unfinished, unfinished.open("wb") as stream:  # pyarrow would read a name as an address
         parquet.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(schema, metadata=metadata)), stream)
 

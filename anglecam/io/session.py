@@ -7,6 +7,7 @@ recording alone: `read_session` lists it in ``problems`` and continues with the 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -214,6 +215,13 @@ def read_session(directory: Path, rig: Rig | None = None) -> Session:
     others = [p for p in sorted(directory.glob("*.csv")) if p not in known and any(map(p.name.startswith, sources))]
     notes += [f"{p}: not used; a command is NAME{COMMAND_ENDING}, a series NAME{SERIES_ENDING}" for p in others]
     return Session(directory, rig, tuple(recordings), tuple(problems), (*unused, *notes))
+
+
+def require_recordings(session: Session, names: Sequence[str]) -> None:
+    """Raise `RigError` where one of ``names``, which are to be held out, is no recording of the session."""
+    unknown = sorted(set(names) - {recording.name for recording in session.recordings})
+    if unknown:
+        raise RigError(f"hold out {unknown[0]}: no such recording in {session.directory}")
 
 
 def _choose_tracks(directory: Path, rig: Rig) -> tuple[dict[str, Path], list[str]]:

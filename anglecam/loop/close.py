@@ -9,7 +9,7 @@ works on stretches of long recordings; the errors and sizes that are stated are 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -46,6 +46,7 @@ from anglecam.loop.stretches import stretches
 from anglecam.loop.verdict import Accepted, Verdict
 from anglecam.loop.whole import with_whole_recordings
 from anglecam.models.plant import FASTEST, Plant
+from anglecam.progress import Progress, Stage, unseen
 from anglecam.threads import map_in_threads
 
 VERDICTS = {
@@ -65,7 +66,7 @@ def close_records(
     held_out: Sequence[str] = (),
     starts: Sequence[np.ndarray] = (),
     seed: int = 0,
-    progress: Callable[[str], None] = lambda stage: None,
+    progress: Progress = unseen,
     policy: Policy = DEFAULT,
 ) -> Verdict:
     """Close the loop on recordings of one rig.
@@ -80,8 +81,8 @@ def close_records(
         Further start values of a, b, c (1/s, 1/s², 1/s²) for the base fit.
     seed : int
         Of the bootstraps.
-    progress : callable
-        Receives the name of each stage as it begins.
+    progress : Progress
+        Called with each stage.
     policy : Policy
         Every decision threshold.
 
@@ -99,19 +100,19 @@ def close_records(
     with threadpool_limits(1, "blas"):
         fitted, predicted = split_records(records, held_out)
         task, base = begin(fitted, predicted, starts, np.random.default_rng(seed), progress, policy)
-        progress("residual")
+        progress(Stage("testing the residual"))
         first = assess(task, base)
         candidates: list[Candidate] = []
         if not first.residual_test.passed:
-            progress("candidates")
+            progress(Stage("trying effects one by one"))
             candidates = rank_candidates(task, first)
         last = add_effects(task, first, first, candidates)
         final_task, last = _without_windows(task, first, last)
-        progress("verdict")
+        progress(Stage("reaching the verdict"))
         verdict = _conclude(task, final_task, first, last, candidates)
         if max(map(_samples, (fitted, predicted))) <= policy.stepwise.most_samples:
             return _with_intervals(verdict)
-        progress("whole recordings")
+        progress(Stage("fitting the whole recordings"))
         if final_task.uncut is not None:
             fitted, predicted = (windows(part, base.parameters) for part in (fitted, predicted))
         return _with_intervals(with_whole_recordings(verdict, fitted, predicted, task.rng))
@@ -159,7 +160,7 @@ def begin(
     whole_predicted: Sequence[Record],
     starts: Sequence[np.ndarray],
     rng: np.random.Generator,
-    progress: Callable[[str], None],
+    progress: Progress,
     policy: Policy,
 ) -> tuple[Task, Fit]:
     """Fit the base model to stretches of long recordings, in windows if a free run over them diverges.
@@ -179,7 +180,7 @@ def begin(
         Of the base model.
     """
     fitted, predicted = (stretches(part, policy.stepwise.most_samples) for part in (whole_fitted, whole_predicted))
-    progress("base model")
+    progress(Stage("fitting the base model"))
     found = start_parameters(fitted)
     plant = Plant(
         driven=any(r.command is not None for r in fitted), fastest=max(FASTEST, *(math.sqrt(s[1]) for s in found))
@@ -215,7 +216,7 @@ def _without_windows(task: Task, first: Assessment, last: Assessment) -> tuple[T
     fit = fit_output_error(last.fit.model, fitted, [last.fit.parameters], phi=last.fit.phi)
     if drifts(fit.parameters, fitted) or loses_step(fit, fitted):
         return task, last
-    task.progress("without windows")
+    task.progress(Stage("fitting without windows"))
     whole = replace(task, fitted=fitted, predicted=predicted, uncut=None)
     return whole, add_more_effects(whole, first, assess(whole, fit))
 

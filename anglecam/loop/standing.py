@@ -18,6 +18,7 @@ from anglecam.identification.noise import Noise
 from anglecam.loop.cross_validation import Prediction, predict_held_out
 from anglecam.loop.refit import effects_of, refit_without
 from anglecam.loop.stepwise import Assessment, Task, assess
+from anglecam.progress import Stage
 
 
 def model_that_stands(task: Task, first: Assessment, last: Assessment) -> Assessment:
@@ -48,7 +49,7 @@ def model_that_stands(task: Task, first: Assessment, last: Assessment) -> Assess
         share = error_beyond_noise(now.held_out, noise) / max(error_beyond_noise(without, noise), 1e-300)
         if share <= task.policy.verdict.partly_explained_share:
             break
-        task.progress(f"without {weakest.id}")
+        task.progress(Stage(f"fitting without {weakest.id}"))
         fewer = refit_without(now.fit, weakest, task.fitted)
         if not effects_of(fewer) or not fewer.rmse < spread:
             return first

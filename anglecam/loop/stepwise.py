@@ -11,7 +11,7 @@ predicted was used neither to fit the candidate nor to choose it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +29,7 @@ from anglecam.loop.refit import effects_left, effects_of, refit_with_phi, refit_
 from anglecam.loop.residual_test import ResidualTest, run_residual_test
 from anglecam.loop.screen import Change, Forecast, changes, directions, forecasts
 from anglecam.loop.size import sizes_determined
+from anglecam.progress import Progress, Stage
 from anglecam.threads import map_in_threads
 
 NARROW, WIDE = math.radians(20.0), math.radians(120.0)
@@ -49,7 +50,7 @@ class Task:
     floor: Noise | None
     """Noise of the angle, apart from any model."""
     rng: np.random.Generator
-    progress: Callable[[str], None]
+    progress: Progress
     policy: Policy = DEFAULT
     uncut: tuple[tuple[Record, ...], tuple[Record, ...]] | None = None
     """Fitted and held-out recordings before they were cut into windows; ``None`` if they are whole."""
@@ -225,7 +226,7 @@ def _significant(task: Task, now: Assessment, candidates: Sequence[Candidate], l
 
 def _add(task: Task, best: Candidate) -> Assessment:
     """Assess the candidate's model without each earlier effect that does not improve its prediction."""
-    task.progress(f"adding {best.effect.id}")
+    task.progress(Stage(f"adding {best.effect.id}"))
     fit, cross_validated = best.fit, best.cross_validated
     for effect in effects_of(fit)[:-1]:
         if cross_validated is None:

@@ -18,6 +18,7 @@ from anglecam.data.typing import Floats, Image
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.detections import frames_to_keep
+from anglecam.progress import Progress, Stage, unseen, watched
 from anglecam.video.decode import Row
 from anglecam.video.film import Film, Sample
 from anglecam.video.picture import Picture
@@ -99,13 +100,15 @@ class _PictureAtRest(Picture):
         return seen_from_first(image, self.move, behind.astype(np.uint8))
 
 
-def hold_camera(film: Film) -> HeldCamera:
+def hold_camera(film: Film, progress: Progress = unseen) -> HeldCamera:
     """Find out how the camera moves.
 
     Parameters
     ----------
     film : Film
         The clip.
+    progress : Progress
+        Called with each stage.
 
     Returns
     -------
@@ -117,6 +120,7 @@ def hold_camera(film: Film) -> HeldCamera:
     InputError
         Where the file cannot be read.
     """
+    progress(Stage("looking whether the camera moves"))
     images = [f.image for f in film.sample(frames_to_keep(film)).frames if f.image is not None]
     steady = learn_background(images)
     known = images if steady is None else [image for image in images if steady.at(image).known]
@@ -127,7 +131,8 @@ def hold_camera(film: Film) -> HeldCamera:
         why = f"the camera moves, and how can be seen in {len(known)} of {len(images)} sampled frames only"
     elif steady is not None or len(images) < 2 or stands_still(images):
         return HeldCamera(film, steady)
-    moves = tuple(follow_plane(frame.image for frame in film.frames()))
+    frames = watched(film.frames(), progress, "following the camera", film.count)
+    moves = tuple(follow_plane(frame.image for frame in frames))
     followed = sum(move is not None for move in moves) >= _LEAST_FOLLOWED * len(moves)
     if why is None and not (followed and moves_in_the_hand(moves, film.size)):
         return HeldCamera(film)  # nothing says that the camera moves: what is seen to move may be the mechanism

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -25,6 +25,7 @@ from anglecam.measurement.followed import Followed, follow_mark_or_body
 from anglecam.measurement.one_rigid_mark import why_not_rigid
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.measurement.trust import why_elsewhere, why_few, why_unproven
+from anglecam.progress import Progress, Stage, unseen
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.mark.outline_turn import outline_turn
@@ -99,7 +100,7 @@ def measure_clip(
     rig: Rig,
     command: Command | None = None,
     *,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress = unseen,
     mark: FoundMark | None = None,
 ) -> Measurement:
     """Measure the angle in every frame of a clip.
@@ -112,8 +113,8 @@ def measure_clip(
         Declares mark, pivot, direction, neutral and camera.
     command : Command, optional
         Its first change ends the rest that defines neutral. Where the rig declares a lamp, the lamp dates that change.
-    progress : callable, optional
-        Called with (frames done, frames in all) after each frame.
+    progress : Progress
+        Called with each stage, and after each frame of those that go through the frames.
     mark : FoundMark, optional
         The mark, where it was found before (`anglecam.measurement.mark_pass.seek_mark`); then nothing else is followed.
 
@@ -129,13 +130,15 @@ def measure_clip(
     """
     rig = rig_as_shown(rig, film)
     changes = command is not None and command.first_change() is not None
-    lamp = see_lamp(film, rig) if changes else None
+    lamp = see_lamp(film, rig, progress) if changes else None
     offset = offset_of(command, lamp)
     command = on_clip_clock(command, offset)
-    camera = hold_camera(film)
+    film.learn(progress)
+    camera = hold_camera(film, progress)
     held = camera.film
     rig = as_seen_at_rest(rig, held)
     followed = follow_mark_or_body(camera, rig, command, progress, mark)
+    progress(Stage("working out angles and uncertainties"))
     detections = _as_filmed(followed.detections, held)
     series = _series(held, rig, followed, detections.status, lamp)
     zero = why_zero_is_elsewhere(rig, command, followed.time[followed.ok])

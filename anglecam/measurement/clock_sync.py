@@ -17,6 +17,7 @@ from anglecam.camera.shutter import measurement_time
 from anglecam.data.command import Command
 from anglecam.errors import RigError
 from anglecam.io.rig import Rig
+from anglecam.progress import Progress, unseen, watched
 from anglecam.video.film import Film
 from anglecam.vision.image.lamp import lit_between, patch_levels
 
@@ -37,7 +38,7 @@ AGREED = Offset(0.0, 0.0)
 DARK = "the lamp is not seen to light; command and clip are assumed to share one clock"
 
 
-def see_lamp(film: Film, rig: Rig) -> Interval | None:
+def see_lamp(film: Film, rig: Rig, progress: Progress = unseen) -> Interval | None:
     """Find when the lamp that the rig declares first lights.
 
     Parameters
@@ -46,6 +47,8 @@ def see_lamp(film: Film, rig: Rig) -> Interval | None:
         The clip.
     rig : Rig
         Its ``sync.lamp`` is the position of the lamp in the picture.
+    progress : Progress
+        Called after each frame.
 
     Returns
     -------
@@ -66,7 +69,8 @@ def see_lamp(film: Film, rig: Rig) -> Interval | None:
     if not (0.0 <= place[0] <= film.width - 1 and 0.0 <= place[1] <= film.height - 1):
         where, size = f"[{place[0]:g}, {place[1]:g}]", f"{film.width} × {film.height}"
         raise RigError(f"{film.path}: sync: {{lamp: {where}}} lies outside its picture of {size} pixels")
-    frames = [(f.time, None if f.image is None else patch_levels(f.image, place)) for f in film.frames()]
+    shown = watched(film.frames(), progress, "looking for the lamp", film.rows.declared)
+    frames = [(f.time, None if f.image is None else patch_levels(f.image, place)) for f in shown]
     time = np.array([t for t, _ in frames])
     levels = np.array([np.full(3, np.nan) if level is None else level for _, level in frames])
     rows = np.full(len(time), place[1])

@@ -29,10 +29,13 @@ from anglecam.measurement.one_rigid_mark import reaches_over_pivot
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
 from anglecam.measurement.rigid_body_pass import detect_layer, detect_outline, detect_rigid_body
 from anglecam.measurement.trust import require_rotation, why_off_circle
+from anglecam.progress import Progress, unseen
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 
+Follow = Callable[[Film, Rig, Progress], Detections | str]
+"""Follows a body without a mark, as `detect_rigid_body` does."""
 _AGREE = 2.0
 """Standard uncertainties by which two measurements of the rotation may differ."""
 _AS_OFTEN = 0.9
@@ -60,7 +63,7 @@ def follow_mark_or_body(
     camera: HeldCamera,
     rig: Rig,
     command: Command | None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress = unseen,
     known: FoundMark | None = None,
 ) -> Followed:
     """Measure the angle of the mark or, where none is declared and none is found, of a rigid body or its outline.
@@ -73,8 +76,8 @@ def follow_mark_or_body(
         Declares mark, pivot, direction, neutral and camera.
     command : Command, optional
         Its first change ends the rest that defines neutral.
-    progress : callable, optional
-        Called with (frames done, frames in all) after each frame.
+    progress : Progress
+        Called with each stage, and after each frame.
     known : FoundMark, optional
         The mark, where it was found before; then nothing else is followed.
 
@@ -92,14 +95,14 @@ def follow_mark_or_body(
     try:
         mark = detect_mark(film, rig, camera, progress, known)
         followed = _measured(film, rig, command, mark, progress)
-        return _hinted(followed, film, rig, command) if _is_hinted(camera, rig) else followed
+        return _hinted(followed, film, rig, command, progress) if _is_hinted(camera, rig) else followed
     except MarkNotFoundError as problem:
         causes, ways = [str(problem)], _without_mark(camera, rig)
     except InputError as problem:  # the mark moves otherwise; what turns may be another thing, or more than the mark
         causes, ways = [str(problem)], _besides_mark(camera, rig)
     for follow in ways if known is None else ():
         try:
-            body = follow(film, rig)
+            body = follow(film, rig, progress)
             if isinstance(body, Detections):
                 return _measured(film, rig, command, body, progress)
             causes.append(body)
@@ -110,7 +113,7 @@ def follow_mark_or_body(
     raise InputError(found + besides)
 
 
-def _without_mark(camera: HeldCamera, rig: Rig) -> list[Callable[[Film, Rig], Detections | str]]:
+def _without_mark(camera: HeldCamera, rig: Rig) -> list[Follow]:
     """Return the ways in which a body may be followed where no mark is declared by its colour."""
     if rig.mark_rgb is not None or camera.film.undecodable == len(camera.film.times):
         return []
@@ -118,7 +121,7 @@ def _without_mark(camera: HeldCamera, rig: Rig) -> list[Callable[[Film, Rig], De
     return [detect_rigid_body, *by_outline, *([detect_layer] if _is_hinted(camera, rig) else [])]
 
 
-def _besides_mark(camera: HeldCamera, rig: Rig) -> list[Callable[[Film, Rig], Detections | str]]:
+def _besides_mark(camera: HeldCamera, rig: Rig) -> list[Follow]:
     """Return the ways in which a body may be followed where what was taken for the mark does not turn.
 
     Where somebody declared the mark or the pivot, no other thing may take its place but one that turns about the hint.
@@ -129,7 +132,7 @@ def _besides_mark(camera: HeldCamera, rig: Rig) -> list[Callable[[Film, Rig], De
     return [] if declared or camera.unknown is not None else _without_mark(camera, rig)
 
 
-def _hinted(mark: Followed, film: Film, rig: Rig, command: Command | None) -> Followed:
+def _hinted(mark: Followed, film: Film, rig: Rig, command: Command | None, progress: Progress) -> Followed:
     """Return the rotation about the hinted pivot, where it is not clear what the mark is, or the mark reaches over it.
 
     Raises
@@ -143,8 +146,8 @@ def _hinted(mark: Followed, film: Film, rig: Rig, command: Command | None) -> Fo
     if not replaceable or not (reaches_over or (registered is None and not mark.detections.clear)):
         return mark
     try:
-        layer = detect_layer(film, rig)
-        other = None if isinstance(layer, str) else _measured(film, rig, command, layer, None)
+        layer = detect_layer(film, rig, progress)
+        other = None if isinstance(layer, str) else _measured(film, rig, command, layer, progress)
     except InputError:
         other = None
     if other is None or other.detections.body is None:
@@ -176,7 +179,7 @@ def _measured(
     rig: Rig,
     command: Command | None,
     detections: Detections,
-    progress: Callable[[int, int], None] | None,
+    progress: Progress,
 ) -> Followed:
     """Return the angles of what was detected, finer where more of the body than the mark can be registered."""
     ok = np.array([s == OK for s in detections.status])
@@ -203,7 +206,7 @@ def _measured(
             angles = fine_angles(angles, registered, np.flatnonzero(ok), filmed, time[ok], rig, command)
         elif _may_follow_body(detections, rig) and why_off_circle(detections, angles) is None:
             # a centre fitted to the mark's path is often much less certain than that of the whole body's rotation
-            body = detect_rigid_body(film, rig)
+            body = detect_rigid_body(film, rig, progress)
             if isinstance(body, Detections) and body.body is not None and _shows_rotation(body.body, detections, ok):
                 rigid = np.array([s == OK for s in body.status])
                 other = coarse_angles(body, rigid, body.time, rig, command)

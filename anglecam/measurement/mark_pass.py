@@ -7,7 +7,7 @@ the mark in every frame.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -27,6 +27,7 @@ from anglecam.measurement.frame_reading import Sought, read_frames
 from anglecam.measurement.parallel_reading import read_in_parts, readers_for
 from anglecam.measurement.pivot import HEIGHT_SHARE, find_pivot
 from anglecam.measurement.trust import shows_its_centre, travel
+from anglecam.progress import Progress, Stage, counted, unseen
 from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.mark.found_mark import FoundMark, Samples, region_in_plane
@@ -77,7 +78,7 @@ def detect_mark(
     film: Film,
     rig: Rig,
     camera: HeldCamera | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress = unseen,
     mark: FoundMark | None = None,
 ) -> Detections:
     """Find the mark in every frame of a clip, and the pivot.
@@ -90,8 +91,8 @@ def detect_mark(
         Declares mark, pivot and camera.
     camera : HeldCamera, optional
         How the camera moves; without it the camera is at rest.
-    progress : callable, optional
-        Called with (frames done, frames in all) after each frame.
+    progress : Progress
+        Called with each stage, and after each frame.
     mark : FoundMark, optional
         The mark, where it was found before; it is sought by default.
 
@@ -109,15 +110,17 @@ def detect_mark(
     """
     path, steady = film.path, None if camera is None else camera.steady
     lens = lens_from_rig(rig, film.size, path)
+    progress(Stage("looking for the mark"))
     sample, samples = _sampled(film, rig, steady, lens)
     noise = pixel_noise([f.image for f in sample.frames if f.image is not None])
     with readers_for(film) if steady is None else nullcontext() as readers:
         found = _sought(film, rig, sample, samples, lens) if mark is None else mark
         if camera is not None and camera.unknown is not None:
             raise InputError(camera.unknown)
+        progress(Stage("learning how the body looks"))
         body = _body_ahead(film, found, samples, rig, lens) if steady is None else None
         sought = Sought(found, body, steady)
-        done = None if progress is None else lambda frames: progress(frames, sample.count)
+        done = counted(progress, "measuring", sample.count)
         reading = read_frames(film, sought, done) if readers is None else read_in_parts(readers, film, sought, done)
     time, filmed, shakes = reading.time, reading.regions, None if steady is None else tuple(reading.moves)
     candidates = filmed if shakes is None else [_unshaken(r, move) for r, move in zip(filmed, shakes, strict=True)]

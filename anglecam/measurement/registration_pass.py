@@ -7,7 +7,6 @@ keeps. What was found in an earlier reading (`anglecam.measurement.body_ahead`) 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +15,7 @@ from anglecam.camera.lens import Lens
 from anglecam.data.typing import Flags, Floats, Image
 from anglecam.measurement.body_ahead import BodyAhead, TurnsAhead
 from anglecam.measurement.body_learning import FEWEST, learn_from_frames, spread_out
+from anglecam.progress import Progress, Stage, counted, unseen, watched
 from anglecam.video.film import Film
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.registration.tiles import FrameView, motion_plane
@@ -88,7 +88,7 @@ def register_clip(
     film: Film,
     start: Start,
     lens: Lens,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress = unseen,
     ahead: TurnsAhead | None = None,
 ) -> Registered | str:
     """Find the rotation of the body in every frame.
@@ -104,8 +104,8 @@ def register_clip(
         From the coarse pass.
     lens : Lens
         From the picture to the plane of motion.
-    progress : callable, optional
-        Called with (frames done, frames in all).
+    progress : Progress
+        Called with each stage, and after each frame.
     ahead : TurnsAhead, optional
         The rotations by a body that was learnt before.
 
@@ -125,11 +125,13 @@ def register_clip(
         left &= ~settled
         start = replace(start, turn=start.turn + reference)
     else:
+        shown = film.frames(brightness=film.coarse_colour, only=wanted)
         views = [
             _frame_view(start, frame.index, frame.image)
-            for frame in film.frames(brightness=film.coarse_colour, only=wanted)
+            for frame in watched(shown, progress, "reading pictures to learn how the body looks", len(wanted))
             if frame.image is not None
         ]
+        progress(Stage("learning how the body looks"))
         appearance = learn_from_frames(views, motion_plane(lens, film.size), start.pivot)
         del views
     if isinstance(appearance, str):
@@ -168,7 +170,7 @@ def _find_turns(
     start: Start,
     wanted: Flags,
     found: list[TurnEstimate],
-    progress: Callable[[int, int], None] | None,
+    progress: Progress,
 ) -> Floats:
     """Find the rotation in the wanted frames, and write it; return the rows (n,) at whose exposure it holds."""
     n, rows = len(start.turn), start.row.copy()
@@ -176,6 +178,7 @@ def _find_turns(
         return rows
     indices = np.flatnonzero(wanted)
     before: Image | None = None
+    done = counted(progress, "measuring the whole body", n)
     for frame in film.frames(brightness=film.coarse_colour, only={*indices.tolist(), *(indices - 1).tolist()}):
         i, image = frame.index, frame.image
         if i < n and wanted[i] and image is not None:
@@ -188,8 +191,7 @@ def _find_turns(
                 one = refine_doubtful_turn(appearance, _going_on(one, found, i), DOUBT_PX)
             found[i] = find_turn(appearance, one, before if frame.predicted else None)
         before = image
-        if progress is not None:
-            progress(i + 1, n)
+        done(i + 1)
     return rows
 
 

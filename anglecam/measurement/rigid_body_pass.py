@@ -14,6 +14,7 @@ from anglecam.data.series import OK
 from anglecam.io.rig import Rig
 from anglecam.measurement.detections import Detections, frame_of_mark, frames_to_keep
 from anglecam.measurement.pivot import find_pivot
+from anglecam.progress import Progress, Stage, unseen, watched
 from anglecam.video.film import Film, Sample
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.circle import Circle
@@ -30,7 +31,7 @@ _NAMES = {
 """Of what is followed, in a message."""
 
 
-def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
+def detect_rigid_body(film: Film, rig: Rig, progress: Progress = unseen) -> Detections | str:
     """Follow the features of a rigid body in place of a mark.
 
     Parameters
@@ -39,6 +40,8 @@ def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
         The clip.
     rig : Rig
         Declares pivot and camera.
+    progress : Progress
+        Called with each stage, and after each frame.
 
     Returns
     -------
@@ -52,40 +55,51 @@ def detect_rigid_body(film: Film, rig: Rig) -> Detections | str:
     """
     sample = film.sample(frames_to_keep(film))
     images, pointed = [f.image for f in sample.frames if f.image is not None], rig.pointed_mark
+    frames = watched(film.frames(), progress, "following a body without a mark", film.count)
     if pointed is None:
-        body = follow_rigid_body(film.frames(), images, pixel_noise(images))
+        body = follow_rigid_body(frames, images, pixel_noise(images))
     else:
         first = frame_of_mark(film, pointed).image
         assert first is not None
-        body = follow_rigid_body(film.frames(), [first, *images], pixel_noise(images), np.array(pointed.as_box))
-    return body if isinstance(body, str) else _detections(film, rig, sample, body, "body's keyframes")
+        body = follow_rigid_body(frames, [first, *images], pixel_noise(images), np.array(pointed.as_box))
+    return body if isinstance(body, str) else _detections(film, rig, sample, body, "body's keyframes", progress)
 
 
-def detect_outline(film: Film, rig: Rig) -> Detections | str:
+def detect_outline(film: Film, rig: Rig, progress: Progress = unseen) -> Detections | str:
     """Follow the outline of what moves before a still background; arguments and result as of `detect_rigid_body`."""
     sample = film.sample(frames_to_keep(film))
-    learnt = learn_outline(sample.frames, film.frames())
-    outline = learnt if isinstance(learnt, str) else follow_outline(film.frames(), learnt)
-    return outline if isinstance(outline, str) else _detections(film, rig, sample, outline, "outline")
+    learnt = learn_outline(
+        sample.frames, watched(film.frames(), progress, "learning the outline of what moves", film.count)
+    )
+    if isinstance(learnt, str):
+        return learnt
+    outline = follow_outline(watched(film.frames(), progress, "following the outline", film.count), learnt)
+    return outline if isinstance(outline, str) else _detections(film, rig, sample, outline, "outline", progress)
 
 
-def detect_layer(film: Film, rig: Rig) -> Detections | str:
+def detect_layer(film: Film, rig: Rig, progress: Progress = unseen) -> Detections | str:
     """Follow what turns about a hinted pivot; arguments and result as of `detect_rigid_body`."""
     near = rig.pivot.expected
     if near is None or not (0.0 <= near[0] < film.size[0] and 0.0 <= near[1] < film.size[1]):
         return "no pivot in the picture is hinted"
     sample = film.sample(frames_to_keep(film))
+    progress(Stage("learning what turns about the hint"))
     learnt = learn_turning_layer(sample.frames, np.array(near))
-    layer = learnt if isinstance(learnt, str) else follow_turning_layer(film.frames(), learnt)
-    return layer if isinstance(layer, str) else _detections(film, rig, sample, layer, "layer")
+    if isinstance(learnt, str):
+        return learnt
+    frames = watched(film.frames(), progress, "following what turns about the hint", film.count)
+    layer = follow_turning_layer(frames, learnt)
+    return layer if isinstance(layer, str) else _detections(film, rig, sample, layer, "layer", progress)
 
 
-def _detections(film: Film, rig: Rig, sample: Sample, body: RigidMotion, by: str) -> Detections | str:
+def _detections(
+    film: Film, rig: Rig, sample: Sample, body: RigidMotion, by: str, progress: Progress
+) -> Detections | str:
     """Return the detections of a body that was followed, or the cause where it has no pivot."""
     images = [f.image for f in sample.frames if f.image is not None]
     lens = lens_from_rig(rig, film.size, film.path)
     stamps, repeated, before = [], [], None
-    for frame in film.frames():
+    for frame in watched(film.frames(), progress, "looking for repeated frames", film.count):
         stamps.append(frame.time)
         same = frame.image is not None and before is not None and np.array_equal(frame.image, before)
         repeated.append(same)

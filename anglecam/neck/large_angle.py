@@ -18,11 +18,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicHermiteSpline
 
 from anglecam.data.typing import Floats
 from anglecam.neck.fourbar import NEUTRAL_SERVO, FourBar, head_angle, reach, servo_angle
@@ -30,6 +29,9 @@ from anglecam.neck.parameters import PAPER, NeckParameters
 from anglecam.neck.spring import Preload, spring_tangent
 from anglecam.neck.statics import balanced, stable_zero, static_torque
 from anglecam.neck.transmission import bend, slope
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline
 
 WIDEST = math.radians(120.0)
 """Largest angle from neutral at which constant γ is used, rad; the equations themselves have no end stop."""
@@ -105,6 +107,8 @@ class LinkageRatio:
 
         Over ξ it is smooth, whereas γ over Δθ ends like a square root.
         """
+        from scipy.interpolate import CubicHermiteSpline  # SciPy takes most of a second to load
+
         low, high = self.reach
         middle, half = (low + high) / 2.0, (high - low) / 2.0
 

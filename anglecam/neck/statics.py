@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from anglecam.data.typing import Floats
 from anglecam.neck.linear import passive_stiffness
@@ -233,6 +232,8 @@ def stable_zero(torque: Callable[[Floats], Floats], low: float, high: float) -> 
     ValueError
         If there is no such angle.
     """
+    from scipy.optimize import brentq  # SciPy takes most of a second to load
+
     grid = np.linspace(low, high, STEPS + 1)
     values = torque(grid)
     starts = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))

@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import companion
-from scipy.optimize import brentq
 
 from anglecam.data.step_figures import HIGH, LOW, NO_STEP, SETTLED, StepFigures
 from anglecam.data.typing import Floats
@@ -83,6 +81,8 @@ def linear_step_figures(numerator: ArrayLike, denominator: ArrayLike) -> StepFig
     ValueError
         If the transfer function is not strictly proper.
     """
+    from scipy.optimize import brentq  # SciPy takes most of a second to load
+
     A, B, C = _realise(numerator, denominator)
     poles = np.linalg.eigvals(A)
     slowest = -float(poles.real.max())
@@ -133,6 +133,8 @@ def linear_step_figures(numerator: ArrayLike, denominator: ArrayLike) -> StepFig
 
 def _realise(numerator: ArrayLike, denominator: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Return A, B and C of the controller form."""
+    from scipy.linalg import companion
+
     above = np.trim_zeros(np.atleast_1d(np.asarray(numerator, dtype=float)), "f")
     below = np.trim_zeros(np.atleast_1d(np.asarray(denominator, dtype=float)), "f")
     if len(above) >= len(below):

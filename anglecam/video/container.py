@@ -17,6 +17,7 @@ from pathlib import Path
 import av
 
 from anglecam.errors import InputError
+from anglecam.io.files import require_film_file
 from anglecam.video.truncation import is_cut_short
 
 MOST_PIXELS = 8192 * 8192
@@ -65,14 +66,9 @@ def open_container(path: Path) -> av.container.InputContainer:
     InputError
         Where the file is missing, empty, not a film, or beyond the limits: one line with the file and the cause.
     """
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
-    if not path.is_file():
-        raise InputError(f"{path}: not a file")
+    require_film_file(path)
     limits = {"max_pixels": str(MOST_PIXELS)}
     try:
-        if path.stat().st_size == 0:
-            raise InputError(f"{path}: empty file")
         with _limited_memory():
             container = av.open(
                 f"file:{path}",

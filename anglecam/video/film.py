@@ -16,6 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from anglecam.data.typing import Floats, Image
+from anglecam.progress import Progress, counted
 from anglecam.threads import native_threads
 from anglecam.video.decode import Row
 from anglecam.video.display import Display
@@ -101,6 +102,21 @@ class Film:
     def times(self) -> Floats:
         """(n,) presentation times of the frames, s; reads the film if it was not read before."""
         return np.array(self.rows.times)
+
+    @property
+    def count(self) -> int:
+        """Number of frames, some of which may lack a picture; reads what the film is learnt from."""
+        return self.rows.count
+
+    def learn(self, progress: Progress) -> None:
+        """Read the pictures from which is learnt what the film shows, unless they were read before.
+
+        Raises
+        ------
+        InputError
+            As `frames`.
+        """
+        self.rows.learn(counted(progress, "reading pictures to learn what moves", self.rows.declared))
 
     @property
     def undecodable(self) -> int:

@@ -132,13 +132,31 @@ class FilmRows:
     def kept(self) -> KeptRows:
         """The rows that are kept."""
         if self._kept is None:
-            # where they are more than are kept for sure, the others are not decoded
-            if self._declared * self._bytes_each > MOST_BYTES:
-                self._keep_some()
-            if self._kept is None:
-                self._read_once()
+            self.learn()
         assert self._kept is not None
         return self._kept
+
+    @property
+    def declared(self) -> int | None:
+        """Number of wanted rows by what the container states; ``None`` where that is not to be relied on."""
+        last = self._declared if self.wanted.last is None else min(self._declared, self.wanted.last + 1)
+        return last - self.first if last > self.first else None
+
+    def learn(self, done: Callable[[int], None] = lambda rows: None) -> None:
+        """Read the rows that are kept, unless they were read before.
+
+        Parameters
+        ----------
+        done : callable
+            Called with the number of rows that were read.
+        """
+        if self._kept is not None:
+            return
+        # where they are more than are kept for sure, the others are not decoded
+        if self._declared * self._bytes_each > MOST_BYTES:
+            self._keep_some(done)
+        if self._kept is None:
+            self._read_once(done)
 
     def read(self, wants: Wants | None = None) -> Iterator[Row]:
         """Yield the rows from memory, or decode them; the first complete reading fills the memory.
@@ -166,15 +184,16 @@ class FilmRows:
         """Note what a reading by others found, in which every picture could be decoded; some rows were kept before."""
         self._times, self._undecodable, self._interlaced, self._count = times, 0, interlaced, len(times)
 
-    def _read_once(self) -> None:
+    def _read_once(self, done: Callable[[int], None] = lambda rows: None) -> None:
         """Read the film to learn from some of its pictures; keep all of them for what comes next."""
         if self.is_read:
             return
         room = cache_room()
         fits = self._declared <= MOST_ROWS and self._declared * self._bytes_each <= room
         cache = RowCache(room if fits else 0)
-        for row in self._read_all():
+        for number, row in enumerate(self._read_all(), start=1):
             cache.add(row)
+            done(number)
         if self._kept is not None and self._kept.stride > 1:
             self._all = cache.rows
 
@@ -192,19 +211,19 @@ class FilmRows:
         self._times, self._undecodable, self._interlaced, self._count = times, undecodable, interlaced, len(times)
         self._kept = self._kept or kept
 
-    def _keep_some(self) -> None:
+    def _keep_some(self, done: Callable[[int], None]) -> None:
         """Keep evenly spaced rows without decoding all of them, where the codec allows it."""
         if self._independent:
             kept = KeptRows(stride=self._expected_stride())
-            count, _ = _keep(kept, self._decoded(kept.wants))
+            count, _ = _keep(kept, self._decoded(kept.wants), done)
             if kept.stride > 1 and len(kept.rows) < self._room() / 4:  # there are fewer than the container states
                 kept = KeptRows()
-                count, _ = _keep(kept, self._decoded(kept.wants))
+                count, _ = _keep(kept, self._decoded(kept.wants), done)
             self._kept, self._count = kept, count
         elif self._decode_keys is not None:
             kept = KeptRows(stride=2)
             try:
-                count, gap = _keep(kept, self._wanted(self._decode_keys()), pictures_only=True)
+                count, gap = _keep(kept, self._wanted(self._decode_keys()), done, pictures_only=True)
             except InputError:  # it is repeated where all pictures are decoded
                 return
             if gap <= _LARGEST_GAP * count / (MOST_SPREAD / 2):
@@ -212,9 +231,8 @@ class FilmRows:
 
     def _expected_stride(self) -> int:
         """Return the spacing of the rows that will be kept if there are as many as declared."""
-        last = self._declared if self.wanted.last is None else min(self._declared, self.wanted.last + 1)
         stride = 1
-        while (last - self.first) / stride > self._room():
+        while (self.declared or 0) / stride > self._room():
             stride *= 2
         return stride
 
@@ -229,12 +247,29 @@ class FilmRows:
     def _wanted(self, rows: Iterator[Row]) -> Iterator[Row]:
         """Yield the rows that are wanted; raise an `InputError` where there are none."""
         stop = None if self.wanted.last is None else self.wanted.last + 1
-        empty = True
-        for row in islice(rows, self.first, stop):
-            empty = False
-            yield row
-        if empty:
-            raise InputError(f"{self._path}: it ends before frame {self.first}, the first that is wanted")
+        before = sum(1 for _ in islice(rows, self.first))
+        wanted = islice(rows, None if stop is None else stop - self.first)
+        row = next(wanted, None)
+        if row is None:
+            raise ends_before(self._path, self.first, before)
+        yield row
+        yield from wanted
+
+
+def ends_before(path: Path, first: int, count: int) -> InputError:
+    """Return the error of a film that ends before the first frame that is wanted.
+
+    Parameters
+    ----------
+    path : Path
+        The film.
+    first : int
+        Number of that frame.
+    count : int
+        Number of frames that the film has.
+    """
+    ends = f"it ends before frame {first}, the first that is wanted"
+    return InputError(f"{path}: {ends}; it has {count} frames, numbered from 0")
 
 
 def first_of_each(stride: int, rows: Sequence[tuple[int, Row]]) -> list[tuple[int, Row]]:
@@ -243,7 +278,9 @@ def first_of_each(stride: int, rows: Sequence[tuple[int, Row]]) -> list[tuple[in
     return [rows[k] for k in starts]
 
 
-def _keep(kept: KeptRows, rows: Iterator[Row], pictures_only: bool = False) -> tuple[int, int]:
+def _keep(
+    kept: KeptRows, rows: Iterator[Row], done: Callable[[int], None], pictures_only: bool = False
+) -> tuple[int, int]:
     """Offer all rows, or those with a picture, to be kept.
 
     Returns
@@ -259,4 +296,5 @@ def _keep(kept: KeptRows, rows: Iterator[Row], pictures_only: bool = False) -> t
             kept.add(count, row)
             gap, last = max(gap, count - last), count
         count += 1
+        done(count)
     return count, max(gap, count - last)

@@ -16,7 +16,7 @@ from anglecam.video.decode import INTRA_CODECS, Row, decode, decode_container, d
 from anglecam.video.display import Display, read_display
 from anglecam.video.fields import STILL_CODECS, is_bottom_first
 from anglecam.video.film import Film
-from anglecam.video.film_rows import FilmRows
+from anglecam.video.film_rows import FilmRows, ends_before
 from anglecam.video.images import decode_images
 from anglecam.video.row_cache import picture_bytes
 from anglecam.video.truncation import is_cut_short
@@ -55,6 +55,8 @@ def open_film(path: Path, frames: RigFrames | None = None) -> Film:
         # of a damaged film, what a decoder says of it changes with the pictures
         size, form = (stream.width, stream.height), stream.codec_context.format
         declared = _declared_frames(container, stream)
+        if 0 < declared <= (wanted.first or 0):
+            _require_packets(path, wanted.first or 0)
         picture = _first_picture(decode_container(path, container))
         independent = stream.codec_context.name in INTRA_CODECS
         cut_short = is_cut_short(path)
@@ -142,6 +144,14 @@ def _declared_frames(container: av.container.InputContainer, stream: av.VideoStr
     if not container.format.name.startswith("mov") or not len(index):
         return stream.frames
     return sum(not entry.is_discard for entry in index)
+
+
+def _require_packets(path: Path, first: int) -> None:
+    """Raise `InputError` where a film has fewer packets than come before its first wanted frame; none is decoded."""
+    with open_container(path) as container:
+        count = sum(packet.size > 0 for packet in container.demux(container.streams.video[0]))
+    if count <= first:
+        raise ends_before(path, first, count)
 
 
 def _has_coarse_colour(form: av.VideoFormat | None) -> bool:

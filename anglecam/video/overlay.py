@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from anglecam.data.series import OK, AngleSeries
 from anglecam.data.typing import Floats, Image
 from anglecam.io.files import write_whole
+from anglecam.progress import Progress, unseen, watched
 from anglecam.video.film import Film, Frame
 
 RADII_PX = (6.0, 10.0)
@@ -41,7 +42,7 @@ class Measured(Protocol):
         """Each frame's (k, 2) outline of the mark, where one was found."""
 
 
-def write_overlay(film: Film, measured: Measured, path: Path) -> None:
+def write_overlay(film: Film, measured: Measured, path: Path, progress: Progress = unseen) -> None:
     """Write ``NAME.overlay.mp4``: the clip in H.264, each frame at its time, with the measured angle drawn into it.
 
     Parameters
@@ -52,14 +53,17 @@ def write_overlay(film: Film, measured: Measured, path: Path) -> None:
         The result of measuring it.
     path : Path
         The file to write; it appears whole or not at all. Its folder is made if missing.
+    progress : Progress
+        Called after each frame.
 
     Raises
     ------
     InputError
         As `Film.frames`.
     """
+    frames = watched(film.frames(), progress, "drawing the overlay", len(measured.series.time))
     with write_whole(path) as unfinished, av.open(str(unfinished), mode="w") as container:
-        _encode(container, film.frames(), measured)
+        _encode(container, frames, measured)
 
 
 def draw_frame(image: Image, measured: Measured, index: int) -> Image:

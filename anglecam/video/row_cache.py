@@ -49,7 +49,7 @@ class RowCache:
 
 def cache_room() -> int:
     """Return how many bytes of pictures this process may keep, where the other cores work on other films."""
-    return int(_SHARE * min(native_threads() / cores(), 1.0) * (free_memory() or 0))
+    return int(_SHARE * min(native_threads() / cores(), 1.0) * free_memory())
 
 
 def picture_bytes(picture: av.VideoFrame | None) -> int:

@@ -16,6 +16,7 @@ from typing import Any
 
 from anglecam.errors import AnglecamError, InputError, blame
 from anglecam.io.session import read_session
+from anglecam.progress import Stage, within
 from anglecam.terminal import make_folder
 from anglecam.workflow.clip import measure_source, open_source, write_measurement
 
@@ -26,8 +27,11 @@ def measure(request: dict[str, Any]) -> dict[str, Any]:
     with blame(clip):
         make_folder(out)
         source = open_source(clip)
-        measurement = measure_source(source, progress=lambda done, total: _progress(clip.name, done, total))
+        measurement = measure_source(source, progress=within(_progress, clip.name))
+        _progress(Stage("writing the series and its plot", of=clip.name))
         write_measurement(measurement, source.command, out)
+        frames = len(measurement.series.time)
+        _progress(Stage("done", frames, frames, clip.name))
     if measurement.doubt:
         raise InputError(f"{clip}: {measurement.doubt}")
     return {"by": measurement.by, "pivot": measurement.pivot, "notes": list(measurement.notes)}
@@ -42,14 +46,14 @@ def close(request: dict[str, Any]) -> dict[str, Any]:
     with blame(folder):
         make_folder(out)
         measured = measure_session(read_session(folder), out=out, progress=_progress)
-        closed = write_closed(measured, loop_input(measured), out, progress=lambda stage: _progress(stage, 0, 0))
+        closed = write_closed(measured, loop_input(measured), out, progress=_progress)
     effects = [accepted.effect.id for accepted in closed.verdict.accepted]
     problems = [*map(str, measured.problems), *closed.missing]
     return {"verdict": closed.verdict.verdict, "effects": effects, "notes": [*measured.notes, *problems]}
 
 
-def _progress(what: str, done: int, total: int) -> None:
-    _say({"what": what, "done": done, "total": total})
+def _progress(stage: Stage) -> None:
+    _say({"what": stage.title, "done": stage.done, "total": stage.total or 0})
 
 
 def _say(message: dict[str, Any]) -> None:

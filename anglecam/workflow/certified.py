@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 from anglecam.certificate.certificate_json import COMMAND_ENDING, certificate_as_dict
@@ -14,6 +13,7 @@ from anglecam.io.files import write_json
 from anglecam.io.session import Session, recording_name
 from anglecam.loop.next_experiment.design import write_command
 from anglecam.loop.verdict import Verdict
+from anglecam.progress import Progress, Stage, unseen
 from anglecam.report.certificate_page import write_certificate_page
 from anglecam.workflow.session import MeasuredSession
 
@@ -22,7 +22,7 @@ FILE = "certificate.json"
 
 
 def write_certificate(
-    measured: MeasuredSession, verdict: Verdict, out: Path, *, progress: Callable[[str], None] = lambda stage: None
+    measured: MeasuredSession, verdict: Verdict, out: Path, *, progress: Progress = unseen
 ) -> Certificate:
     """Certify the servo of a session; write ``certificate.json``, ``certificate.html`` and commands to play.
 
@@ -44,7 +44,7 @@ def write_certificate(
     """
     session = measured.session
     certificate = certify(verdict, clock_of(measured), progress)
-    progress("certificate")
+    progress(Stage("writing the certificate"))
     for one in certificate.quantities:
         path = out / f"{one.quantity.id}{COMMAND_ENDING}"
         path.unlink(missing_ok=True)

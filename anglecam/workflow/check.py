@@ -29,9 +29,10 @@ from anglecam.identification.noise import noise_floor
 from anglecam.io.rig import Rig, RigFrames
 from anglecam.io.session import command_beside, rig_beside
 from anglecam.measurement.clip import Measurement
+from anglecam.progress import Progress, Stage, unseen
 from anglecam.video.film import Film
 from anglecam.video.open_film import open_film
-from anglecam.workflow.clip import Progress, measure_source, open_recording
+from anglecam.workflow.clip import measure_source, open_recording
 
 SECONDS = 4.0
 """Length of the part that is read, s."""
@@ -47,7 +48,7 @@ def check_clip(
     command: Command | None = None,
     first: int | None = None,
     *,
-    progress: Progress | None = None,
+    progress: Progress = unseen,
 ) -> Prediction:
     """Predict how well a clip can be measured, and what a session of recordings like it would show.
 
@@ -61,8 +62,8 @@ def check_clip(
         What shall be played in the session; otherwise the clip's command, or its natural motion.
     first : int, optional
         Number of the first frame that is read.
-    progress : callable, optional
-        Called with the frames done and the frames in all.
+    progress : Progress
+        Called with each stage, and after each frame.
 
     Returns
     -------
@@ -78,12 +79,14 @@ def check_clip(
     """
     with blame(path):
         declared = rig_beside(path) if rig is None else rig
+        progress(Stage("reading the first pictures"))
         part, film, frames = _part_of(path, declared, first)
         filmed_with = command_beside(path, declared)
         measured = measure_source(open_recording(path, part, filmed_with), progress=progress)
         assert isinstance(measured, Measurement)  # a film is no file of tracks
         if measured.few or measured.other_thing:
             raise InputError(f"{path}: {measured.few or measured.other_thing}")
+        progress(Stage("predicting what a session would show"))
         return _predict(measured, part, film, frames, filmed_with, command)
 
 

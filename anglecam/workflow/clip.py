@@ -5,39 +5,29 @@ The command line, the batch and the Python API all measure through these functio
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from anglecam.data.command import Command
-from anglecam.errors import InputError, RigError, blame
+from anglecam.errors import InputError, blame
+from anglecam.io.clip_files import ClipFiles, FrameRange, read_clip_files, recording_files
 from anglecam.io.files import write_json
 from anglecam.io.netcdf_parquet import Also, write_also
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import write_series
-from anglecam.io.session import (
-    SERIES_ENDING,
-    clip_beside,
-    command_beside,
-    command_file_beside,
-    rig_beside,
-    rig_file_beside,
-)
+from anglecam.io.session import SERIES_ENDING, clip_beside, command_file_beside, rig_file_beside
 from anglecam.io.tracks.files import TRACKS_ENDINGS
 from anglecam.measurement.clip import Measurement, measure_clip
 from anglecam.measurement.clock_sync import offset_of, on_clip_clock
 from anglecam.measurement.step_response import Response, responses, responses_as_dicts
 from anglecam.measurement.tracks import MeasuredTracks, measure_tracks
+from anglecam.progress import Progress, unseen
 from anglecam.report.origin import Run, origin_of
 from anglecam.video.film import Film
 from anglecam.video.open_film import open_film
-
-Progress = Callable[[int, int], None]
-"""Called with the frames done and the frames in all."""
-FrameRange = tuple[int | None, int | None]
-"""Numbers of the first and the last frame that are measured."""
 
 
 @dataclass(frozen=True)
@@ -81,42 +71,30 @@ def open_source(path: Path, rig: Rig | None = None, frames: FrameRange = (None, 
     RigError
         Where the rig file is wrong.
     """
-    with blame(path):
-        declared = _of_frames(rig_beside(path) if rig is None else rig, frames)
-        return _open(path, declared, lambda source: command_beside(source, declared))
+    return open_files(read_clip_files(path, rig, frames))
 
 
 def open_recording(path: Path, rig: Rig, command: Command | None) -> Source:
     """Open one recording of a session, whose rig and command have been read; raises as `open_source`."""
-    with blame(path):
-        return _open(path, rig, lambda _: command)
+    return open_files(recording_files(path, rig, command))
 
 
-def _of_frames(rig: Rig, frames: FrameRange) -> Rig:
-    """Return a rig with another range of frames."""
-    wanted = {key: k for key, k in zip(("first", "last"), frames, strict=True) if k is not None}
-    within = rig.frames.model_copy(update=wanted)
-    if within.last is not None and within.last < (within.first or 0):
-        raise RigError(f"no frame lies from {within.first} to {within.last}; the first of them must not be the larger")
-    return rig.model_copy(update={"frames": within})
+def open_files(files: ClipFiles) -> Source:
+    """Open the film of a clip whose other files have been read; raises as `open_source`."""
+    with blame(files.path):
+        film = None if files.film is None else open_film(files.film, files.rig.frames)
+        return Source(files.path, files.rig, files.command, film)
 
 
-def _open(path: Path, rig: Rig, command_of: Callable[[Path], Command | None]) -> Source:
-    if path.name.endswith(SERIES_ENDING):
-        raise InputError(f"{path}: holds angles already; identify or close the folder that contains it")
-    clip = clip_beside(path) if path.suffix.lower() in TRACKS_ENDINGS else path
-    return Source(path, rig, command_of(path), None if clip is None else open_film(clip, rig.frames))
-
-
-def measure_source(source: Source, *, progress: Progress | None = None) -> Measurement | MeasuredTracks:
+def measure_source(source: Source, *, progress: Progress = unseen) -> Measurement | MeasuredTracks:
     """Measure the angle in every frame.
 
     Parameters
     ----------
     source : Source
         From `open_source` or `open_recording`.
-    progress : callable, optional
-        See `Progress`; tracks are measured without it.
+    progress : Progress
+        Called with each stage; tracks are measured without it.
 
     Returns
     -------
@@ -142,7 +120,8 @@ def measure_source(source: Source, *, progress: Progress | None = None) -> Measu
 def _what_would_mend(cause: str) -> str:
     """Return what would mend a clip that cannot be measured, where its message does not say so."""
     says_so = "rig.yaml" in cause or "; film " in cause
-    of_the_file = any(words in cause for words in ("cannot be", "be decoded", "no frames", "no such", "truncated"))
+    faults = ("cannot be", "be decoded", "no frames", "no such", "truncated", "it ends before")
+    of_the_file = any(words in cause for words in faults)
     if says_so or of_the_file:
         return ""
     return (
@@ -227,7 +206,9 @@ def inputs_of(path: Path, rig: Rig, run: Run | None = None) -> list[Path]:
     return [path, *(one for one in others if one is not None)]
 
 
-def write_clip_overlay(source: Source, measurement: Measurement | MeasuredTracks, out: Path) -> None:
+def write_clip_overlay(
+    source: Source, measurement: Measurement | MeasuredTracks, out: Path, progress: Progress = unseen
+) -> None:
     """Write ``NAME.overlay.mp4``.
 
     Raises
@@ -239,4 +220,4 @@ def write_clip_overlay(source: Source, measurement: Measurement | MeasuredTracks
 
     if source.film is None:
         raise InputError(f"{source.path}: no overlay, because the clip is not in the folder of the tracks")
-    write_overlay(source.film, measurement, out / f"{measurement.series.name}.overlay.mp4")
+    write_overlay(source.film, measurement, out / f"{measurement.series.name}.overlay.mp4", progress)

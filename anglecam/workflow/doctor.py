@@ -19,6 +19,7 @@ import numpy as np
 from anglecam.errors import AnglecamError
 from anglecam.free_memory import free_memory
 from anglecam.prepare import Kernels
+from anglecam.progress import Progress, Stage, unseen
 from anglecam.threads import cores, native_threads
 from anglecam.workflow.self_test import FRAMES, self_test
 
@@ -46,14 +47,22 @@ class Check:
     """What is wrong and what to do, in one line; ``None`` if nothing is."""
 
 
-def checks() -> Iterator[Check]:
-    """Yield the results of all checks, the self-test last, because it takes seconds."""
+def checks(progress: Progress = unseen) -> Iterator[Check]:
+    """Yield the results of all checks, the self-test last, because it takes seconds.
+
+    Parameters
+    ----------
+    progress : Progress
+        Called with each stage.
+    """
+    progress(Stage("checking packages, codecs, threads, memory and disk"))
     yield check_versions()
     yield check_codecs()
     yield check_threads()
     yield check_kernel_cache()
     yield check_memory()
     yield check_disk()
+    progress(Stage("measuring a drawn film; the first time, kernels are compiled for up to a minute"))
     yield check_self_test()
 
 
@@ -69,7 +78,7 @@ def check_versions() -> Check:
             found[name] = version(name)
         except PackageNotFoundError:
             missing.append(name)
-    problem = f"versions: {', '.join(missing)} not installed; run make setup again" if missing else None
+    problem = f"versions: {', '.join(missing)} not installed; install anglecam again" if missing else None
     shown = ("python", "anglecam", "numpy", "scipy", "av", "opencv-python-headless", "numba")
     return Check("versions", ", ".join(f"{name} {found[name]}" for name in shown if name in found), found, problem)
 
@@ -111,8 +120,6 @@ def check_kernel_cache() -> Check:
 def check_memory() -> Check:
     """Check that enough memory is free."""
     free = free_memory()
-    if free is None:
-        return Check("memory", "unknown on this system", {"free_bytes": None})
     problem = f"memory: {_gib(free)} are free; a clip in full HD needs 0.7 GiB" if free < LEAST_MEMORY else None
     return Check("memory", f"{_gib(free)} free", {"free_bytes": free}, problem)
 

@@ -24,9 +24,10 @@ from anglecam.io.session import recording_name
 from anglecam.measurement.clip import Measurement
 from anglecam.measurement.live_meter import LiveMeter
 from anglecam.measurement.live_model import LiveAngle
+from anglecam.progress import Progress, Stage, unseen, within
 from anglecam.video.decode import Row
 from anglecam.video.live_source import LiveSource
-from anglecam.workflow.clip import Progress, measure_source, open_recording, write_clip_page, write_measurement
+from anglecam.workflow.clip import measure_source, open_recording, write_clip_page, write_measurement
 from anglecam.workflow.live_learning import Learning, Lesson
 
 LATE_S = 0.1
@@ -78,7 +79,7 @@ def measure_live(
     rig: Rig,
     command: Command | None,
     show: Callable[[LiveRow, str | None], None],
-    progress: Progress | None = None,
+    progress: Progress = unseen,
 ) -> LiveResult:
     """Measure until the source ends or is stopped, then measure the recording, and write its files.
 
@@ -95,8 +96,8 @@ def measure_live(
         What is commanded, on the clock of the source.
     show : callable
         Called with each frame, and with the cause why nothing could be learnt yet.
-    progress : callable, optional
-        Called with (frames done, frames in all) while the recording is measured.
+    progress : Progress
+        Called with each stage once the source has ended, while the recording is measured.
 
     Returns
     -------
@@ -125,10 +126,12 @@ def measure_live(
     from anglecam.report.live_figure import plot_live  # matplotlib takes a second to load
 
     name = recording_name(path)
+    progress(Stage("opening the recording", of=path.name))
     write_live(session.rows, out / f"{name}{LIVE_ENDING}")
     recording = open_recording(path, rig, command)
-    measurement = measure_source(recording, progress=progress)
+    measurement = measure_source(recording, progress=within(progress, path.name))
     assert isinstance(measurement, Measurement)  # a film is no file of tracks
+    progress(Stage("writing plots and the page", of=path.name))
     write_clip_page(recording, measurement, write_measurement(measurement, command, out), out)
     result = LiveResult(path, tuple(session.rows), measurement, session.learning.cause)
     plot_live(result.rows, out / f"{name}.live.png", name)

@@ -19,12 +19,13 @@ from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError, RigError
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import read_series, write_series
-from anglecam.io.session import SERIES_ENDING, Recording, Session
+from anglecam.io.session import SERIES_ENDING, Recording, Session, require_recordings
 from anglecam.measurement.clip import Measurement
 from anglecam.measurement.clock_sync import DARK, note_on, offsets, on_clip_clock
 from anglecam.measurement.tracks import MeasuredTracks
 from anglecam.measurement.trust import why_few
 from anglecam.measurement.uncorrected import uncorrected
+from anglecam.progress import Progress, unseen, within
 from anglecam.workflow.clip import measure_source, open_recording
 
 if TYPE_CHECKING:
@@ -87,18 +88,11 @@ class LoopInput:
     """Whether these angles differ from the measured ones, because measuring corrected an effect of the camera."""
 
 
-def require_recordings(session: Session, names: Sequence[str]) -> None:
-    """Raise `RigError` where one of ``names``, which are to be held out, is no recording of the session."""
-    unknown = sorted(set(names) - {recording.name for recording in session.recordings})
-    if unknown:
-        raise RigError(f"hold out {unknown[0]}: no such recording in {session.directory}")
-
-
 def measure_session(
     session: Session,
     *,
     out: Path | None = None,
-    progress: Callable[[str, int, int], None] = lambda name, done, total: None,
+    progress: Progress = unseen,
 ) -> MeasuredSession:
     """Measure all clips and tracks of a session and read all its series.
 
@@ -108,8 +102,8 @@ def measure_session(
         From `anglecam.io.session.read_session`.
     out : Path, optional
         Folder in which ``NAME.angles.csv`` of every measured recording is written.
-    progress : callable
-        Called with a clip's name, the frames done and the frames in total, 0 if unknown.
+    progress : Progress
+        Called with each stage of each clip, and after each frame.
 
     Returns
     -------
@@ -121,7 +115,7 @@ def measure_session(
     def measured(recording: Recording) -> tuple[AngleSeries, str | None]:
         name = recording.name
         source = open_recording(recording.source, session.rig, recording.command)
-        measurement = measure_source(source, progress=lambda done, total: progress(name, done, total))
+        measurement = measure_source(source, progress=within(progress, recording.source.name))
         if out is not None:
             write_series(measurement.series, out / f"{name}{SERIES_ENDING}")
         notes.extend(f"{recording.source}: {note}" for note in measurement.notes if note != _dated_alone(measurement))
@@ -245,7 +239,7 @@ def close_session(
     *,
     hold_out: Sequence[str] = (),
     shown: LoopInput | None = None,
-    progress: Callable[[str], None] = lambda stage: None,
+    progress: Progress = unseen,
 ) -> Verdict:
     """Find what the base model lacks in a session.
 
@@ -257,8 +251,8 @@ def close_session(
         Recordings to predict only, besides those that the rig file names.
     shown : LoopInput, optional
         From `loop_input`, where the caller has it already.
-    progress : callable
-        Called with the name of each stage.
+    progress : Progress
+        Called with each stage.
 
     Returns
     -------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -32,6 +32,7 @@ from anglecam.loop.refit import plant_of
 from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import NEXT_COMMAND, next_experiment, verdict_as_dict, write_next_command
 from anglecam.neck.large_angle import LargeAngleNeck
+from anglecam.progress import Progress, Stage, unseen
 from anglecam.report.origin import Run, origin_of
 from anglecam.report.page import write_report
 from anglecam.terminal import make_folder
@@ -87,7 +88,7 @@ def write_closed(
     out: Path,
     *,
     hold_out: Sequence[str] = (),
-    progress: Callable[[str], None] = lambda stage: None,
+    progress: Progress = unseen,
     run: Run | None = None,
 ) -> Closed:
     """Close the loop; write the models, ``loop.json``, ``report.html`` and the command of the next experiment.
@@ -113,23 +114,24 @@ def write_closed(
     fitted, held_out = split_records(shown.records, [*session.rig.held_out, *hold_out])
     verdict = close_session(measured, hold_out=hold_out, shown=shown, progress=progress)
     missing: list[str] = []
-    progress("free form")
+    progress(Stage("looking for a torque of free form"))
     verdict = attempt("free form", partial(with_free_form, verdict), missing) or verdict
-    progress("clocks")
+    progress(Stage("fitting the clocks"))
     models = []
     effects = _fitted_effects(verdict.after)
     clock = attempt("the clocks", lambda: session_clocks(measured, fitted, effects), missing)
-    stages = (("extended Kalman filter", "ekf", "ekf", None), ("output error", "oe2", "model", clock))
-    for stage, estimator, name, clocks in stages:
-        progress(stage)
+    estimators = (("extended Kalman filter", "ekf", "ekf", None), ("output error", "oe2", "model", clock))
+    for title, estimator, name, clocks in estimators:
+        progress(Stage(f"fitting the model by {title}"))
         model = attempt(
             f"{name}.json", partial(_identify, fitted, held_out, session.rig, estimator, out, name, clocks), missing
         )
         models += [] if model is None else [model]
-    progress("report")
+    progress(Stage("designing the next experiment"))
     experiment = attempt("the next experiment", lambda: next_experiment(verdict), missing)
     attempt(NEXT_COMMAND, lambda: write_next_command(experiment, out), missing)
     attempt(CORRECTED, lambda: _write_corrected(shown, verdict, out / CORRECTED, missing), missing)
+    progress(Stage("working out the smallest effects that would be seen"))
     result = verdict_as_dict(verdict, experiment)
     title, page = session.directory.resolve().name, out / REPORT
     problems = [*map(str, measured.problems), *missing]
@@ -143,6 +145,7 @@ def write_closed(
             shown=uncorrected, films=films, made=made,
         )  # fmt: skip
 
+    progress(Stage("writing the report"))
     attempt(REPORT, report, missing)
     write_json(out / "loop.json", result | {"missing": missing})
     return Closed(tuple(models), verdict, experiment, tuple(missing))

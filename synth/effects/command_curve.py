@@ -6,7 +6,6 @@ import math
 from typing import ClassVar
 
 import numpy as np
-from scipy.integrate import quad
 
 from synth.effects.effect import Effect
 from synth.effects.piecewise import PiecewiseLinear
@@ -24,6 +23,8 @@ class CommandCurve(Effect):
 
     def bent(self, level: float) -> float:
         """Return the servo's angle at a command, rad."""
+        from scipy.integrate import quad  # SciPy takes most of a second to load
+
         return float(quad(lambda u: math.exp(self.p_per_rad * u + self.q_per_rad2 * u * u), 0.0, level)[0])
 
     def follow(self, command: PiecewiseLinear) -> PiecewiseLinear:

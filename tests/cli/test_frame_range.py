@@ -81,7 +81,7 @@ def test_the_rig_files_range_holds_and_the_command_line_overrides_it(clip, tmp_p
 @pytest.mark.parametrize(
     ("range_", "code", "cause"),
     [
-        (("--from", 60), 1, "it ends before frame 60"),
+        (("--from", 60), 1, "swing.mkv: it ends before frame 60, the first that is wanted; it has 60 frames"),
         (("--from", 30, "--to", 20), 2, "no frame lies from 30 to 20"),
         (("--from", -1), 2, "--from"),
     ],
@@ -90,6 +90,7 @@ def test_a_range_without_frames_is_one_line(clip, tmp_path, status, range_, code
     found, told = status("measure", clip, *range_, "--out", tmp_path)
     assert found == code
     assert cause in told
+    assert "film it with" not in told
     assert "Traceback" not in told
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from anglecam.errors import InputError
-from anglecam.io.rig import Rig, RigMark, RigPivot
+from anglecam.io.rig import Rig, RigFrames, RigMark, RigPivot
 from anglecam.measurement.clip import measure_clip
 from anglecam.video.open_film import open_film
 from support import things
@@ -159,3 +159,11 @@ def test_a_picture_of_64_px_is_measured(tmp_path, monkeypatch):
 def test_a_small_header_is_refused_below_32_px(tmp_path):
     with pytest.raises(InputError, match="too small"):
         open_film(encode(tmp_path / "16.mkv", [np.zeros((16, 16, 3), np.uint8)] * 2))
+
+
+def test_a_film_that_states_its_frames_is_not_decoded_to_find_that_it_ends_too_early(tmp_path, monkeypatch):
+    film = encode(tmp_path / "film.mp4", _greys())
+    count = len(open_film(film).times)
+    monkeypatch.setattr("anglecam.video.open_film.FilmRows", None)  # the rows are not even begun
+    with pytest.raises(InputError, match=f"ends before frame {count}, the first that is wanted; it has {count} frames"):
+        open_film(film, RigFrames.model_validate({"from": count}))

@@ -102,7 +102,20 @@ def test_a_part_beside_the_verdict_that_fails_is_missing_and_the_verdict_is_writ
     monkeypatch.setattr(session_results, "identify_records", diverges)
     monkeypatch.setattr(session_results, "next_experiment", diverges)
     measured = measure_session(read_session(session))
-    closed = session_results.write_closed(measured, loop_input(measured), out)
+    stages = []
+    closed = session_results.write_closed(measured, loop_input(measured), out, progress=stages.append)
+    assert [stage.name for stage in stages] == [
+        "fitting the base model",
+        "testing the residual",
+        "reaching the verdict",
+        "looking for a torque of free form",
+        "fitting the clocks",
+        "fitting the model by extended Kalman filter",
+        "fitting the model by output error",
+        "designing the next experiment",
+        "working out the smallest effects that would be seen",
+        "writing the report",
+    ]
     written = json.loads((out / "loop.json").read_text())
     assert written["verdict"] == closed.verdict.verdict == "nothing_missing"
     names = [line.split(":")[0] for line in written["missing"]]

@@ -1,6 +1,7 @@
 """The registry of estimators: every module of this package that defines ``ESTIMATOR`` is an entry.
 
 To add an estimator, add a file. `identify_records`, the command line and its help read their choices from `ESTIMATORS`.
+The help must appear at once, so a module imports what fits when it fits.
 """
 
 from __future__ import annotations

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,16 +11,17 @@ from anglecam.data.record import Record
 from anglecam.data.typing import Floats
 from anglecam.identification.estimators.estimator import Estimate, Estimator
 from anglecam.identification.estimators.oe2 import second_order_step
-from anglecam.identification.fit import Fit
-from anglecam.identification.noise import noise_floor
-from anglecam.identification.output_error import fit_output_error
-from anglecam.models.plant import Plant
-from anglecam.neck.large_angle import LargeAngleNeck
+
+if TYPE_CHECKING:
+    from anglecam.identification.fit import Fit
+    from anglecam.neck.large_angle import LargeAngleNeck
 
 
 def _fit(second_order: Fit, records: Sequence[Record], start: Floats, neck: LargeAngleNeck | None) -> Estimate:
-    # filterpy takes a second to load: only this estimator pays for it
     from anglecam.identification.ekf import fit_ekf, settings_for
+    from anglecam.identification.noise import noise_floor
+    from anglecam.identification.output_error import fit_output_error
+    from anglecam.models.plant import Plant
 
     noise = noise_floor(records)
     sigma = max(noise.sigma if noise else 0.0, second_order.rmse)

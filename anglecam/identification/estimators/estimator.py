@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from anglecam.data.record import Record
 from anglecam.data.step_figures import StepFigures
 from anglecam.data.typing import Floats
-from anglecam.identification.fit import Fit
-from anglecam.neck.large_angle import LargeAngleNeck
+
+if TYPE_CHECKING:
+    from anglecam.identification.fit import Fit
+    from anglecam.neck.large_angle import LargeAngleNeck
 
 
 @dataclass(frozen=True)

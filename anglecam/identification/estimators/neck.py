@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,15 +12,17 @@ from anglecam.data.step_figures import StepFigures
 from anglecam.data.typing import Floats
 from anglecam.errors import RigError
 from anglecam.identification.estimators.estimator import Estimate, Estimator, optimum_estimate
-from anglecam.identification.fit import Fit
-from anglecam.identification.output_error import fit_output_error
-from anglecam.models.large_angle import DEFAULT, FREE_SWING, LargeAngle
-from anglecam.models.plant import Plant
-from anglecam.models.unit_step import step_figures
-from anglecam.neck.large_angle import LargeAngleNeck, linearise
+
+if TYPE_CHECKING:
+    from anglecam.identification.fit import Fit
+    from anglecam.neck.large_angle import LargeAngleNeck
 
 
 def _fit(second_order: Fit, records: Sequence[Record], start: Floats, neck: LargeAngleNeck | None) -> Estimate:
+    from anglecam.identification.output_error import fit_output_error
+    from anglecam.models.large_angle import DEFAULT, FREE_SWING, LargeAngle
+    from anglecam.neck.large_angle import LargeAngleNeck
+
     driven = len(second_order.parameters) == 3
     model = LargeAngle(neck or LargeAngleNeck(), DEFAULT if driven else FREE_SWING)
     starts = model.starts(second_order.parameters) if driven else [model.nominal]
@@ -34,6 +37,11 @@ def _fit(second_order: Fit, records: Sequence[Record], start: Floats, neck: Larg
 
 def _step_response(fit: Fit) -> StepFigures:
     """Return the figures of the model linearised at neutral: a unit step (1 rad) is beyond the linkage's reach."""
+    from anglecam.models.large_angle import LargeAngle
+    from anglecam.models.plant import Plant
+    from anglecam.models.unit_step import step_figures
+    from anglecam.neck.large_angle import linearise
+
     assert isinstance(fit.model, LargeAngle)
     neck = fit.model.neck_at(fit.parameters)
     near = linearise(neck)

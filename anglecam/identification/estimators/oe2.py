@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,9 +11,10 @@ from anglecam.data.record import Record
 from anglecam.data.step_figures import StepFigures
 from anglecam.data.typing import Floats
 from anglecam.identification.estimators.estimator import Estimate, Estimator, optimum_estimate
-from anglecam.identification.fit import Fit
-from anglecam.models.unit_step import step_figures
-from anglecam.neck.large_angle import LargeAngleNeck
+
+if TYPE_CHECKING:
+    from anglecam.identification.fit import Fit
+    from anglecam.neck.large_angle import LargeAngleNeck
 
 
 def _fit(second_order: Fit, records: Sequence[Record], start: Floats, neck: LargeAngleNeck | None) -> Estimate:
@@ -21,6 +23,8 @@ def _fit(second_order: Fit, records: Sequence[Record], start: Floats, neck: Larg
 
 def second_order_step(fit: Fit) -> StepFigures:
     """Return the figures of a second-order model's step response."""
+    from anglecam.models.unit_step import step_figures
+
     p = fit.parameters
     return step_figures(fit.model, p, np.roots([1.0, p[0], p[1]]), p[2] / p[1] if p[1] else 0.0)
 

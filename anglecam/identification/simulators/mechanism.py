@@ -10,9 +10,8 @@ from typing import Any
 from anglecam.effects import LEDGER, Parameter
 from anglecam.errors import InputError
 from anglecam.identification.export import FittedModel, read_model
-from anglecam.io.files import read_json
+from anglecam.io.model_json import read_model_file
 
-LOOP, MODEL = "loop.json", "model.json"
 CAMERA = {e.id for e in LEDGER if e.station == "camera"}
 
 
@@ -44,22 +43,6 @@ class Exported:
     """One line for each effect, or part of one, that the format cannot express or expresses differently."""
 
 
-def model_file(path: Path) -> Path:
-    """Return the file of a model: ``path``, or in a folder its ``loop.json``, otherwise its ``model.json``.
-
-    Raises
-    ------
-    InputError
-        If the folder has neither.
-    """
-    if not path.is_dir():
-        return path
-    for name in (LOOP, MODEL):
-        if (path / name).is_file():
-            return path / name
-    raise InputError(f"{path}: neither {LOOP} nor {MODEL} is in this folder")
-
-
 def read_mechanism(path: Path) -> Mechanism:
     """Read a mechanism.
 
@@ -78,7 +61,7 @@ def read_mechanism(path: Path) -> Mechanism:
     InputError
         Naming the file and the cause.
     """
-    content = _content(path)
+    content = read_model_file(path)
     if "verdict" in content:
         return _from_loop(path, content)
     model = read_model(path)
@@ -98,9 +81,9 @@ def linear_model(path: Path) -> tuple[FittedModel, list[str]]:
     """
     import numpy as np
 
-    if "verdict" not in _content(path):
+    if "verdict" not in read_model_file(path):
         return read_model(path), []
-    content, mechanism = _content(path)["model"], read_mechanism(path)
+    content, mechanism = read_model_file(path)["model"], read_mechanism(path)
     names = tuple(name for name in ("a_per_s", "b_per_s2", "c_per_s2") if name in content)
     values = np.array([content[name]["value"] for name in names], dtype=float)
     sigmas = np.array([_number(content[name].get("sigma")) for name in names])
@@ -110,18 +93,6 @@ def linear_model(path: Path) -> tuple[FittedModel, list[str]]:
         numerator, denominator = numerator / lag, np.polymul(denominator, [1.0, 1.0 / lag])
     left_out = [f"{name}: not in the transfer function" for name in mechanism.effects if name != "actuator_lag"]
     return FittedModel(mechanism.name, names, values, np.diag(sigmas**2), numerator, denominator), left_out
-
-
-def _content(path: Path) -> dict[str, Any]:
-    try:
-        content = read_json(path)
-    except OSError as fault:
-        raise InputError(f"{path}: cannot be read ({fault.strerror or fault})") from fault
-    except ValueError as fault:
-        raise InputError(f"{path}: neither a loop.json nor a model.json of anglecam") from fault
-    if not isinstance(content, dict):
-        raise InputError(f"{path}: neither a loop.json nor a model.json of anglecam")
-    return content
 
 
 def _from_loop(path: Path, content: dict[str, Any]) -> Mechanism:
