@@ -24,7 +24,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from shutil import rmtree
 
-_LOADS_NUMBA = re.compile(rb"^(from numba |import numba)", re.MULTILINE)
+_LOADS_NUMBA = re.compile(rb"^(from|import) numba\b", re.MULTILINE)
 """In the source of a module with kernels."""
 _OF_CODE = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
 """Settings that change for which processor Numba compiles."""
