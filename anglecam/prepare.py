@@ -132,7 +132,8 @@ class Kernels:
     def modules(self) -> list[str]:
         """Return the modules with kernels, those with the longest sources first."""
         sources = sorted(self._kernel_sources(), key=lambda path: -path.stat().st_size)
-        return [".".join([self.package, *path.relative_to(self.root).with_suffix("").parts]) for path in sources]
+        names = [".".join([self.package, *path.relative_to(self.root).with_suffix("").parts]) for path in sources]
+        return [name.removesuffix(".__init__") for name in names]
 
     def _write_stamp(self, files: dict[str, list[str]]) -> None:
         """Write the stamp, given the files that Numba wrote to each of its folders."""
