@@ -62,7 +62,6 @@ $(DEV): $(RUN) requirements/dev.lock
 
 demo: setup ## render a rig with a hidden effect, measure it, find the effect, write the report
 	@rm -rf $(DEMO)
-	@echo "demo: the first run also compiles the numerical kernels, which takes up to a minute"
 	$(BIN)/synth render configs/demo.yaml --out $(DEMO)/session --truth $(DEMO)/truth
 	$(BIN)/anglecam close $(DEMO)/session --out $(DEMO)/result
 	$(BIN)/synth score $(DEMO)/result --truth $(DEMO)/truth
