@@ -15,7 +15,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, Protocol
 
 from anglecam import end_with_parent
 from anglecam.threads import ONE_THREAD
@@ -32,6 +32,16 @@ class ProcessLost(Exception):  # noqa: N818  (an event, not a fault of this prog
 
 class Abandoned(BaseException):
     """The batch has ended, and the process with it."""
+
+
+class Measurer(Protocol):
+    """What does the measuring and fitting for one job at a time; see `MeasuringProcess`."""
+
+    def ask(self, request: dict[str, Any], time_limit: float) -> dict[str, Any]:
+        """Have a clip measured or a session fitted, within a time limit in s."""
+
+    def close(self) -> None:
+        """End it for good; a thread that waits for its answer gets `Abandoned`."""
 
 
 class MeasuringProcess:

@@ -10,13 +10,13 @@ import time
 
 import pytest
 
-from anglecam.batch.run import Options, run_batch
+from anglecam.batch.run import Options
 from anglecam.errors import RigError
 from support.dask_cluster import dask_cluster
+from support.measured_here import run_batch
 from support.tiny import batch_command, children, is_alive, results, tiny_lab
 
 pytest.importorskip("distributed")
-pytestmark = pytest.mark.usefixtures("shared_processes")
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def lab(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def without_dask(lab, tmp_path_factory, shared_processes):
+def without_dask(lab, tmp_path_factory):
     """Return what a batch without Dask gives."""
     out = tmp_path_factory.mktemp("here")
     assert not run_batch([str(lab)], out, Options(jobs=2, quiet=True)).problems

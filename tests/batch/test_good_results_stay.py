@@ -27,14 +27,14 @@ from support.batch_trials import (
 )
 from support.tiny import results
 
-pytestmark = pytest.mark.usefixtures("shared_processes")
+pytestmark = pytest.mark.usefixtures("measured_here")
 
 HERE = [trial for trial in TRIALS if trial.cause is not only_another_version]
 """`test_dask.py` sees a batch of another version refused before it measures; `benchmarks/batch_trials.py` runs all."""
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory, shared_processes):
+def made(tmp_path_factory, measured_here):
     return make_lab(tmp_path_factory.mktemp("stay"))
 
 

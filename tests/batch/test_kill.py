@@ -11,12 +11,10 @@ import pytest
 
 from anglecam.batch.measuring_process import MeasuringProcess, ProcessLost
 from anglecam.batch.run import Options
-from anglecam.batch.run import run_batch as run_here
 from anglecam.errors import RigError
+from support.measured_here import run_batch as run_here
 from support.tiny import batch_command, children, is_alive, results, tiny_clip, tiny_lab, unfinished
 from support.tiny_session import tiny_session
-
-pytestmark = pytest.mark.usefixtures("shared_processes")
 
 TWO = Options(jobs=2, quiet=True)
 NAMES = [f"{folder}/{k}.avi" for folder in ("mon", "tue") for k in range(2)]

@@ -9,16 +9,15 @@ import shutil
 import fsspec
 import pytest
 
-from anglecam.batch.run import Options, run_batch
+from anglecam.batch.run import Options
 from anglecam.batch.session_job import SessionJob, _inputs
 from anglecam.batch.worker import Settings
 from anglecam.io.session import read_session
 from anglecam.workflow.session import measure_session
 from anglecam.workflow.session_results import write_identified
+from support.measured_here import run_batch
 from support.tiny import tiny_clip, tiny_lab
 from support.tiny_session import tiny_session
-
-pytestmark = pytest.mark.usefixtures("shared_processes")
 
 QUIET = Options(jobs=2, quiet=True)
 
