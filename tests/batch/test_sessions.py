@@ -30,10 +30,10 @@ def lab(made_once, tmp_path):
 
 @pytest.fixture(scope="module")
 def made_once(tmp_path_factory):
-    """Return a folder with one session of four series and a clip, and with a folder that is no session."""
+    """Return a folder with one session of three series and a clip, and with a folder that is no session."""
     folder = tmp_path_factory.mktemp("made")
     tiny_clip(folder / "plain" / "a.avi")
-    tiny_session(folder / "neck", 1)
+    tiny_session(folder / "neck", 1, kinds=("stairs", "chirp", "random"))
     return folder
 
 
