@@ -112,6 +112,7 @@ def test_a_scheduler_with_workers_of_other_versions_only_is_refused_and_names_th
     assert not list((tmp_path / "out").glob("*.csv"))
 
 
+@pytest.mark.sweep
 def test_a_batch_waits_for_a_worker_of_its_version_that_joins_after_one_of_another(tmp_path, monkeypatch):
     lab, lines = tiny_lab(tmp_path / "lab", ["a.avi"]), []
     with dask_cluster(tmp_path, ["9.9.9"]) as cluster:
