@@ -56,6 +56,7 @@ def test_a_wrongly_predicted_breakaway_does_not_contradict_dry_friction(seed):
     assert abs(verdict.after.parameters[3] - 1.83) < 3.0 * verdict.after.sigma[3]
 
 
+@pytest.mark.sweep
 def test_a_limit_that_is_reached_once_is_named_or_its_only_alias():
     # it acts for a fraction of a second; if a second were left out at a time, the rest would not determine it. A torque
     # that falls with the speed explains it as well: the log-likelihoods differ by 0.1
