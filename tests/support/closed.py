@@ -42,9 +42,9 @@ class Canonical:
     options: dict[str, Any] = field(default_factory=lambda: {"held_out": ["random"]})
 
 
-def _three(plant: Plant, seed: int, **noise: float) -> Callable[[], list[Record]]:
+def _three(plant: Plant, seed: int) -> Callable[[], list[Record]]:
     """Return what makes the records of steps, a triangle and random steps."""
-    return lambda: session(plant, seed, **noise)[::2]
+    return lambda: session(plant, seed)[::2]
 
 
 CANONICAL = {
