@@ -19,10 +19,10 @@ from support.tiny import batch_command, children, is_alive, results, tiny_lab
 pytest.importorskip("distributed")
 
 
-@pytest.fixture
-def cluster(tmp_path):
-    """Start a scheduler and two workers as a user does."""
-    with dask_cluster(tmp_path) as started:
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """Start a scheduler and two workers as a user does; the last test that uses them kills one."""
+    with dask_cluster(tmp_path_factory.mktemp("cluster")) as started:
         yield started.address, started.workers
 
 
@@ -37,6 +37,26 @@ def without_dask(lab, tmp_path_factory):
     out = tmp_path_factory.mktemp("here")
     assert not run_batch([str(lab)], out, Options(jobs=2, quiet=True)).problems
     return results(out)
+
+
+def test_what_workers_finish_while_the_batch_is_killed_is_not_measured_again(cluster, lab, without_dask, tmp_path):
+    (address, _), out = cluster, tmp_path / "out"
+    batch = subprocess.Popen(batch_command(lab, "--out", out, "--dask", address, "--quiet"))
+    until = time.monotonic() + 120.0
+    unfinished = out / ".anglecam" / "unfinished"
+    while not list(unfinished.glob("*/*/out")):  # a worker is measuring
+        assert time.monotonic() < until
+        time.sleep(0.005)
+    batch.send_signal(signal.SIGSTOP)
+    while not (left := list(unfinished.glob("*/*/result.json"))):
+        assert time.monotonic() < until
+        time.sleep(0.005)
+    batch.kill()
+    batch.wait()
+    made = {path.name: path.stat().st_mtime_ns for path in (left[0].parent / "out").iterdir()}
+    assert not run_batch([str(lab)], out, Options(jobs=2, quiet=True)).problems
+    assert made == {name: (out / name).stat().st_mtime_ns for name in made}
+    assert results(out) == without_dask
 
 
 def test_a_worker_that_is_killed_loses_no_clip(cluster, lab, without_dask, tmp_path):
@@ -60,26 +80,6 @@ def test_a_worker_that_is_killed_loses_no_clip(cluster, lab, without_dask, tmp_p
     assert not any(map(is_alive, killed))
     assert not result.problems
     assert [row.status for row in result.rows] == ["ok"] * 6
-    assert results(out) == without_dask
-
-
-def test_what_workers_finish_while_the_batch_is_killed_is_not_measured_again(cluster, lab, without_dask, tmp_path):
-    (address, _), out = cluster, tmp_path / "out"
-    batch = subprocess.Popen(batch_command(lab, "--out", out, "--dask", address, "--quiet"))
-    until = time.monotonic() + 120.0
-    unfinished = out / ".anglecam" / "unfinished"
-    while not list(unfinished.glob("*/*/out")):  # a worker is measuring
-        assert time.monotonic() < until
-        time.sleep(0.005)
-    batch.send_signal(signal.SIGSTOP)
-    while not (left := list(unfinished.glob("*/*/result.json"))):
-        assert time.monotonic() < until
-        time.sleep(0.005)
-    batch.kill()
-    batch.wait()
-    made = {path.name: path.stat().st_mtime_ns for path in (left[0].parent / "out").iterdir()}
-    assert not run_batch([str(lab)], out, Options(jobs=2, quiet=True)).problems
-    assert made == {name: (out / name).stat().st_mtime_ns for name in made}
     assert results(out) == without_dask
 
 

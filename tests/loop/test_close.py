@@ -116,9 +116,9 @@ def test_no_effect_is_named_if_none_is_hidden(closed):
     assert all(smallest > 0.0 for smallest in detectable.values())
 
 
-def test_an_effect_outside_the_ledger_is_called_unexplained(closed):
-    # the search adds an effect that takes away a part of the gusts and does not stand
-    verdict = closed("gusts")
+@pytest.mark.parametrize("cause", ["magnet", pytest.param("gusts", marks=pytest.mark.sweep)])
+def test_an_effect_outside_the_ledger_is_called_unexplained(closed, cause):
+    verdict = closed(cause)
     assert verdict.verdict == "unexplained"
     assert verdict_as_dict(verdict)["effects"] == []
     assert "none" in sentence(verdict)
