@@ -124,7 +124,7 @@ class TestSelfTestOfThePaper:
         values, stated = np.array([f.parameters for f in found]), np.array([f.covariance.diagonal() for f in found])
         records = [self.step(np.random.default_rng(0))]
         bound = np.sqrt(cramer_rao_bound(Plant(), self.true, records, [np.zeros(2)], self.sigma).diagonal())
-        # three deviations of each over the draws: of a normal error the median is uncertain by 1.25/√n, the median of
+        # at most three deviations of each over the draws: of a normal error the median is uncertain by 1.25/√n, the median of
         # its size, 0.674, by 0.79/√n, and the deviation by 0.71/√n
         three = 3.0 / np.sqrt(draws)
         assert np.all(np.median(np.abs(values - self.true), axis=0) < (0.674 + 0.75 * three) * bound)
