@@ -124,8 +124,8 @@ class TestSelfTestOfThePaper:
         values, stated = np.array([f.parameters for f in found]), np.array([f.covariance.diagonal() for f in found])
         records = [self.step(np.random.default_rng(0))]
         bound = np.sqrt(cramer_rao_bound(Plant(), self.true, records, [np.zeros(2)], self.sigma).diagonal())
-        # at most three deviations of each over the draws: of a normal error the median is uncertain by 1.25/√n, the median of
-        # its size, 0.674, by 0.79/√n, and the deviation by 0.71/√n
+        # at most three deviations of each over the draws: of a normal error the median is uncertain by 1.25/√n, the
+        # median of its size, 0.674, by 0.79/√n, and the deviation by 0.71/√n
         three = 3.0 / np.sqrt(draws)
         assert np.all(np.median(np.abs(values - self.true), axis=0) < (0.674 + 0.75 * three) * bound)
         assert np.all(np.abs(np.median(values, axis=0) - self.true) < 1.25 * three * bound)
