@@ -9,6 +9,8 @@ import signal
 import threading
 import time
 
+import pytest
+
 from anglecam.batch.run import Options, run_batch
 from support.measured_here import run_batch as run_here
 from support.tiny import children, command_line, tiny_clip, tiny_lab, unfinished
@@ -88,6 +90,7 @@ def test_a_clip_that_is_removed_or_rewritten_while_it_is_read_is_reported(tmp_pa
     assert [row.status for row in run_here([str(lab)], out, QUIET).rows] == ["ok", "ok"]
 
 
+@pytest.mark.filterwarnings("ignore:Glyph")  # the font of the plots does not have every sign
 def test_a_clip_of_any_file_name_is_measured_and_listed(tmp_path):
     names = ["new\nline.avi", "Ⅳ θ 日本　語.avi", os.fsdecode(b"not-utf8-\xff.avi"), "-o.avi", "a'b;$x$_.avi"]
     lab, out = tiny_lab(tmp_path / "clips", names), tmp_path / "out"
