@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -73,6 +74,17 @@ def test_friction_of_no_size_is_no_friction():
     friction = effect("coulomb_friction")
     drag = effect("quadratic_drag")
     assert np.array_equal(run(friction, drag, parameters=([0.0] * 4, [1.0])), run(drag, parameters=([1.0],)))
+
+
+@pytest.mark.parametrize("beside", ["quadratic_drag", "elastic_coupling", "load_dependent_friction"])
+@pytest.mark.parametrize("effect_id", [e.id for e in INSIDE if any(p.staged for p in e.parameters)])
+def test_an_omitted_staged_parameter_is_zero_whatever_acts_beside_it(effect_id, beside):
+    whole, other = effect(effect_id), effect(beside)
+    kept = tuple(p for p in whole.parameters if not p.staged)
+    values = first_start(whole)[: len(kept)]
+    zeros = np.zeros(len(whole.parameters) - len(kept))
+    shorter = run(replace(whole, parameters=kept), other, parameters=(values, first_start(other)))
+    assert np.array_equal(shorter, run(whole, other, parameters=(np.append(values, zeros), first_start(other))))
 
 
 def test_a_command_and_instants_that_cannot_be_written_to_are_taken():
