@@ -4,8 +4,12 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from support.films import Films
 
 sys.path.insert(0, str(Path(__file__).parent))
 # before NumPy is loaded: there are as many test processes as cores, and libraries whose threads wait in a loop for a
@@ -20,3 +24,12 @@ def _films_are_drawn_here() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("synth.render.workers", lambda: 1)
         yield
+
+
+@pytest.fixture(scope="session")
+def films(tmp_path_factory: pytest.TempPathFactory) -> "Films":
+    """Return the films that tests share, in a folder that the test processes of this run share."""
+    from support.films import Films
+
+    base = tmp_path_factory.getbasetemp()
+    return Films((base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "films")
