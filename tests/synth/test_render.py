@@ -280,7 +280,7 @@ def test_pyrender_makes_films_too_and_records_its_edge_errors(tmp_path):
     assert 0.001 < facts["render"]["edge_error"]["half_plane_px"] < 0.1
 
 
-@pytest.mark.parametrize("blow", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("blow", [pytest.param(signal.SIGTERM, marks=pytest.mark.sweep), signal.SIGKILL])
 def test_ending_the_command_ends_its_workers(tmp_path, blow):
     long = [{**SPEC["recordings"][0], "duration_s": 8.0}]
     with call(write_spec(tmp_path, recordings=long), tmp_path) as rendering:

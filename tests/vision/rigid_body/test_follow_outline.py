@@ -140,7 +140,11 @@ def _gear(scene, angle):
 
 @pytest.mark.parametrize(
     ("covered", "goes_on", "known"),
-    [(1, True, None), pytest.param(6, False, None, marks=pytest.mark.sweep), (6, False, 1)],
+    [
+        pytest.param(1, True, None, marks=pytest.mark.sweep),
+        pytest.param(6, False, None, marks=pytest.mark.sweep),
+        (6, False, 1),
+    ],
 )
 def test_a_gear_is_not_found_again_at_another_tooth(tmp_path, covered, goes_on, known):
     turned = 4.0 * np.arange(60)

@@ -95,6 +95,7 @@ def test_a_horn_is_followed_about_a_hinted_pivot(horn, seed):
     assert np.hypot(*(measured.angles.pivot.centre_px - PIVOT)) < 1.0
 
 
+@pytest.mark.sweep  # a stick is measured by its outline in `tests/measurement/test_without_mark.py`
 def test_without_a_hint_a_horn_is_measured_by_its_outline(horn):
     # its middle moves on another circle than the fitted one: the thin ends of the arms are not seen
     measured = measure_clip(open_film(horn(4)), Rig())
