@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from copy import copy
 from dataclasses import replace
 from itertools import combinations
 
@@ -91,3 +92,13 @@ def test_a_command_and_instants_that_cannot_be_written_to_are_taken():
     time = TIME.copy()
     time.setflags(write=False)
     assert np.array_equal(Plant().predict(np.array(BASE), time, COMMAND, FIRST), run())
+
+
+def test_what_is_kept_of_a_plant_holds_no_addresses_of_this_process():
+    plant = Plant((effect("quadratic_drag"),))
+    parameters = np.array([*BASE, 1.0])
+    expected = plant.run(parameters, TIME, COMMAND, FIRST)
+    assert "pieces" in vars(plant)
+    copied = copy(plant)  # it takes what pickle takes
+    assert "pieces" not in vars(copied)
+    np.testing.assert_array_equal(copied.run(parameters, TIME, COMMAND, FIRST), expected)
