@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from anglecam.data.series import AngleSeries
 from anglecam.errors import AnglecamError
 from anglecam.io.rig import Rig
 from anglecam.workflow.clip import measure_source, open_source
@@ -130,23 +131,54 @@ def main() -> None:
         if arguments.only and not any(word in name for word in arguments.only):
             continue
         path = Path(arguments.folder) / film.path
-        times, angle = film.track(path)
+        tracked = film.track(path)
         for hint in ({}, film.hint) if film.hint else ({},):
-            row, success = _compared(path, hint, times, angle, film)
+            row, success = cells(path, hint, tracked, film)
             print(f"| {name} | {hint or 'nothing'} | {row} | {film.known} |", flush=True)
             if success:
                 break
 
 
-def _compared(
-    path: Path, hint: dict[str, Any], times: np.ndarray, angle: np.ndarray, film: RealFilm
-) -> tuple[str, bool]:
-    """Return the cells of one measurement, and whether it was a success."""
+@dataclass(frozen=True)
+class Compared:
+    """One measurement beside the tracker; the differences are NaN where no frame has both."""
+
+    ok: int
+    rows: int
+    difference_deg: float
+    """RMS, the medians subtracted."""
+    scale: float
+    """anglecam's angle over the tracker's."""
+    scaled_deg: float
+    """RMS difference after the tracker's angle is multiplied by the scale."""
+    over_sigma: float
+    """RMS of that difference over sigma."""
+    sigma_deg: float
+    """Median."""
+    period_s: float
+
+
+def cells(path: Path, hint: dict[str, Any], tracked: Tracked, film: RealFilm) -> tuple[str, bool]:
+    """Measure a film; return the cells of its row, and whether it was a success."""
     try:
         measured = measure_source(open_source(path, Rig.model_validate(hint)))
     except AnglecamError as problem:
         return f"{str(problem).replace(f'{path}: ', '')} | | | | | ", False
-    series = measured.series
+    found = compared(measured.series, tracked)
+    shown = [
+        f"{found.ok}/{found.rows}",
+        f"{found.difference_deg:.3f}",
+        f"{found.scale:.3f}",
+        f"{found.scaled_deg:.3f}",
+        f"{found.sigma_deg:.3f}",
+        f"{found.period_s:.4f}" if film.periodic else "",
+    ]
+    return " | ".join(shown), measured.doubt is None
+
+
+def compared(series: AngleSeries, tracked: Tracked) -> Compared:
+    """Compare angles with a tracker's at equal time stamps."""
+    times, angle = tracked
     # FFmpeg states times of reordered frames in AVI late by the decoder's delay; each count starts at its first frame.
     times, own = times - times[0], series.time - series.time[0]
     nearest = np.abs(times[None, :] - own[:, None]).argmin(axis=1)
@@ -154,15 +186,17 @@ def _compared(
     found, other = np.degrees(series.angle[both]), angle[nearest][both]
     found, other = found - np.median(found), other - np.median(other)
     scale = float(found @ other / (other @ other))
-    cells = [
-        f"{series.ok.sum()}/{len(series.ok)}",
-        f"{np.sqrt(((found - other) ** 2).mean()):.3f}",
-        f"{scale:.3f}",
-        f"{np.std(found - scale * other):.3f}",
-        f"{np.degrees(np.median(series.sigma[series.ok])):.3f}",
-        f"{_period(series.time[series.ok], series.angle[series.ok]):.4f}" if film.periodic else "",
-    ]
-    return " | ".join(cells), measured.doubt is None
+    scaled = found - scale * other
+    return Compared(
+        int(series.ok.sum()),
+        len(series.ok),
+        float(np.sqrt(((found - other) ** 2).mean())),
+        scale,
+        float(np.std(scaled)),
+        float(np.sqrt((((scaled - scaled.mean()) / np.degrees(series.sigma[both])) ** 2).mean())),
+        float(np.degrees(np.median(series.sigma[series.ok]))),
+        _period(series.time[series.ok], series.angle[series.ok]),
+    )
 
 
 def _period(time: np.ndarray, angle: np.ndarray) -> float:

@@ -97,10 +97,15 @@ def session(
     SpecError, ValidationError
         If an effect is so strong that the rig leaves its reach, or an effect is invalid.
     """
-    spec = spec_of(effects, seed=seed, fps=fps, plant=plant)
-    seen = look(spec)
     known = "constant_torque" in effects or _rng(seed, ZERO).random() < DECLARED
-    rng = np.random.default_rng(seed)
+    spec = spec_of(effects, seed=seed, fps=fps, plant=plant)
+    return filmed(spec, known=known, sigma_deg=sigma_deg, noise=noise)
+
+
+def filmed(spec: Spec, *, known: bool, sigma_deg: float, noise: str = "white") -> list[Record]:
+    """Make the recordings of a spec of `synth`; ``known`` is whether their zero is declared, the rest as `session`."""
+    seen = look(spec)
+    rng = np.random.default_rng(spec.seed)
     records = []
     for take in perform(spec, seen):
         exact = _record(spec, seen, take, known)

@@ -1,0 +1,83 @@
+"""One film or session: where it is kept, what its measurement costs, and the row that states what became of it."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import math
+import resource
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from numba.core import event
+
+from benchmarks.fuzz.trial import forget_peak, peak
+
+Row = dict[str, Any]
+"""Ready for JSON; a figure that does not exist is ``None``."""
+STATUSES = ("ok", "refused", "internal error", "timeout", "died")
+"""Refused: one line says why. Died: the process ended without an answer."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """Folders outside the package."""
+
+    cache: Path
+    """Films that take long to draw are kept here."""
+    real: Path | None
+    """Films and logs that nobody here made."""
+
+
+class Meter:
+    """CPU time, peak memory and compiled kernels of what happens while it is entered."""
+
+    def __init__(self) -> None:
+        self.cpu_s, self.peak_mib, self.kernels = math.nan, math.nan, 0
+
+    @contextlib.contextmanager
+    def __call__(self) -> Iterator[None]:
+        forget_peak()
+        began = _cpu_s()
+        with event.install_recorder("numba:compile") as seen:
+            try:
+                yield
+            finally:
+                self.cpu_s, self.peak_mib = _cpu_s() - began, peak() / 2**20
+                self.kernels = sum(one.is_start for _, one in seen.buffer)
+
+    @property
+    def figures(self) -> Row:
+        """Return what every row states of the cost."""
+        return {"cpu_s": round(self.cpu_s, 2), "peak_mib": round(self.peak_mib), "kernels_compiled": self.kernels}
+
+
+def _cpu_s() -> float:
+    of_children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + of_children.ru_utime + of_children.ru_stime
+
+
+def status_of(message: str) -> str:
+    """Return the status of a film or session that ended in one line."""
+    return "internal error" if "internal error" in message else "refused"
+
+
+def sha256(*paths: Path) -> str:
+    """Return the first half of the hash of some files, in their order."""
+    found = hashlib.sha256()
+    for path in paths:
+        found.update(path.read_bytes())
+    return found.hexdigest()[:32]
+
+
+def known(value: float) -> float | None:
+    """Return a number as JSON can state it: ``None`` where it is not finite."""
+    return float(value) if math.isfinite(value) else None
+
+
+def known_rms(values: Any) -> float | None:
+    """Return the root of the mean square; ``None`` where there is none."""
+    return known(float((values**2).mean()) ** 0.5) if len(values) else None
