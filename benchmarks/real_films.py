@@ -25,10 +25,12 @@ from anglecam.data.series import AngleSeries
 from anglecam.errors import AnglecamError
 from anglecam.io.rig import Rig
 from anglecam.workflow.clip import measure_source, open_source
-from benchmarks.real.trackers import Tracked, blob, gear, polar, thread
+from benchmarks.real.trackers import Tracked, blob, frames, gear, polar, thread
 
 SAME_S = 0.002
 """Time stamps closer than this are one frame's; containers round to a millisecond."""
+ENCODER_LATE_S = 1.96
+"""Time in the film at which the pendubot's log begins, s."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,33 @@ def _yellow_left(image: np.ndarray) -> np.ndarray:
     chosen = (np.minimum(r, g) - b > 40) & (np.indices(b.shape)[0] > 240)
     chosen[:, 440:] = False
     return chosen
+
+
+def _red_below(image: np.ndarray) -> np.ndarray:
+    """Return the dot on the bob, which hangs below the red things on the shelf."""
+    chosen = _redder(image)
+    chosen[:240] = False
+    return chosen
+
+
+def _greener(image: np.ndarray) -> np.ndarray:
+    """Return the only green sector of the wheel."""
+    b, g, r = (image[..., k].astype(int) for k in range(3))
+    return g - np.maximum(b, r) > 20
+
+
+def _turns_steadily(path: Path, rate_deg_s: float) -> Tracked:
+    times = np.array([time for time, _ in frames(path)])
+    return times, rate_deg_s * times
+
+
+def _shoulder(path: Path) -> Tracked:
+    """Return the encoder of the driven link, at the times of the frames within its log."""
+    log = np.genfromtxt(path.with_name("encoder.csv"), delimiter=",", names=True)
+    times = np.array([time for time, _ in frames(path)])
+    at = times - ENCODER_LATE_S
+    angle = np.interp(at, log["time_s"], log["shoulder_deg"])
+    return times, np.where((at >= log["time_s"][0]) & (at <= log["time_s"][-1]), angle, np.nan)
 
 
 FILMS = {
@@ -113,6 +142,26 @@ FILMS = {
         lambda path: gear(path, (1236.0, 464.0), (428.0, 375.0), 13.0),
         {"pivot": {"near": [670, 1193]}},
         periodic=False,
+    ),
+    "lab pendulum": RealFilm(
+        "films/lab-pendulum/lab_pendulum_20fps.avi", lambda path: blob(path, _red_below), {}, "T 0.773 s"
+    ),
+    "turntable": RealFilm(
+        "films/turntable/turntable.mp4",
+        lambda path: _turns_steadily(path, -200.0),
+        {"pivot": {"near": [668, 553]}},
+        "33 1/3 turns a minute, clockwise",
+        periodic=False,
+    ),
+    "fivefold wheel": RealFilm(
+        "films/wheel-fivefold/wheel_fivefold.mp4",
+        lambda path: blob(path, _greener, (75.0, 88.5)),
+        {},
+        "706.8° clockwise",
+        periodic=False,
+    ),
+    "pendubot": RealFilm(
+        "films/pendubot/pendubot.m4v", _shoulder, {"pivot": {"near": [307, 476]}}, "encoders", periodic=False
     ),
 }
 
