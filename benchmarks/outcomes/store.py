@@ -8,7 +8,7 @@ from datetime import date
 from pathlib import Path
 
 from anglecam.io.files import write_atomically
-from benchmarks.outcomes.case import Row
+from benchmarks.outcomes.case import Row, sha256
 
 FOLDER = Path(__file__).parent
 ROOT = FOLDER.parents[1]
@@ -35,9 +35,12 @@ def write_rows(path: Path, rows: dict[str, Row]) -> None:
 
 
 def origin() -> Row:
-    """Return the commit that last changed the code, marked where files differ from it, and the date."""
+    """Return the date and the commit that last changed the code, with a hash of the files where they differ from it."""
     commit = _git("log", "-1", "--format=%h", "--abbrev=10", "--", *CODE)
-    return {"commit": commit + ("+" if _git("status", "--porcelain", "--", *CODE) else ""), "date": f"{date.today()}"}
+    if _git("status", "--porcelain", "--", *CODE):
+        listed = _git("ls-files", "--cached", "--others", "--exclude-standard", "--", *CODE).splitlines()
+        commit += "+" + sha256(*(path for name in listed if (path := ROOT / name).exists()))[:8]
+    return {"commit": commit, "date": f"{date.today()}"}
 
 
 def _git(*arguments: str) -> str:
