@@ -19,7 +19,7 @@ from benchmarks.outcomes.case import Meter, Places, Row
 
 CPU_S = 600
 """Limit of CPU time of one process, s; drawing the film counts."""
-WALL_S = 4 * CPU_S
+WALL_S = 6 * CPU_S
 """Limit of waiting for a process that hangs, s."""
 
 

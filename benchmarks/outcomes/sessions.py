@@ -64,9 +64,17 @@ def session(name: str, places: Places, meter: Meter) -> Row:
                 PENDULUM: real_data.write_pendulum
             }
             writers[which](places.real / which, folder)
-        row, verdict = _closed(meter, lambda: close_session(measure_session(read_session(folder))))
+        unused: list[str] = []
+
+        def close() -> Verdict:
+            found = measure_session(read_session(folder))
+            unused.extend(map(str, found.problems))
+            return close_session(found)
+
+        row, verdict = _closed(meter, close)
         row["session"] = sha256(*sorted(path for path in folder.iterdir() if path.suffix in (".csv", ".yaml")))
-        row["message"] = row["message"].replace(f"{folder}/", "").replace(str(folder), which)
+        said = "; ".join(filter(None, (*unused, row["message"])))
+        row["message"] = said.replace(f"{folder}/", "").replace(str(folder), which)
     if kind == "mechanism" and verdict is not None:
         row["verdict"] = "right" if mechanisms.is_right(which, verdict) else "wrong"
     return row
