@@ -17,8 +17,8 @@ from multiprocessing.connection import Connection
 from anglecam.threads import ONE_THREAD
 from benchmarks.outcomes.case import Meter, Places, Row
 
-CPU_S = 600
-"""Limit of CPU time of one process, s; drawing the film counts."""
+CPU_S = 1200
+"""Limit of CPU time of one process, s, with the drawing of the film. Beside other work the longest take 500 s."""
 WALL_S = 6 * CPU_S
 """Limit of waiting for a process that hangs, s."""
 

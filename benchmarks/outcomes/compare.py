@@ -14,7 +14,7 @@ GRADES = (
 """From the best to the worst."""
 WORSE = ("outcome", "error", "error/sigma", "rows ok", "CPU")
 """Kinds of change that can be worse, the most serious first."""
-COST = frozenset({"cpu_s", "peak_mib", "kernels_compiled", "commit", "date"})
+COST = frozenset({"cpu_s", "yardstick_s", "peak_mib", "kernels_compiled", "commit", "date"})
 """What may differ although the result is the same."""
 
 
@@ -25,6 +25,7 @@ class Factors:
     figure: float
     """Of errors, of error/sigma, of the share of rows and of the size of an effect."""
     cpu: float
+    """Of CPU time, as a multiple of the yardstick's in the same process."""
 
 
 @dataclass(frozen=True)
@@ -79,11 +80,15 @@ def _of_row(name: str, before: Row, after: Row, factors: Factors) -> Iterator[Ch
         ("error", "error_deg", lambda a, b: math.log(b / a)),
         ("error/sigma", "error_over_sigma", lambda a, b: abs(math.log(b)) - abs(math.log(a))),
         ("rows ok", "ok_share", lambda a, b: math.log(a / b)),
-        ("CPU", "cpu_s", lambda a, b: math.log(b / a)),
     ):
         a, b = before.get(key), after.get(key)
-        if a and b and abs(growth := worse(a, b)) > (math.log(factors.cpu) if kind == "CPU" else least):
+        if a and b and abs(growth := worse(a, b)) > least:
             yield Change(name, kind, f"{a:.4g}", f"{b:.4g}", growth)
+    a, b = (row["cpu_s"] / row["yardstick_s"] if row.get("cpu_s") else None for row in (before, after))
+    if a and b and abs(growth := math.log(b / a)) > math.log(factors.cpu):
+        yield Change(
+            name, "CPU", *(f"{row['cpu_s']:.3g} s at {row['yardstick_s']:.2g} s" for row in (before, after)), growth
+        )
     for kind, key in (("verdict of the loop", "loop_verdict"), ("message", "message"), ("film", "film")):
         a, b = before.get(key), after.get(key)
         if a != b and a is not None and b is not None and not (kind == "message" and grade(before) != grade(after)):

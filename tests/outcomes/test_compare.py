@@ -19,6 +19,7 @@ RIGHT = {
     "error_over_sigma": 1.0,
     "film": "f",
     "cpu_s": 10.0,
+    "yardstick_s": 0.5,
     "commit": "a",
 }
 REFUSED = {"status": "refused", "message": "nothing moves", "verdict": "refused", "ok_share": 0.0, "film": "f"}
@@ -83,9 +84,15 @@ def test_changes_within_the_factors_are_not_listed_but_not_called_the_same():
     assert same(RIGHT, {**RIGHT, "cpu_s": 14.0, "commit": "b", "peak_mib": 7})
 
 
+def test_cpu_time_counts_against_the_yardstick_of_the_same_process():
+    assert compared(RIGHT, {**RIGHT, "cpu_s": 20.0, "yardstick_s": 1.0}) == []
+    (change,) = compared(RIGHT, {**RIGHT, "cpu_s": 10.0, "yardstick_s": 0.25})
+    assert (change.kind, change.worse) == ("CPU", True)
+
+
 def test_other_effects_are_listed_and_a_larger_error_on_what_was_held_out_is_worse():
     friction = {"coulomb_friction": {"friction_deg_per_s2": {"value": 340.0, "sigma": 3.0}}}
-    before = {"status": "ok", "loop_verdict": "attributed", "effects": friction, "error_deg": 0.1, "cpu_s": 5.0}
+    before = {"status": "ok", "loop_verdict": "attributed", "effects": friction, "error_deg": 0.1}
     after = {**before, "loop_verdict": "unexplained", "effects": {}, "error_deg": 0.4}
     assert [(change.kind, change.worse) for change in compared(before, after)] == [
         ("error", True),
