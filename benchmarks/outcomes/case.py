@@ -19,9 +19,8 @@ from scipy.ndimage import gaussian_filter
 from benchmarks.fuzz.trial import forget_peak, peak
 
 Row = dict[str, Any]
-"""Ready for JSON; a figure that does not exist is ``None``."""
-STATUSES = ("ok", "refused", "internal error", "timeout", "died")
-"""Refused: one line says why. Died: the process ended without an answer."""
+"""Ready for JSON; a figure that does not exist is ``None``. ``status`` is ok, refused (``message`` says why), internal
+error, timeout or died, where the process ended without an answer."""
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,12 @@ def _of_row(name: str, before: Row, after: Row, factors: Factors) -> Iterator[Ch
         yield Change(
             name, "CPU", *(f"{row['cpu_s']:.3g} s at {row['yardstick_s']:.2g} s" for row in (before, after)), growth
         )
-    for kind, key in (("verdict of the loop", "loop_verdict"), ("message", "message"), ("film", "film")):
+    for kind, key in (
+        ("verdict of the loop", "loop_verdict"),
+        ("message", "message"),
+        ("hash of the film", "film"),
+        ("hash of the session", "session"),
+    ):
         a, b = before.get(key), after.get(key)
         if a != b and a is not None and b is not None and not (kind == "message" and grade(before) != grade(after)):
             yield Change(name, kind, str(a), str(b), 0.0)
