@@ -101,10 +101,21 @@ def session(
     SpecError, ValidationError
         If an effect is so strong that the rig leaves its reach, or an effect is invalid.
     """
-    spec = spec_of(effects, seed=seed, fps=fps, plant=plant)
-    seen = look(spec)
     known = "constant_torque" in effects or _rng(seed, ZERO).random() < DECLARED
-    rng = np.random.default_rng(seed)
+    spec = spec_of(effects, seed=seed, fps=fps, plant=plant)
+    return filmed(spec, known=known, sigma_deg=sigma_deg, noise=noise, names=names)
+
+
+def filmed(
+    spec: Spec, *, known: bool, sigma_deg: float, noise: str = "white", names: Collection[str] | None = None
+) -> list[Record]:
+    """Make the recordings of a spec of `synth`, all by default.
+
+    ``known`` is whether their zero is declared; the rest is as in `session`.
+    """
+    seen = look(spec)
+    rng = np.random.default_rng(spec.seed)
+    names = {recording.name for recording in spec.recordings} if names is None else names
     takes = {take.recording.name: take for take in perform(spec, seen, names)}
     records = []
     for number, recording in enumerate(spec.recordings):
