@@ -93,9 +93,13 @@ def panel(ylabel: str, draw: Callable[[Axes], None], xlabel: str = "time, s") ->
 
 
 def _draw_angle(axes: Axes, series: AngleSeries) -> None:
-    degrees, half = np.degrees(series.angle), NORMAL_95 * np.degrees(series.sigma)
+    parted = series.sigma_random is not None
+    shaded = series.sigma if series.sigma_random is None else series.sigma_random
+    degrees, half = np.degrees(series.angle), NORMAL_95 * np.degrees(shaded)
     if np.isfinite(half).any():
-        label = "95 % interval (1.96 σ)"
+        share = series.common_share
+        common = f"; {100.0 * share:.2g} % of the angle in common" if np.isfinite(share) else ""
+        label = f"95 % interval of the random part{common}" if parted else "95 % interval (1.96 σ)"
         axes.fill_between(series.time, degrees - half, degrees + half, color=SHADE, label=label)
     axes.plot(series.time, degrees, color=MEASURED, lw=1.0, marker=".", ms=2, label="angle")
     lost = ~series.ok
@@ -106,7 +110,11 @@ def _draw_angle(axes: Axes, series: AngleSeries) -> None:
 
 
 def _draw_sigma(axes: Axes, series: AngleSeries) -> None:
-    axes.plot(series.time, np.degrees(series.sigma), color=AFTER, lw=1.0)
+    if series.sigma_random is None:
+        axes.plot(series.time, np.degrees(series.sigma), color=AFTER, lw=1.0)
+    else:
+        axes.plot(series.time, np.degrees(series.sigma_common), color=COMMAND, lw=1.0, label="common part")
+        axes.plot(series.time, np.degrees(series.sigma_random), color=AFTER, lw=1.0, label="random part")
     axes.set(ylabel="σ, °", ylim=(0.0, None))
 
 

@@ -14,7 +14,7 @@ from anglecam.io.command_csv import read_command
 from anglecam.io.rig import Rig, RigMark, RigPivot, read_rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.mark_pass import detect_mark
-from anglecam.measurement.sigma import angle_sigma, place_errors, worst_case, worst_case_both_ends
+from anglecam.measurement.sigma import Sigma, angle_sigma, place_errors, scatter, worst_case, worst_case_both_ends
 from anglecam.video.open_film import open_film
 from support import broken
 from support.drawn import Look, Recording, draw_frames, draw_session, write_clip
@@ -276,11 +276,47 @@ def test_sigma_propagates_noise_pose_and_pivot():
         off = np.hypot(*(mouth - pivot).T) - R
         errors = place_errors(mouth, off, np.full(n, 0.01), np.full(n, 0.01))
         resting = np.arange(n) < 100
-        sigma = angle_sigma(mouth, used, covariance, errors, resting)
+        sigma = angle_sigma(mouth, used, covariance, errors, resting).total
         arm = mouth - used
         line = np.arctan2(-arm[:, 1], arm[:, 0])
         pulls.append((line - line[resting].mean() - angle) / sigma)
     assert 0.85 < np.std(pulls) < 1.15
+
+
+def test_the_random_part_is_the_scatter_of_frames_and_the_common_part_the_error_they_share():
+    rng = np.random.default_rng(1)
+    pivot, R, n = np.array([200.0, 300.0]), 170.0, 400
+    covariance = np.diag([0.3, 0.1]) ** 2
+    angle = np.where(np.arange(n) < 100, 0.0, np.radians(15 * np.sin(np.arange(n) / 20)))
+    resting, moving = np.arange(n) < 100, np.arange(n) >= 100
+    away = moving & (np.abs(angle) > np.radians(5.0))
+    scattered, shared = [], []
+    for _ in range(60):
+        exact = pivot + R * np.column_stack([np.cos(angle), -np.sin(angle)])
+        mouth = exact + 0.03 * rng.standard_normal((n, 2))
+        used = pivot + np.sqrt(np.diag(covariance)) * rng.standard_normal(2)
+        errors = place_errors(mouth, np.hypot(*(mouth - pivot).T) - R, np.full(n, 0.01), np.full(n, 0.01))
+        sigma = angle_sigma(mouth, used, covariance, errors, resting)
+        about, without_noise = mouth - pivot, exact - used
+        line = np.arctan2(-about[:, 1], about[:, 0])
+        random = sigma.random(scatter(np.arange(n) / 30, line))
+        scattered.append((line - angle)[moving] / random[moving])
+        line = np.arctan2(-without_noise[:, 1], without_noise[:, 0])
+        shared.append((line - line[resting].mean() - angle)[away] / sigma.common[away])
+    assert 0.95 < np.sqrt(np.mean(np.square(scattered))) < 1.05
+    assert 0.8 < np.sqrt(np.mean(np.square(shared))) < 1.2  # 60 pivots
+
+
+def test_an_error_of_the_pose_is_random_as_far_as_it_scatters():
+    time, noise, pose = np.arange(300) / 30, 1e-4, 1e-3
+    parts = Sigma(np.full(300, noise), np.full(300, pose), np.full(300, 5e-3))
+    motion = 0.2 * np.sin(2.0 * time)
+    rng = np.random.default_rng(2)
+    slow = motion + pose * np.sin(3.0 * motion / 0.2) + noise * rng.standard_normal(300)
+    fast = motion + np.hypot(noise, pose) * rng.standard_normal(300)
+    assert np.median(parts.random(scatter(time, slow))) == pytest.approx(noise, rel=0.3)
+    assert np.median(parts.random(scatter(time, fast))) == pytest.approx(np.hypot(noise, pose), rel=0.2)
+    assert np.median(parts.random(np.nan)) == pytest.approx(np.hypot(noise, pose))
 
 
 @pytest.mark.parametrize("off", [(-60, 30), (60, 20)])
