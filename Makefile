@@ -29,7 +29,7 @@ system = @missing=""; \
 	fi
 
 .DEFAULT_GOAL := help
-.PHONY: help setup venv-module test-packages demo test check docs lock clean
+.PHONY: help setup venv-module test-packages demo test sweep check docs lock clean
 
 help: ## list what there is
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-8s %s\n", $$1, $$2}'
@@ -62,7 +62,6 @@ $(DEV): $(RUN) requirements/dev.lock
 
 demo: setup ## render a rig with a hidden effect, measure it, find the effect, write the report
 	@rm -rf $(DEMO)
-	@echo "demo: the first run also compiles the numerical kernels, which takes up to a minute"
 	$(BIN)/synth render configs/demo.yaml --out $(DEMO)/session --truth $(DEMO)/truth
 	$(BIN)/anglecam close $(DEMO)/session --out $(DEMO)/result
 	$(BIN)/synth score $(DEMO)/result --truth $(DEMO)/truth
@@ -70,6 +69,9 @@ demo: setup ## render a rig with a hidden effect, measure it, find the effect, w
 # Many tests start processes; they start in three quarters of the time where bytecode of anglecam is kept.
 test: venv-module test-packages $(DEV) ## everything that must pass
 	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest
+
+sweep: venv-module test-packages $(DEV) ## the claims at their full size, which make test leaves out; the result goes to benchmarks
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m benchmarks.sweep
 
 check: venv-module $(DEV) ## style, types, docstrings and the direction of imports, in seconds
 	$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy && $(BIN)/lint-imports --no-logo

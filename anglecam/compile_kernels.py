@@ -6,7 +6,8 @@ module waits and then loads what has been compiled. Modules do not import each o
 wait for each other.
 
 The processes are programs of their own, as in `anglecam.batch.measuring_process`: started anew on every system, and
-ended by Linux with the thread that started them.
+ended by Linux with the thread that started them. Elsewhere one may outlive a killed parent until its module is
+compiled; it holds that module's lock, for which the processes of the next call wait.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ def compile_modules(package: str, modules: list[str], locks: Path) -> set[str] |
     begin, folders, failed = time.monotonic(), set[str](), list[str]()
     locks.mkdir(exist_ok=True)
     waiting, answers, stop = SimpleQueue[str](), SimpleQueue[tuple[str, list[str] | None]](), Event()
-    processes, count = list[subprocess.Popen[str]](), min(cores(), len(modules))
+    processes, count = list[subprocess.Popen[str]](), max(1, min(cores(), len(modules)))
     for module in modules:
         waiting.put(module)
     terminal = sys.stderr.isatty()

@@ -24,7 +24,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from shutil import rmtree
 
-_LOADS_NUMBA = re.compile(rb"^(from numba |import numba|from anglecam\.effects import ports$)", re.MULTILINE)
+_LOADS_NUMBA = re.compile(rb"^((from|import) numba\b|from anglecam\.effects import ports$)", re.MULTILINE)
 """In the source of a module with kernels; the ports compile the functions of effects."""
 _OF_CODE = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
 """Settings that change for which processor Numba compiles."""
@@ -132,7 +132,8 @@ class Kernels:
     def modules(self) -> list[str]:
         """Return the modules with kernels, those with the longest sources first."""
         sources = sorted(self._kernel_sources(), key=lambda path: -path.stat().st_size)
-        return [".".join([self.package, *path.relative_to(self.root).with_suffix("").parts]) for path in sources]
+        names = [".".join([self.package, *path.relative_to(self.root).with_suffix("").parts]) for path in sources]
+        return [name.removesuffix(".__init__") for name in names]
 
     def _write_stamp(self, files: dict[str, list[str]]) -> None:
         """Write the stamp, given the files that Numba wrote to each of its folders."""

@@ -1,7 +1,7 @@
 """Measures the angle's error and its stated uncertainty on films of an independent renderer, beside OpenCV's methods.
 
     build/mitsuba/bin/python benchmarks/foreign/render.py FOLDER      # once: see there
-    .venv/bin/python benchmarks/foreign_films.py FOLDER [name ...]
+    .venv/bin/python -m benchmarks.foreign_films FOLDER [name ...]
 
 anglecam gets the clip alone, without a rig file. ECC and Lucas-Kanade get a rectangle that the body fills in the first
 frame. Each method's mean error is removed: its zero is a matter of definition. What remains includes an error of scale,
@@ -18,11 +18,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from foreign.peers import with_ecc, with_lucas_kanade
 
 import anglecam
+from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError
 from anglecam.video.open_film import open_film
+from benchmarks.foreign.peers import with_ecc, with_lucas_kanade
 
 PEERS: dict[str, Callable[[Iterator[np.ndarray], tuple[int, int, int, int]], np.ndarray]] = {
     "ECC": with_ecc,
@@ -52,24 +53,37 @@ def described(error: np.ndarray, truth_deg: np.ndarray) -> str:
     return f"{np.sqrt((error[seen] ** 2).mean()):.4f} | {100 * scale:+.3f} | {np.abs(error[seen]).max():.4f}"
 
 
+def truth_deg_of(clip: Path) -> np.ndarray:
+    """Return the true angle of every frame."""
+    return np.genfromtxt(f"{_stem(clip)}.truth.csv", delimiter=",", names=True)["angle_deg"]
+
+
+def series_errors_deg(series: AngleSeries, truth_deg: np.ndarray) -> np.ndarray:
+    """Return `errors_deg` of what anglecam measured."""
+    return errors_deg(np.where(series.ok, np.degrees(series.angle), np.nan), truth_deg)
+
+
 def rows(clip: Path) -> Iterator[str]:
     """Yield the table's rows for one clip."""
-    stem = clip.with_name(clip.name.split(".")[0])
-    truth = np.genfromtxt(f"{stem}.truth.csv", delimiter=",", names=True)["angle_deg"]
+    truth = truth_deg_of(clip)
     try:
         series = anglecam.measure(clip)
     except InputError as refusal:
         yield f"| {clip.name} | anglecam | refused: {str(refusal).split(': ', 1)[-1]} | | | | |"
     else:
-        error = errors_deg(np.where(series.ok, np.degrees(series.angle), np.nan), truth)
+        error = series_errors_deg(series, truth)
         pull = error / np.degrees(series.sigma)
         cells = described(error, truth)
         lost = int((~series.ok).sum())
         yield f"| {clip.name} | anglecam | {cells} | {np.sqrt(np.nanmean(pull**2)):.2f} | {lost} of {len(truth)} |"
-    region = tuple(int(v) for v in Path(f"{stem}.region.txt").read_text().split())
+    region = tuple(int(v) for v in Path(f"{_stem(clip)}.region.txt").read_text().split())
     for name, method in PEERS.items():
         error = errors_deg(np.degrees(method(pictures(clip), region)), truth)
         yield f"| {clip.name} | {name} | {described(error, truth)} | | {int(np.isnan(error).sum())} of {len(truth)} |"
+
+
+def _stem(clip: Path) -> Path:
+    return clip.with_name(clip.name.split(".")[0])
 
 
 def main() -> None:

@@ -20,6 +20,7 @@ import typer
 
 from anglecam.io.session import read_session
 from anglecam.loop.close import close_records
+from anglecam.loop.verdict import Verdict
 from anglecam.workflow.session import loop_input, measure_session
 from benchmarks.blind.simulated import KINDS, SECONDS, Drawn, Played
 
@@ -66,6 +67,14 @@ def write(kind: str, seed: int, session: Path, *, with_sigma: bool) -> None:
     (session / "rig.yaml").write_text(json.dumps({"source": "encoder", "held_out": [str(RECORDINGS - 1)]}))
 
 
+def is_right(kind: str, verdict: Verdict) -> bool:
+    """Return whether a verdict names what is missing, or says that something is left where no effect is right."""
+    right = KINDS[kind][1]
+    if not right:
+        return verdict.verdict in LEFT
+    return {accepted.effect.id for accepted in verdict.accepted} in right and verdict.verdict not in LEFT
+
+
 def main(
     first: int = 0,
     seeds: int = 3,
@@ -84,8 +93,7 @@ def main(
             verdict = close_records(records, held_out=[str(RECORDINGS - 1)])
             took = time.process_time() - began
             found = [accepted.effect.id for accepted in verdict.accepted]
-            right = KINDS[kind][1]
-            fits = set(found) in right and verdict.verdict not in LEFT if right else verdict.verdict in LEFT
+            fits = is_right(kind, verdict)
             before, after = (np.degrees(p.rmse) for p in (verdict.before_held_out, verdict.after_held_out))
             cells = (kind, seed, "yes" if fits else "no", verdict.verdict, ", ".join(found) or "–")
             print(f"| {' | '.join(map(str, cells))} | {before:.3f}, {after:.3f} | {took:.0f} |", flush=True)

@@ -109,12 +109,17 @@ def film(case: Case, folder: Path) -> Path:
     return path
 
 
+def clip_of(spec_file: Path, name: str) -> Path:
+    """Return the film of one recording."""
+    session = spec_file.parent / "session"
+    return next(p for p in session.glob(f"{name}.*") if p.suffix in (".avi", ".mp4", ".mkv"))
+
+
 def judge(spec_file: Path, name: str) -> tuple[np.ndarray, np.ndarray, int, int]:
     """Measure one clip; return errors and sigmas (°) of its ok rows, and the counts of other rows and broken bounds."""
     spec = read_spec(spec_file)
-    session = spec_file.parent / "session"
+    session, clip = spec_file.parent / "session", clip_of(spec_file, name)
     recording = next(r for r in spec.recordings if r.name == name)
-    clip = next(p for p in session.glob(f"{name}.*") if p.suffix in (".avi", ".mp4", ".mkv"))
     command = session / f"{name}.command.csv"
     rig = read_rig(session / "rig.yaml")
     series = measure_clip(open_film(clip), rig, read_command(command)).series

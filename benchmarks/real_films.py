@@ -21,13 +21,16 @@ from typing import Any
 
 import numpy as np
 
+from anglecam.data.series import AngleSeries
 from anglecam.errors import AnglecamError
 from anglecam.io.rig import Rig
 from anglecam.workflow.clip import measure_source, open_source
-from benchmarks.real.trackers import Tracked, blob, gear, polar, thread
+from benchmarks.real.trackers import Tracked, blob, frames, gear, polar, thread
 
 SAME_S = 0.002
 """Time stamps closer than this are one frame's; containers round to a millisecond."""
+ENCODER_LATE_S = 1.96
+"""Time in the film at which the pendubot's log begins, s."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,33 @@ def _yellow_left(image: np.ndarray) -> np.ndarray:
     chosen = (np.minimum(r, g) - b > 40) & (np.indices(b.shape)[0] > 240)
     chosen[:, 440:] = False
     return chosen
+
+
+def _red_below(image: np.ndarray) -> np.ndarray:
+    """Return the dot on the bob, which hangs below the red things on the shelf."""
+    chosen = _redder(image)
+    chosen[:240] = False
+    return chosen
+
+
+def _greener(image: np.ndarray) -> np.ndarray:
+    """Return the only green sector of the wheel."""
+    b, g, r = (image[..., k].astype(int) for k in range(3))
+    return g - np.maximum(b, r) > 20
+
+
+def _turns_steadily(path: Path, rate_deg_s: float) -> Tracked:
+    times = np.array([time for time, _ in frames(path)])
+    return times, rate_deg_s * times
+
+
+def _shoulder(path: Path) -> Tracked:
+    """Return the encoder of the driven link, at the times of the frames within its log."""
+    log = np.genfromtxt(path.with_name("encoder.csv"), delimiter=",", names=True)
+    times = np.array([time for time, _ in frames(path)])
+    at = times - ENCODER_LATE_S
+    angle = np.interp(at, log["time_s"], log["shoulder_deg"])
+    return times, np.where((at >= log["time_s"][0]) & (at <= log["time_s"][-1]), angle, np.nan)
 
 
 FILMS = {
@@ -113,6 +143,26 @@ FILMS = {
         {"pivot": {"near": [670, 1193]}},
         periodic=False,
     ),
+    "lab pendulum": RealFilm(
+        "films/lab-pendulum/lab_pendulum_20fps.avi", lambda path: blob(path, _red_below), {}, "T 0.773 s"
+    ),
+    "turntable": RealFilm(
+        "films/turntable/turntable.mp4",
+        lambda path: _turns_steadily(path, -200.0),
+        {"pivot": {"near": [668, 553]}},
+        "33 1/3 turns a minute, clockwise",
+        periodic=False,
+    ),
+    "fivefold wheel": RealFilm(
+        "films/wheel-fivefold/wheel_fivefold.mp4",
+        lambda path: blob(path, _greener, (75.0, 88.5)),
+        {},
+        "706.8° clockwise",
+        periodic=False,
+    ),
+    "pendubot": RealFilm(
+        "films/pendubot/pendubot.m4v", _shoulder, {"pivot": {"near": [307, 476]}}, "encoders", periodic=False
+    ),
 }
 
 
@@ -130,23 +180,54 @@ def main() -> None:
         if arguments.only and not any(word in name for word in arguments.only):
             continue
         path = Path(arguments.folder) / film.path
-        times, angle = film.track(path)
+        tracked = film.track(path)
         for hint in ({}, film.hint) if film.hint else ({},):
-            row, success = _compared(path, hint, times, angle, film)
+            row, success = cells(path, hint, tracked, film)
             print(f"| {name} | {hint or 'nothing'} | {row} | {film.known} |", flush=True)
             if success:
                 break
 
 
-def _compared(
-    path: Path, hint: dict[str, Any], times: np.ndarray, angle: np.ndarray, film: RealFilm
-) -> tuple[str, bool]:
-    """Return the cells of one measurement, and whether it was a success."""
+@dataclass(frozen=True)
+class Compared:
+    """One measurement beside the tracker; the differences are NaN where no frame has both."""
+
+    ok: int
+    rows: int
+    difference_deg: float
+    """RMS, the medians subtracted."""
+    scale: float
+    """anglecam's angle over the tracker's."""
+    scaled_deg: float
+    """RMS difference after the tracker's angle is multiplied by the scale."""
+    over_sigma: float
+    """RMS of that difference over sigma."""
+    sigma_deg: float
+    """Median."""
+    period_s: float
+
+
+def cells(path: Path, hint: dict[str, Any], tracked: Tracked, film: RealFilm) -> tuple[str, bool]:
+    """Measure a film; return the cells of its row, and whether it was a success."""
     try:
         measured = measure_source(open_source(path, Rig.model_validate(hint)))
     except AnglecamError as problem:
         return f"{str(problem).replace(f'{path}: ', '')} | | | | | ", False
-    series = measured.series
+    found = compared(measured.series, tracked)
+    shown = [
+        f"{found.ok}/{found.rows}",
+        f"{found.difference_deg:.3f}",
+        f"{found.scale:.3f}",
+        f"{found.scaled_deg:.3f}",
+        f"{found.sigma_deg:.3f}",
+        f"{found.period_s:.4f}" if film.periodic else "",
+    ]
+    return " | ".join(shown), measured.doubt is None
+
+
+def compared(series: AngleSeries, tracked: Tracked) -> Compared:
+    """Compare angles with a tracker's at equal time stamps."""
+    times, angle = tracked
     # FFmpeg states times of reordered frames in AVI late by the decoder's delay; each count starts at its first frame.
     times, own = times - times[0], series.time - series.time[0]
     nearest = np.abs(times[None, :] - own[:, None]).argmin(axis=1)
@@ -154,15 +235,17 @@ def _compared(
     found, other = np.degrees(series.angle[both]), angle[nearest][both]
     found, other = found - np.median(found), other - np.median(other)
     scale = float(found @ other / (other @ other))
-    cells = [
-        f"{series.ok.sum()}/{len(series.ok)}",
-        f"{np.sqrt(((found - other) ** 2).mean()):.3f}",
-        f"{scale:.3f}",
-        f"{np.std(found - scale * other):.3f}",
-        f"{np.degrees(np.median(series.sigma[series.ok])):.3f}",
-        f"{_period(series.time[series.ok], series.angle[series.ok]):.4f}" if film.periodic else "",
-    ]
-    return " | ".join(cells), measured.doubt is None
+    scaled = found - scale * other
+    return Compared(
+        int(series.ok.sum()),
+        len(series.ok),
+        float(np.sqrt(((found - other) ** 2).mean())),
+        scale,
+        float(np.std(scaled)),
+        float(np.sqrt((((scaled - scaled.mean()) / np.degrees(series.sigma[both])) ** 2).mean())),
+        float(np.degrees(np.median(series.sigma[series.ok]))),
+        _period(series.time[series.ok], series.angle[series.ok]),
+    )
 
 
 def _period(time: np.ndarray, angle: np.ndarray) -> float:

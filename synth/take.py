@@ -7,6 +7,7 @@ do not depend on each other.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,8 +111,8 @@ def view(spec: Spec) -> View:
     return View(pinhole, mouth, offset)
 
 
-def perform(spec: Spec, seen: View) -> list[Take]:
-    """Move the rig through every recording.
+def perform(spec: Spec, seen: View, names: Collection[str] | None = None) -> list[Take]:
+    """Move the rig through the recordings.
 
     Parameters
     ----------
@@ -119,6 +120,8 @@ def perform(spec: Spec, seen: View) -> list[Take]:
         The whole session.
     seen : View
         The camera.
+    names : collection of str, optional
+        Names of the recordings; all by default. A recording does not depend on which others are performed.
 
     Returns
     -------
@@ -132,6 +135,8 @@ def perform(spec: Spec, seen: View) -> list[Take]:
     """
     takes = []
     for number, recording in enumerate(spec.recordings):
+        if names is not None and recording.name not in names:
+            continue
         key = f"recordings.{number}.command"
         rows = command_rows(recording, seed_of(spec, number, COMMAND))
         table = timetable(spec.camera, spec.effects, recording.duration_s, seed_of(spec, number, CLOCK))

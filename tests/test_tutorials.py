@@ -1,15 +1,19 @@
 """The tutorials' commands and code run as they stand, in their order, and lead to what the pages say.
 
-A page is executed block by block in a separate folder: ``sh`` by line, ``python`` in one namespace; a ``yaml`` block
-is written to the file that its first line names.
+A page is executed block by block in a separate folder: ``sh`` by line, on one page in a shell and on the others in this
+process; ``python`` in one namespace; a ``yaml`` block is written to the file that its first line names.
 """
 
 from __future__ import annotations
 
+import io
 import json
 import re
+import shlex
 import subprocess
 import sys
+from collections.abc import Callable
+from contextlib import redirect_stdout
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -19,6 +23,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from anglecam.cli.app import main
 from anglecam.workflow.self_test import HEIGHT, WIDTH, write_film
 from support.tracked import nod, write_deeplabcut, write_sleap
 
@@ -27,8 +32,31 @@ PAGES = sorted((ROOT / "docs" / "tutorials").glob("*.md"))
 BLOCK = re.compile(r"^```(sh|python|yaml)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
-def run_page(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """Execute a tutorial in a folder; return the namespace of its Python blocks."""
+def run_line(line: str) -> None:
+    """Run a command in a shell."""
+    done = subprocess.run(line, shell=True, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+
+
+def call_line(line: str) -> None:
+    """Do what a shell does with ``.venv/bin/anglecam ARGUMENTS [> FILE]``, in this process, which has imported all."""
+    called, _, file = line.partition(" > ")
+    program, *arguments = shlex.split(called)
+    assert program == ".venv/bin/anglecam"
+    printed = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(printed):
+        patch.setattr(sys, "argv", ["anglecam", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            main()
+    assert not ended.value.code, f"{line}\n{printed.getvalue()}"
+    if file:
+        Path(file).write_text(printed.getvalue())
+
+
+def run_page(
+    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch, run: Callable[[str], None] = call_line
+) -> dict[str, Any]:
+    """Execute a tutorial in a folder, its commands by ``run``; return the namespace of its Python blocks."""
     monkeypatch.chdir(folder)
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     (folder / ".venv").mkdir()
@@ -41,8 +69,7 @@ def run_page(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> dict[s
             Path(text.splitlines()[0].removeprefix("# ")).write_text(text)
         else:
             for line in text.splitlines():
-                done = subprocess.run(line, shell=True, capture_output=True, text=True, check=False)
-                assert done.returncode == 0, f"{line}\n{done.stdout}{done.stderr}"
+                run(line)
     return space
 
 
@@ -80,7 +107,7 @@ def test_tracks(tmp_path, monkeypatch):
     true = 10.0 * np.sin(np.arange(120) / 10.0)
     write_deeplabcut(tmp_path / "nodDLC_resnet50_nodJan1shuffle1_50000.csv", nod(true, rng))
     write_sleap(tmp_path / "swing.analysis.h5", nod(true, rng))
-    space = run_page("tracks", tmp_path, monkeypatch)
+    space = run_page("tracks", tmp_path, monkeypatch, run_line)
     angle = space["table"]["angle_deg"]
     assert np.std(angle - true) < 0.2
     assert len(pd.read_csv(tmp_path / "result" / "swing.angles.csv")) == 120

@@ -10,7 +10,7 @@ from anglecam import __version__
 from anglecam.batch.address import TransientError, fetch, is_remote, name, stem
 from anglecam.batch.identity import clip_inputs, combined_hash, content_hash, is_reliable, stamp
 from anglecam.batch.lock import is_current
-from anglecam.batch.measuring_process import MeasuringProcess, ProcessLost
+from anglecam.batch.measuring_process import Measurer, ProcessLost
 from anglecam.batch.publish import Finished, finish, not_done, workspace
 from anglecam.batch.records import ClipRecord
 from anglecam.batch.row import DOUBTFUL, OK, TRUNCATED, Row
@@ -35,7 +35,7 @@ class ClipJob:
     """Its record by an earlier batch."""
 
 
-def run_clip_job(job: ClipJob, settings: Settings, process: MeasuringProcess) -> Finished:
+def run_clip_job(job: ClipJob, settings: Settings, measurer: Measurer) -> Finished:
     """Measure a clip, unless an earlier batch has done so; raise nothing.
 
     Parameters
@@ -44,8 +44,8 @@ def run_clip_job(job: ClipJob, settings: Settings, process: MeasuringProcess) ->
         The clip.
     settings : Settings
         The settings of the batch.
-    process : MeasuringProcess
-        The process that measures.
+    measurer : Measurer
+        What measures.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def run_clip_job(job: ClipJob, settings: Settings, process: MeasuringProcess) ->
                 done = _done_before(record, job, settings)
                 if done is not None:
                     return _unchanged(done, record)
-                record, made = _measured(record, job, settings, process, clip, work)
+                record, made = _measured(record, job, settings, measurer, clip, work)
         except TroubleError as problem:
             return not_done(record, job.before, problem.trouble)
         except TransientError as problem:
@@ -127,7 +127,7 @@ def _fetched(address: str, work: Path) -> Path:
 
 
 def _measured(
-    record: ClipRecord, job: ClipJob, settings: Settings, process: MeasuringProcess, clip: Path, work: Path
+    record: ClipRecord, job: ClipJob, settings: Settings, measurer: Measurer, clip: Path, work: Path
 ) -> tuple[ClipRecord, dict[str, Path]]:
     """Have a clip measured; return its record, and its finished files by their output paths."""
     into, cached = work / "out", work / "series.nc"
@@ -146,7 +146,7 @@ def _measured(
     except RigError as problem:
         raise _unreadable(problem.one_line, job, work) from problem
     try:
-        answer = process.ask(request, clip_time_limit(record.row.size_bytes or 0, settings))
+        answer = measurer.ask(request, clip_time_limit(record.row.size_bytes or 0, settings))
     except ProcessLost as loss:
         raise InputError(f"{job.address}: {loss}") from loss
     figures = {name: value for name, value in answer.items() if name in Row.__dataclass_fields__ and name != "cause"}

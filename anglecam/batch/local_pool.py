@@ -1,4 +1,4 @@
-"""A worker pool on this machine: one measuring process for each job under way, each on one core."""
+"""A worker pool on this machine: one measurer, usually a process on one core, for each job under way."""
 
 from __future__ import annotations
 
@@ -8,43 +8,45 @@ import threading
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from anglecam.batch.measuring_process import Abandoned, MeasuringProcess
+from anglecam.batch.measuring_process import Abandoned, Measurer
 
 Job = TypeVar("Job")
 Done = TypeVar("Done")
 
 
 class LocalPool(Generic[Job, Done]):
-    """Threads, each with a measuring process; use it in a ``with`` block.
+    """Threads, each with a measurer; use it in a ``with`` block.
 
     Parameters
     ----------
     work : callable
-        Does a job with a measuring process and returns the outcome; it raises nothing.
+        Does a job with a measurer and returns the outcome; it raises nothing.
     size : int
         Number of jobs at a time.
+    measurer : callable
+        Makes the measurer of a thread.
     """
 
-    def __init__(self, work: Callable[[Job, MeasuringProcess], Done], size: int) -> None:
+    def __init__(self, work: Callable[[Job, Measurer], Done], size: int, measurer: Callable[[], Measurer]) -> None:
         self._work = work
         self._jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
         self._done: queue.SimpleQueue[Done | Exception] = queue.SimpleQueue()
-        self._processes = [MeasuringProcess() for _ in range(size)]
+        self._measurers = [measurer() for _ in range(size)]
 
     def __enter__(self) -> LocalPool[Job, Done]:
-        for process in self._processes:
-            threading.Thread(target=self._serve, args=(process,), daemon=True).start()
+        for measurer in self._measurers:
+            threading.Thread(target=self._serve, args=(measurer,), daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        for process in self._processes:
-            process.close()
+        for measurer in self._measurers:
+            measurer.close()
             self._jobs.put(None)
 
     @property
     def capacity(self) -> int:
         """Number of jobs to have under way so that no worker waits for its next job."""
-        return 2 * len(self._processes)
+        return 2 * len(self._measurers)
 
     def start(self, job: Job) -> None:
         """Queue a job for the next free worker."""
@@ -57,10 +59,10 @@ class LocalPool(Generic[Job, Done]):
             raise done
         return done
 
-    def _serve(self, process: MeasuringProcess) -> None:
+    def _serve(self, measurer: Measurer) -> None:
         with contextlib.suppress(Abandoned):
             while (job := self._jobs.get()) is not None:
                 try:
-                    self._done.put(self._work(job, process))
+                    self._done.put(self._work(job, measurer))
                 except Exception as fault:  # noqa: BLE001  (raised again by next_done)
                     self._done.put(fault)

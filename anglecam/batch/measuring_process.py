@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from typing import IO, Any
+from typing import IO, Any, Protocol
 
 from anglecam import end_with_parent
 from anglecam.prepare import prepare_kernels
@@ -34,6 +34,16 @@ class ProcessLost(Exception):  # noqa: N818  (an event, not a fault of this prog
 
 class Abandoned(BaseException):
     """The batch has ended, and the process with it."""
+
+
+class Measurer(Protocol):
+    """What does the measuring and fitting for one job at a time; see `MeasuringProcess`."""
+
+    def ask(self, request: dict[str, Any], time_limit: float) -> dict[str, Any]:
+        """Have a clip measured or a session fitted, within a time limit in s."""
+
+    def close(self) -> None:
+        """End it for good; a thread that waits for its answer gets `Abandoned`."""
 
 
 class MeasuringProcess:

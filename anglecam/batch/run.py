@@ -20,7 +20,7 @@ from anglecam.batch.clip_job import ClipJob, run_clip_job
 from anglecam.batch.database import RecordDatabase
 from anglecam.batch.local_pool import LocalPool
 from anglecam.batch.lock import locked, start_run
-from anglecam.batch.measuring_process import MeasuringProcess
+from anglecam.batch.measuring_process import Measurer, MeasuringProcess
 from anglecam.batch.output_folder import OutputFolder
 from anglecam.batch.plan import Plan, out_of_reach, plan_jobs
 from anglecam.batch.progress import Log, ProgressDisplay, open_log, show_progress
@@ -87,7 +87,9 @@ class WorkerPool(Protocol):
         """Wait for the next job to finish and return its outcome."""
 
 
-def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
+def run_batch(
+    asked: Sequence[str], out: Path, options: Options, measurer: Callable[[], Measurer] = MeasuringProcess
+) -> Result:
     """Measure every clip that has not been measured yet, fit the sessions among them, and write the index.
 
     Parameters
@@ -98,6 +100,8 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
         The output folder.
     options : Options
         The options of the call.
+    measurer : callable
+        Makes what measures for one job at a time on this machine. Dask's workers have measuring processes.
 
     Returns
     -------
@@ -145,7 +149,7 @@ def run_batch(asked: Sequence[str], out: Path, options: Options) -> Result:
                 database.save(*plan.removed)
             summary = Summary(folder, run, plan.earlier, plan.earlier_sessions, plan.sessions)
             display.begin_jobs(len(sources), len(plan.sessions))
-            with _worker_pool(settings, options) as pool:
+            with _worker_pool(settings, options, measurer) as pool:
                 try:
                     _do_jobs(plan, pool, partial(publish, folder=folder, database=database), summary, display, log)
                     if options.prune:
@@ -218,19 +222,21 @@ def _do_jobs(
                 waiting.appendleft(replace(session, measured=measured, stale=stale))
 
 
-def _worker_pool(settings: Settings, options: Options) -> AbstractContextManager[WorkerPool]:
+def _worker_pool(
+    settings: Settings, options: Options, measurer: Callable[[], Measurer]
+) -> AbstractContextManager[WorkerPool]:
     work = partial(_run_job, settings=settings)
     if options.dask is None:
-        return LocalPool(work, options.jobs)
+        return LocalPool(work, options.jobs, measurer)
     from anglecam.batch.dask_pool import DaskPool  # an optional dependency
 
     return DaskPool(work, options.dask, options.jobs, settings)
 
 
-def _run_job(job: Job, process: MeasuringProcess, *, settings: Settings) -> Finished:
+def _run_job(job: Job, measurer: Measurer, *, settings: Settings) -> Finished:
     if isinstance(job, SessionJob):
-        return run_session_job(job, settings, process)
-    return run_clip_job(job, settings, process)
+        return run_session_job(job, settings, measurer)
+    return run_clip_job(job, settings, measurer)
 
 
 def _require_shared(sources: Sequence[Source]) -> None:

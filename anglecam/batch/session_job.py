@@ -12,7 +12,7 @@ from anglecam import __version__
 from anglecam.batch.address import TransientError, is_remote, join, name, names_in, parent, read_small, stem
 from anglecam.batch.identity import combined_hash, content_hash, hashes
 from anglecam.batch.lock import is_current
-from anglecam.batch.measuring_process import MeasuringProcess, ProcessLost
+from anglecam.batch.measuring_process import Measurer, ProcessLost
 from anglecam.batch.publish import Finished, finish, not_done, workspace
 from anglecam.batch.records import ClipRecord, SessionRecord
 from anglecam.batch.sources import Source
@@ -74,7 +74,7 @@ def find_sessions(sources: Sequence[Source]) -> list[tuple[str, str, tuple[str, 
     return sessions
 
 
-def run_session_job(job: SessionJob, settings: Settings, process: MeasuringProcess) -> Finished:
+def run_session_job(job: SessionJob, settings: Settings, measurer: Measurer) -> Finished:
     """Fit a session's model, unless an earlier batch has done so; raise nothing.
 
     Parameters
@@ -83,8 +83,8 @@ def run_session_job(job: SessionJob, settings: Settings, process: MeasuringProce
         The session, with the records of its clips.
     settings : Settings
         The settings of the batch.
-    process : MeasuringProcess
-        The process that fits.
+    measurer : Measurer
+        What fits.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def run_session_job(job: SessionJob, settings: Settings, process: MeasuringProce
                         return Finished(before, unchanged=True, to_publish=before != job.before)
                 if earlier is not None and job.stale:
                     raise InputError(f"{job.address}: not fitted again without {', '.join(job.stale)}")
-                record, made = _fitted(record, job, settings, process, work)
+                record, made = _fitted(record, job, settings, measurer, work)
         except TroubleError as problem:
             return not_done(record, job.before, problem.trouble)
         except TransientError as problem:
@@ -149,7 +149,7 @@ def _is_done(before: SessionRecord, record: SessionRecord, settings: Settings) -
 
 
 def _fitted(
-    record: SessionRecord, job: SessionJob, settings: Settings, process: MeasuringProcess, work: Path
+    record: SessionRecord, job: SessionJob, settings: Settings, measurer: Measurer, work: Path
 ) -> tuple[SessionRecord, dict[str, Path]]:
     """Have a session fitted; return its record, and its finished files by their output paths."""
     out, into = settings.folder, work / "out"
@@ -167,7 +167,7 @@ def _fitted(
     }
     limit = sum(clip_time_limit(clip.row.size_bytes or 0, settings) for clip in job.measured)
     try:
-        answer = process.ask(request, max(_MIN_TIME_LIMIT_S, limit))
+        answer = measurer.ask(request, max(_MIN_TIME_LIMIT_S, limit))
     except ProcessLost as loss:
         raise InputError(f"{job.address}: {loss}") from loss
     if "not_written" in answer:

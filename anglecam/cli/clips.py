@@ -14,7 +14,7 @@ import typer
 from anglecam.cli.documents import calibration_as_dict, clip_as_dict
 from anglecam.cli.json_output import report
 from anglecam.cli.options import FirstFrame, LastFrame, Out, RigFile
-from anglecam.cli.progress import begin_loading, end, stages
+from anglecam.cli.progress import begin_loading, leave, stages, tell
 from anglecam.cli.this_run import this_run
 from anglecam.errors import AnglecamError, InputError, RigError, blame, printable
 from anglecam.io.clip_files import ClipFiles, FrameRange, read_clip_files
@@ -56,7 +56,7 @@ def measure(
     """Measure the angle in every frame: NAME.angles.csv, a plot and a page with the film for each clip."""
     run = this_run(rig)
     declared = read_rig(rig) if rig else None
-    asked, problems = _read_files(clips, out, declared, (first, last), lambda f: _clips_and_tracks(f, declared))
+    asked, refused = _read_files(clips, out, declared, (first, last), lambda f: _clips_and_tracks(f, declared))
     with stages() as progress:
         begin_loading(progress)
         from anglecam.measurement.step_response import responses_as_dicts
@@ -82,12 +82,13 @@ def measure(
             report(clips=[clip_as_dict(files.path, measurement) | written])
             return measurement
 
-        problems += _for_each(asked, progress, measure_one)
+        problems = _for_each(asked, progress, measure_one)
     if measured:
         screen.print(series_table(measured))
     for table in tables:
         screen.print(table)
-    end(problems)
+    tell(problems)
+    leave([*refused, *problems])
 
 
 def budget(
@@ -100,7 +101,7 @@ def budget(
     """Write the budget of the angle's uncertainty: NAME.budget.json and a page for each clip."""
     run = this_run(rig)
     declared = read_rig(rig) if rig else None
-    asked, problems = _read_files(clips, out, declared, (first, last), find_clips, _require_film)
+    asked, refused = _read_files(clips, out, declared, (first, last), find_clips, _require_film)
     with stages() as progress:
         begin_loading(progress)
         from anglecam.budget.clip import budget_as_dict
@@ -121,8 +122,9 @@ def budget(
             report(budgets=[budget_as_dict(found)])
             return measurement
 
-        problems += _for_each(asked, progress, budget_one)
-    end(problems)
+        problems = _for_each(asked, progress, budget_one)
+    tell(problems)
+    leave([*refused, *problems])
 
 
 def calibrate(
@@ -168,28 +170,31 @@ def _read_files(
 ) -> tuple[list[ClipFiles], list[AnglecamError]]:
     """Return the clips whose files are as they should be, and what is wrong with the others; leave where none is.
 
+    What is wrong is printed before the first clip is measured. Of clips whose results would have one name, the first is
+    taken.
+
     Raises
     ------
     RigError
-        Where the results cannot be written to ``out``, or those of one clip would replace another's.
+        Where the results cannot be written to ``out``.
     """
     make_folder(out)
     asked: list[ClipFiles] = []
     problems: list[AnglecamError] = []
     names: dict[str, Path] = {}
-    for clip in [*_expand(paths, problems, list_folder)]:
+    for clip in _expand(paths, problems, list_folder):
         other = names.setdefault(recording_name(clip), clip)
-        if other is not clip:
-            raise RigError(f"{clip}: {other} has the same name; measure them to separate folders")
-    for clip in names.values():
         try:
+            if other is not clip:
+                raise InputError(f"{clip}: {other} has the same name; measure them to separate folders")
             files = read_clip_files(clip, rig, frames)
             require(files)
             asked.append(files)
         except AnglecamError as problem:
             problems.append(problem)
+    tell(problems)
     if not asked:
-        end(problems)
+        leave(problems)
     return asked, problems
 
 

@@ -25,6 +25,7 @@ import numpy as np
 
 from anglecam.data.camera_evidence import View
 from anglecam.data.typing import Floats
+from anglecam.effects.ports import MOST_PARAMETERS
 from anglecam.effects.seen import Motion, Seen
 from anglecam.effects.unit_names import split_unit
 
@@ -218,6 +219,10 @@ class Effect:
     """What happens where the effect's size is below its null; empty if ``summary`` holds for both signs."""
     possible: Callable[[Values, Values, Motion], bool] = field(default=lambda values, abc, motion: True, repr=False)
     """(parameters, (a, b, c), motion) → whether they describe this effect; a fit elsewhere is some other cause."""
+
+    def __post_init__(self) -> None:
+        if len(self.parameters) + len(self.fixed) > MOST_PARAMETERS:
+            raise ValueError(f"{self.id}: at most {MOST_PARAMETERS} parameters")
 
     def with_fixed(self, values: Mapping[str, float]) -> Effect:
         """Return the effect with more parameters fixed: ``values`` by name, SI; itself if none of them is named."""

@@ -29,6 +29,8 @@ from numba.extending import intrinsic
 
 Numbers = types.CPointer(types.float64)
 """float64 numbers in a row."""
+MOST_PARAMETERS = 8
+"""Parameters that a function may read. An omitted staged parameter reads as 0, as if it had been given."""
 _REAL = types.float64
 SERVO = LOAD = signature(_REAL, _REAL, _REAL, _REAL, Numbers, Numbers)
 FRICTION = signature(types.UniTuple(_REAL, 4), _REAL, _REAL, Numbers, Numbers)

@@ -35,11 +35,14 @@ class ClockedPlant(Plant):
     def predict_all(
         self, parameters: Floats, runs: Runs, first: Floats, near: Floats | None = None
     ) -> tuple[Floats, Floats]:
-        """Return angle and motion as `Plant.predict_all` does; ``first`` has four columns, one for each state."""
+        """Return angle and motion as `Plant.predict_all` does; ``first`` has four columns, one for each state.
+
+        ``near`` does not help: it belongs to commands on other clocks.
+        """
         drifts = np.clip(first[:, DRIFT], -MOST_DRIFT, MOST_DRIFT) if self.with_drift else np.zeros(len(first))
         pairs = zip(runs.commands, first[:, OFFSET], drifts, strict=True)
         clocked = replace(runs, commands=tuple(on_clock(*pair) for pair in pairs))
-        return super().predict_all(parameters, clocked, first[:, :OFFSET], near)
+        return super().predict_all(parameters, clocked, first[:, :OFFSET])
 
 
 def on_clock(command: Command | None, offset: float, drift: float = 0.0) -> Command | None:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
 from anglecam.effects import Effect
-from anglecam.effects.ports import DYNAMICS, FRICTION, INITIAL, LOAD, SERVO, caller_of, shifted
+from anglecam.effects.ports import DYNAMICS, FRICTION, INITIAL, LOAD, MOST_PARAMETERS, SERVO, caller_of, shifted
 
 PORTS = ("servo", "load", "friction", "dynamics")
 """Ports inside the equation of motion, in the order of the pieces."""
@@ -41,12 +41,12 @@ class Pieces:
     edges: NDArray[np.int64]
     """(5,) where the pieces of each of `PORTS` begin, and the end."""
     count: int
-    """Number of parameters of all pieces."""
+    """Number of parameters of all pieces: `MOST_PARAMETERS` for each effect, whose function may read so many."""
     states: int
     """Number of additional states."""
 
     def numbers(self, pairs: Sequence[tuple[Effect, Floats]]) -> Floats:
-        """Return the (count,) parameters of all pieces, SI, zeros for those that are omitted at an effect's end."""
+        """Return the (count,) parameters of all pieces, SI, zeros for those that an effect omits or lacks."""
         numbers = np.zeros(self.count)
         for effect, values in pairs:
             if effect.id in self.ids:
@@ -71,16 +71,15 @@ def pieces_of(effects: Sequence[Effect]) -> Pieces:
     """
     inside = [effect for effect in effects if effect.port in PORTS]
     inside.sort(key=lambda e: (PORTS.index(e.port), e.rank if e.port == "servo" else 0, e.id))
-    sizes = np.array([len(e.parameters) + len(e.fixed) for e in inside], dtype=np.int64)
     states = np.array([e.states for e in inside], dtype=np.int64)
     table = np.zeros((len(inside), _COLUMNS), dtype=np.int64)
     for row, effect in zip(table, inside, strict=True):
         row[_FUNCTION] = getattr(effect, effect.port).address
         row[_INITIAL] = 0 if effect.initial is None else effect.initial.address
-    table[:, _NUMBERS] = np.cumsum(sizes) - sizes
+    table[:, _NUMBERS] = MOST_PARAMETERS * np.arange(len(inside))
     table[:, _STATES] = np.cumsum(states) - states
     edges = np.searchsorted([PORTS.index(e.port) for e in inside], np.arange(_END + 1)).astype(np.int64)
-    return Pieces(tuple(e.id for e in inside), table, edges, int(sizes.sum()), int(states.sum()))
+    return Pieces(tuple(e.id for e in inside), table, edges, MOST_PARAMETERS * len(inside), int(states.sum()))
 
 
 @njit

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -45,6 +46,10 @@ class Plant:
 
     states = 2
     """Unknown initial states of a recording: angle (rad) and rate (rad/s)."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: all but the addresses of compiled functions, which hold in this process only."""
+        return {name: value for name, value in self.__dict__.items() if name != "pieces"}
 
     @cached_property
     def names(self) -> tuple[str, ...]:

@@ -150,7 +150,7 @@ def _figures_of(lines: Sequence[Line]) -> list[str]:
     return [
         str(len(lines)),
         _share([bool(line["found"]) and line["found"][0] in line["true"] for line in something]),
-        _share([_exactly(line) for line in lines]),
+        _share([exactly(line) for line in lines]),
         _share([set(line["true"]) <= set(line["alias_set"]) for line in named if line["true"]]),
         f"{statistics.mean(len(line['alias_set']) for line in named):.1f}" if named else "–",
         _share([bool(set(line["found"]) - set(line["true"])) for line in lines]),
@@ -162,7 +162,7 @@ def _figures_of(lines: Sequence[Line]) -> list[str]:
     ]
 
 
-def _exactly(line: Line) -> bool:
+def exactly(line: Line) -> bool:
     """Return whether the verdict is exactly right: the right names, or none if none is right."""
     if not line["true"]:
         return line["verdict"] == "nothing_missing"

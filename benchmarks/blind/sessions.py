@@ -7,7 +7,7 @@ is that of the line between the two pixels, as an error-free measurement would r
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any
@@ -22,9 +22,10 @@ from anglecam.data.record import Record
 from anglecam.identification.output_error import fit_output_error
 from anglecam.models.plant import Plant
 from benchmarks.blind.drawn import magnified
+from synth.clock import timetable
 from synth.errors import SpecError
 from synth.spec import Spec
-from synth.take import Take, marks, perform
+from synth.take import CLOCK, Take, marks, perform, seed_of
 from synth.take import View as Scenery
 from synth.take import view as look
 
@@ -67,8 +68,9 @@ def session(
     noise: str = "white",
     fps: float = 30,
     plant: tuple[float, float, float] | None = None,
+    names: Collection[str] = RECORDINGS,
 ) -> list[Record]:
-    """Make the five recordings of one session.
+    """Make the five recordings of one session, or some of them.
 
     Parameters
     ----------
@@ -86,6 +88,8 @@ def session(
         Frames per second.
     plant : (a, b, c), optional
         1/s, 1/s², 1/s²; drawn by default.
+    names : collection of str
+        Those of `RECORDINGS` that are made, each as it is among all five.
 
     Returns
     -------
@@ -97,15 +101,31 @@ def session(
     SpecError, ValidationError
         If an effect is so strong that the rig leaves its reach, or an effect is invalid.
     """
-    spec = spec_of(effects, seed=seed, fps=fps, plant=plant)
-    seen = look(spec)
     known = "constant_torque" in effects or _rng(seed, ZERO).random() < DECLARED
-    rng = np.random.default_rng(seed)
+    spec = spec_of(effects, seed=seed, fps=fps, plant=plant)
+    return filmed(spec, known=known, sigma_deg=sigma_deg, noise=noise, names=names)
+
+
+def filmed(
+    spec: Spec, *, known: bool, sigma_deg: float, noise: str = "white", names: Collection[str] | None = None
+) -> list[Record]:
+    """Make the recordings of a spec of `synth`, all by default.
+
+    ``known`` is whether their zero is declared; the rest is as in `session`.
+    """
+    seen = look(spec)
+    rng = np.random.default_rng(spec.seed)
+    names = {recording.name for recording in spec.recordings} if names is None else names
+    takes = {take.recording.name: take for take in perform(spec, seen, names)}
     records = []
-    for take in perform(spec, seen):
-        exact = _record(spec, seen, take, known)
-        angle = _measured(exact.angle, math.radians(sigma_deg), noise, rng)
-        records.append(_from_zero(replace(exact, angle=angle)))
+    for number, recording in enumerate(spec.recordings):
+        if recording.name in takes:
+            exact = _record(spec, seen, takes[recording.name], known)
+            angle = _measured(exact.angle, math.radians(sigma_deg), noise, rng)
+            records.append(_from_zero(replace(exact, angle=angle)))
+        else:  # its noise is drawn all the same, before that of the next
+            frames = timetable(spec.camera, spec.effects, recording.duration_s, seed_of(spec, number, CLOCK)).times
+            _measured(np.zeros(len(frames)), 0.0, noise, rng)
     return records
 
 

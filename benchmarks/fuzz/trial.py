@@ -70,7 +70,7 @@ def judge(read: Reader, path: Path, most_bytes: int | None = None) -> Outcome:
     Outcome
         Never `DIED`, which only another process can observe.
     """
-    before = _forget_peak()
+    before = forget_peak()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -80,7 +80,7 @@ def judge(read: Reader, path: Path, most_bytes: int | None = None) -> Outcome:
         outcome = _judge_line(refusal, path)
     except Exception:  # noqa: BLE001 - any other exception is a finding
         outcome = Outcome(FINDING, traceback.format_exc())
-    grown = _peak() - before
+    grown = peak() - before
     if most_bytes is not None and grown > most_bytes:
         return Outcome(FINDING, f"{grown / 2**20:.0f} MiB of memory; then {outcome.kind} {outcome.said}")
     return outcome
@@ -96,14 +96,14 @@ def _judge_line(refusal: AnglecamError, path: Path) -> Outcome:
     return Outcome(REFUSED, line) if len(cause) > 5 else Outcome(FINDING, f"no cause in {line!r}")
 
 
-def _forget_peak() -> int:
+def forget_peak() -> int:
     """Reset the peak of the resident memory, and return the present peak, bytes."""
     with contextlib.suppress(OSError):  # not Linux, or not allowed: the peak then covers the whole life of the process
         Path("/proc/self/clear_refs").write_text("5")
-    return _peak()
+    return peak()
 
 
-def _peak() -> int:
+def peak() -> int:
     status = Path("/proc/self/status")
     if status.exists():
         line = next(line for line in status.read_text().splitlines() if line.startswith("VmHWM:"))

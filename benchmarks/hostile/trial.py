@@ -57,9 +57,14 @@ class Outcome:
 
 def run(film: Film, folder: Path) -> Outcome:
     """Write a film, measure it by the command line, and judge the result."""
+    return measured(film, write(film, folder))
+
+
+def measured(film: Film, path: Path) -> Outcome:
+    """Measure a film that was written to ``path`` by the command line, judge the result, and delete the film."""
     from anglecam.cli.app import main
 
-    path, out, said = write(film, folder), folder / "out", io.StringIO()
+    out, said = path.parent / "out", io.StringIO()
     began, arguments, status = time.monotonic(), sys.argv, 0
     sys.argv = ["anglecam", "measure", str(path), "--out", str(out)]
     try:

@@ -15,16 +15,15 @@ import pytest
 from anglecam.batch.database import RecordDatabase
 from anglecam.batch.output_folder import OutputFolder
 from anglecam.batch.records import ClipRecord
-from anglecam.batch.run import Options, run_batch
+from anglecam.batch.run import Options
 from anglecam.errors import RigError
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.video.open_film import open_film
 from anglecam.workflow.clip import write_measurement
+from support.measured_here import run_batch
 from support.tiny import FRAMES, SIZE, results, tiny_clip, tiny_lab
 from support.tiny import run_batch as run
-
-pytestmark = pytest.mark.usefixtures("shared_processes")
 
 QUIET = Options(jobs=1, quiet=True)
 

@@ -10,19 +10,19 @@ import time
 
 import pytest
 
-from anglecam.batch.run import Options, run_batch
+from anglecam.batch.run import Options
 from anglecam.errors import RigError
 from support.dask_cluster import dask_cluster
+from support.measured_here import run_batch
 from support.tiny import batch_command, children, is_alive, results, tiny_lab
 
 pytest.importorskip("distributed")
-pytestmark = pytest.mark.usefixtures("shared_processes")
 
 
-@pytest.fixture
-def cluster(tmp_path):
-    """Start a scheduler and two workers as a user does."""
-    with dask_cluster(tmp_path) as started:
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """Start a scheduler and two workers as a user does; the last test that uses them kills one."""
+    with dask_cluster(tmp_path_factory.mktemp("cluster")) as started:
         yield started.address, started.workers
 
 
@@ -32,11 +32,31 @@ def lab(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def without_dask(lab, tmp_path_factory, shared_processes):
+def without_dask(lab, tmp_path_factory):
     """Return what a batch without Dask gives."""
     out = tmp_path_factory.mktemp("here")
     assert not run_batch([str(lab)], out, Options(jobs=2, quiet=True)).problems
     return results(out)
+
+
+def test_what_workers_finish_while_the_batch_is_killed_is_not_measured_again(cluster, lab, without_dask, tmp_path):
+    (address, _), out = cluster, tmp_path / "out"
+    batch = subprocess.Popen(batch_command(lab, "--out", out, "--dask", address, "--quiet"))
+    until = time.monotonic() + 120.0
+    unfinished = out / ".anglecam" / "unfinished"
+    while not list(unfinished.glob("*/*/out")):  # a worker is measuring
+        assert time.monotonic() < until
+        time.sleep(0.005)
+    batch.send_signal(signal.SIGSTOP)
+    while not (left := list(unfinished.glob("*/*/result.json"))):
+        assert time.monotonic() < until
+        time.sleep(0.005)
+    batch.kill()
+    batch.wait()
+    made = {path.name: path.stat().st_mtime_ns for path in (left[0].parent / "out").iterdir()}
+    assert not run_batch([str(lab)], out, Options(jobs=2, quiet=True)).problems
+    assert made == {name: (out / name).stat().st_mtime_ns for name in made}
+    assert results(out) == without_dask
 
 
 def test_a_worker_that_is_killed_loses_no_clip(cluster, lab, without_dask, tmp_path):
@@ -60,26 +80,6 @@ def test_a_worker_that_is_killed_loses_no_clip(cluster, lab, without_dask, tmp_p
     assert not any(map(is_alive, killed))
     assert not result.problems
     assert [row.status for row in result.rows] == ["ok"] * 6
-    assert results(out) == without_dask
-
-
-def test_what_workers_finish_while_the_batch_is_killed_is_not_measured_again(cluster, lab, without_dask, tmp_path):
-    (address, _), out = cluster, tmp_path / "out"
-    batch = subprocess.Popen(batch_command(lab, "--out", out, "--dask", address, "--quiet"))
-    until = time.monotonic() + 120.0
-    unfinished = out / ".anglecam" / "unfinished"
-    while not list(unfinished.glob("*/*/out")):  # a worker is measuring
-        assert time.monotonic() < until
-        time.sleep(0.005)
-    batch.send_signal(signal.SIGSTOP)
-    while not (left := list(unfinished.glob("*/*/result.json"))):
-        assert time.monotonic() < until
-        time.sleep(0.005)
-    batch.kill()
-    batch.wait()
-    made = {path.name: path.stat().st_mtime_ns for path in (left[0].parent / "out").iterdir()}
-    assert not run_batch([str(lab)], out, Options(jobs=2, quiet=True)).problems
-    assert made == {name: (out / name).stat().st_mtime_ns for name in made}
     assert results(out) == without_dask
 
 
@@ -112,6 +112,7 @@ def test_a_scheduler_with_workers_of_other_versions_only_is_refused_and_names_th
     assert not list((tmp_path / "out").glob("*.csv"))
 
 
+@pytest.mark.sweep
 def test_a_batch_waits_for_a_worker_of_its_version_that_joins_after_one_of_another(tmp_path, monkeypatch):
     lab, lines = tiny_lab(tmp_path / "lab", ["a.avi"]), []
     with dask_cluster(tmp_path, ["9.9.9"]) as cluster:

@@ -19,22 +19,30 @@ from support.batch_trials import (
     TUE,
     Call,
     call_batch,
+    disk_full,
     good,
+    killed_scheduler,
     make_lab,
     only_another_version,
+    other_version,
     restored,
     statuses,
 )
 from support.tiny import results
 
-pytestmark = pytest.mark.usefixtures("shared_processes")
+pytestmark = pytest.mark.usefixtures("measured_here")
 
 HERE = [trial for trial in TRIALS if trial.cause is not only_another_version]
 """`test_dask.py` sees a batch of another version refused before it measures; `benchmarks/batch_trials.py` runs all."""
 
 
+def but(*causes):
+    """Return the trials, some of those that need processes of their own with the mark of the sweep."""
+    return [pytest.param(t, marks=pytest.mark.sweep) if t.cause in causes else t for t in HERE]
+
+
 @pytest.fixture(scope="module")
-def made(tmp_path_factory, shared_processes):
+def made(tmp_path_factory, measured_here):
     return make_lab(tmp_path_factory.mktemp("stay"))
 
 
@@ -52,7 +60,7 @@ def assert_says(call, said):
         assert part in line
 
 
-@pytest.mark.parametrize("trial", HERE, ids=lambda trial: trial.cause.__name__)
+@pytest.mark.parametrize("trial", but(killed_scheduler, disk_full), ids=lambda trial: trial.cause.__name__)
 def test_trouble_in_the_first_batch_costs_only_what_it_concerns(trial, made, tmp_path):
     out = tmp_path / "out"
     with restored(made):
@@ -65,7 +73,7 @@ def test_trouble_in_the_first_batch_costs_only_what_it_concerns(trial, made, tmp
     assert results(out) == made.files
 
 
-@pytest.mark.parametrize("trial", HERE, ids=lambda trial: trial.cause.__name__)
+@pytest.mark.parametrize("trial", but(other_version), ids=lambda trial: trial.cause.__name__)
 def test_trouble_in_a_second_batch_leaves_every_good_file(trial, made, tmp_path):
     out = shutil.copytree(made.out, tmp_path / "out")
     with restored(made):

@@ -11,12 +11,10 @@ import pytest
 
 from anglecam.batch.measuring_process import MeasuringProcess, ProcessLost
 from anglecam.batch.run import Options
-from anglecam.batch.run import run_batch as run_here
 from anglecam.errors import RigError
+from support.measured_here import run_batch as run_here
 from support.tiny import batch_command, children, is_alive, results, tiny_clip, tiny_lab, unfinished
 from support.tiny_session import tiny_session
-
-pytestmark = pytest.mark.usefixtures("shared_processes")
 
 TWO = Options(jobs=2, quiet=True)
 NAMES = [f"{folder}/{k}.avi" for folder in ("mon", "tue") for k in range(2)]
@@ -78,6 +76,7 @@ def test_a_batch_that_is_killed_and_resumed_gives_the_files_of_one_that_is_not_k
     assert unfinished(out) == []
 
 
+@pytest.mark.sweep
 def test_a_batch_that_closes_a_loop_survives_a_kill_and_all_its_processes_end(tmp_path):
     session, out = tiny_session(tmp_path / "lab" / "neck", kinds=("stairs", "random")), tmp_path / "out"
     closing = Options(jobs=1, quiet=True, close=True)
@@ -95,7 +94,7 @@ def test_a_batch_that_closes_a_loop_survives_a_kill_and_all_its_processes_end(tm
     assert "loop.json" in results(out)
 
 
-@pytest.mark.parametrize("sent", [signal.SIGSEGV, signal.SIGKILL])
+@pytest.mark.parametrize("sent", [signal.SIGSEGV, pytest.param(signal.SIGKILL, marks=pytest.mark.sweep)])
 def test_a_measuring_process_that_dies_fails_its_clip_only(lab, unbroken, tmp_path, sent):
     out = tmp_path / "out"
     batch = start(lab / "mon", "--out", out, "--jobs", 1, "--quiet")

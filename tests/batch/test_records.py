@@ -19,11 +19,10 @@ from anglecam.batch.output_folder import OutputFolder
 from anglecam.batch.publish import finish, publish, recover
 from anglecam.batch.records import ClipRecord, SessionRecord
 from anglecam.batch.row import OK, Row
-from anglecam.batch.run import Options, run_batch
+from anglecam.batch.run import Options
 from anglecam.errors import RigError
+from support.measured_here import run_batch
 from support.tiny import results, tiny_lab
-
-pytestmark = pytest.mark.usefixtures("shared_processes")
 
 QUIET = Options(jobs=1, quiet=True)
 CLIP = ClipRecord(

@@ -9,16 +9,15 @@ import shutil
 import fsspec
 import pytest
 
-from anglecam.batch.run import Options, run_batch
+from anglecam.batch.run import Options
 from anglecam.batch.session_job import SessionJob, _inputs
 from anglecam.batch.worker import Settings
 from anglecam.io.session import read_session
 from anglecam.workflow.session import measure_session
 from anglecam.workflow.session_results import write_identified
+from support.measured_here import run_batch
 from support.tiny import tiny_clip, tiny_lab
 from support.tiny_session import tiny_session
-
-pytestmark = pytest.mark.usefixtures("shared_processes")
 
 QUIET = Options(jobs=2, quiet=True)
 
@@ -31,10 +30,10 @@ def lab(made_once, tmp_path):
 
 @pytest.fixture(scope="module")
 def made_once(tmp_path_factory):
-    """Return a folder with one session of four series and a clip, and with a folder that is no session."""
+    """Return a folder with one session of three series and a clip, and with a folder that is no session."""
     folder = tmp_path_factory.mktemp("made")
     tiny_clip(folder / "plain" / "a.avi")
-    tiny_session(folder / "neck", 1)
+    tiny_session(folder / "neck", 1, kinds=("stairs", "chirp", "random"))
     return folder
 
 

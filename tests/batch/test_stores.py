@@ -6,12 +6,11 @@ import fsspec
 import numpy as np
 import pytest
 
-from anglecam.batch.run import Options, run_batch
+from anglecam.batch.run import Options
 from anglecam.camera.calibration import Calibration, write_calibration
 from anglecam.errors import RigError
+from support.measured_here import run_batch
 from support.tiny import results, tiny_lab
-
-pytestmark = pytest.mark.usefixtures("shared_processes")
 
 QUIET = Options(jobs=2, quiet=True)
 

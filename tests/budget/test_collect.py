@@ -25,7 +25,7 @@ LOST = slice(5, None, 9)
 def clip(tmp_path_factory):
     folder = tmp_path_factory.mktemp("nod")
     clips = [Recording("stairs", "stairs", duration_s=2.0, amplitude_deg=12.0)]
-    path = draw_session(folder, look=Look(facing="left"), recordings=clips, seed=4)["stairs"].clip
+    path = draw_session(folder, look=Look(facing="left"), recordings=clips, seed=4, mouth="declared")["stairs"].clip
     return path, read_rig(folder / "rig.yaml"), read_command(folder / "stairs.command.csv")
 
 

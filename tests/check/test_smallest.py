@@ -21,7 +21,9 @@ def sizes():
     return {one.effect.id: one for one in smallest_sizes(plan(), TRUE, SCATTER, SCATTER)}
 
 
-@pytest.mark.parametrize("name", TRIED)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name == "dead_time" else pytest.mark.sweep) for name in TRIED]
+)
 def test_twice_the_smallest_size_is_detected_and_a_third_of_it_is_not(sizes, name):
     large, small = (close_without_rivals(session_with(sizes[name], multiple, 0)) for multiple in (2.0, 0.3))
     assert large.verdict != "nothing_missing"

@@ -35,7 +35,8 @@ def film(tmp_path_factory):
         Recording("a-steps", "steps", duration_s=3.0),
         Recording("b-random", "random", duration_s=3.0, held_out=True),
     ]
-    truth = draw_session(folder, look=Look(marker="ring"), plant=Plant(dead_time_s=0.04), recordings=recordings, seed=5)
+    drawn = {"plant": Plant(dead_time_s=0.04), "recordings": recordings, "seed": 5, "mouth": "declared"}
+    truth = draw_session(folder, look=Look(marker="ring"), **drawn)
     return folder, truth
 
 

@@ -14,7 +14,7 @@ import pytest
 from anglecam.cli.app import main
 from support import things
 
-ANGLES = 20.0 * np.sin(np.arange(300) / 5.0)
+ANGLES = 20.0 * np.sin(np.arange(120) / 5.0)
 CALL = [sys.executable, "-c", "from anglecam.cli.app import main; main()", "live"]
 
 

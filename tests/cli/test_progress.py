@@ -15,6 +15,7 @@ from anglecam.batch import progress as batch
 from anglecam.batch.records import ClipRecord
 from anglecam.batch.row import Row
 from anglecam.cli import app, progress
+from anglecam.errors import InputError
 from anglecam.progress import Stage
 from anglecam.workflow.clip import measure_source, open_source
 from support import things
@@ -67,6 +68,26 @@ def test_the_terminal_shows_each_stage_from_loading_to_the_last_file(clip, tmp_p
     assert "loading" in text
     assert "drawing the overlay" in text
     assert "0/?" not in text
+
+
+def test_of_two_clips_of_one_name_the_second_is_refused_before_the_first_is_measured(
+    clip, tmp_path, monkeypatch, capfd
+):
+    second = tmp_path / clip.name
+    second.write_bytes(clip.read_bytes())
+    said = []
+
+    def open_files(files):
+        said.append(capfd.readouterr().err)
+        raise InputError(f"{files.path}: not measured")
+
+    monkeypatch.setattr("anglecam.workflow.clip.open_files", open_files)
+    monkeypatch.setattr(sys, "argv", ["anglecam", "measure", str(clip), str(second), "--out", str(tmp_path / "out")])
+    with pytest.raises(SystemExit) as left:
+        app.main()
+    assert left.value.code == 1
+    assert said == [f"{second}: {clip} has the same name; measure them to separate folders\n"]
+    assert capfd.readouterr().err == f"{clip}: not measured\n"
 
 
 def test_a_batch_shows_what_it_does_before_and_after_its_clips(monkeypatch):

@@ -64,7 +64,9 @@ VIEW = View(neutral=math.radians(20.0), lever_px=200.0, pivot_px=(-80.0, 60.0))
 NOD = np.radians(np.linspace(-25.0, 25.0, len(TIME)))
 
 
-@pytest.mark.parametrize("kind", COMMANDS)
+@pytest.mark.parametrize(
+    "kind", ["stairs", *(pytest.param(kind, marks=pytest.mark.sweep) for kind in COMMANDS if kind != "stairs")]
+)
 @pytest.mark.parametrize("effect_id", MOVED)
 def test_motion_with_an_effect_equals_the_laboratorys(tmp_path, effect_id, kind):
     truth, parameters = MOVED[effect_id]

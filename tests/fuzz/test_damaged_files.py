@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
+
+import pytest
 
 from benchmarks.fuzz import clips, texts
 from benchmarks.fuzz.trial import FINDING, REFUSED, RESULT, judge
 
 SEED = 7
+ONE_OF_EACH = [len(clips.FILMS) * k + k % len(clips.FILMS) for k in range(len(clips.DAMAGES))]
+"""Numbers of one clip for every damage; the containers take turns."""
 
 
-def _judged(generator, count: int, folder: Path) -> tuple[list[str], dict[str, set[str]]]:
+def _judged(generator, numbers: Iterable[int], folder: Path) -> tuple[list[str], dict[str, set[str]]]:
     """Return what was found, and for each kind of damage which outcomes there were."""
     readers, findings, outcomes = generator.readers(), [], {}
-    for number, case in generator.cases(count, SEED):
+    for number in numbers:
+        ((_, case),) = generator.cases(1, SEED, first=number)
         path = folder / f"{number}-{case.name}"
         path.write_bytes(case.content)
         outcome = judge(readers[case.reader], path, generator.MOST_BYTES)
@@ -23,15 +29,19 @@ def _judged(generator, count: int, folder: Path) -> tuple[list[str], dict[str, s
     return findings, outcomes
 
 
-def test_damaged_texts_are_read_or_refused_in_one_line(tmp_path):
-    findings, outcomes = _judged(texts, 250, tmp_path)
+@pytest.mark.parametrize("count", [100, pytest.param(250, marks=pytest.mark.sweep)])
+def test_damaged_texts_are_read_or_refused_in_one_line(tmp_path, count):
+    findings, outcomes = _judged(texts, range(count), tmp_path)
     assert not findings, "\n".join(findings)
     assert set(outcomes) == set(texts.DAMAGES)
     assert set.union(*outcomes.values()) == {RESULT, REFUSED}
 
 
-def test_damaged_clips_are_measured_or_refused_in_one_line(tmp_path):
-    findings, outcomes = _judged(clips, 60, tmp_path)
+@pytest.mark.parametrize(
+    "numbers", [ONE_OF_EACH, pytest.param(range(60), marks=pytest.mark.sweep)], ids=["one of each", "60"]
+)
+def test_damaged_clips_are_measured_or_refused_in_one_line(tmp_path, numbers):
+    findings, outcomes = _judged(clips, numbers, tmp_path)
     assert not findings, "\n".join(findings)
     assert set(outcomes) == set(clips.DAMAGES)
     assert set.union(*outcomes.values()) == {RESULT, REFUSED}

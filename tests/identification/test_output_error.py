@@ -23,7 +23,7 @@ EXACT = session(TruePlant(), 0, sigma_deg=0.0)
 
 def noisy(seed, phi=0.0):
     rng = np.random.default_rng(seed)
-    return [replace(r, angle=r.angle + noise(rng, len(r.time), np.radians(0.2), phi)) for r in EXACT]
+    return [replace(r, angle=r.angle + noise(rng, len(r.time), np.radians(0.2), phi)) for r in EXACT[::2]]
 
 
 def test_a_b_c_lie_within_their_stated_uncertainty():

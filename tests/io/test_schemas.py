@@ -18,7 +18,6 @@ import pytest
 from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
 
-import anglecam
 from anglecam.batch.row import Row
 from anglecam.camera.calibrate import BoardCalibration
 from anglecam.camera.calibration import Calibration
@@ -169,12 +168,12 @@ def test_close(session, tmp_path, capsys):
     assert faults("loop", written | {"free_form": None}) == []
 
 
-def test_certificate(session):
+def test_certificate(closed):
     certified = tuple(
         Certified(quantity, None, (-np.inf, np.inf), False, (), experiment)
         for quantity, experiment in zip(QUANTITIES, [EXPERIMENT, *(len(QUANTITIES) - 1) * [None]], strict=True)
     )
-    content = certificate_as_dict(Certificate(anglecam.close_loop(session), certified, NO_LAMP))
+    content = certificate_as_dict(Certificate(closed("late"), certified, NO_LAMP))
     written = {"session": "servo", **content, "files": [{"file": "stairs.angles.csv", "sha256": "0" * 64}]}
     assert faults("certificate", written) == []
     assert faults("certify.output", {"problems": [], "certificate": written}) == []

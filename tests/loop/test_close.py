@@ -27,15 +27,15 @@ THREE = ("stairs", "chirp", "random")
 
 
 @pytest.mark.parametrize(
-    ("true", "effect_id", "name", "value"),
+    ("session_name", "effect_id", "name", "value"),
     [
-        (TruePlant(dead_time_s=0.040), "dead_time", "tau_s", 0.040),
-        (TruePlant(coulomb=2.0), "coulomb_friction", "friction_deg_per_s2", np.degrees(2.0)),
-        (TruePlant(quadratic_drag=1.0), "quadratic_drag", "q_per_rad", 1.0),
+        ("late", "dead_time", "tau_s", 0.040),
+        ("rubbing", "coulomb_friction", "friction_deg_per_s2", np.degrees(2.0)),
+        ("dragging", "quadratic_drag", "q_per_rad", 1.0),
     ],
 )
-def test_the_hidden_effect_is_named_with_its_true_size(true, effect_id, name, value):
-    result = verdict_as_dict(close_records(session(true, 11)[::2], held_out=HELD_OUT))
+def test_the_hidden_effect_is_named_with_its_true_size(closed, session_name, effect_id, name, value):
+    result = verdict_as_dict(closed(session_name))
     assert result["verdict"] == "attributed"
     assert [e["id"] for e in result["effects"]] == [effect_id]
     assert list(result["effects"][0]["parameters"]) == [name]  # no staged parameter of friction is added
@@ -46,7 +46,7 @@ def test_the_hidden_effect_is_named_with_its_true_size(true, effect_id, name, va
     assert result["effects"][0]["alias_set"][0] == effect_id
 
 
-@pytest.mark.parametrize("seed", [105, 108])
+@pytest.mark.parametrize("seed", [105, pytest.param(108, marks=pytest.mark.sweep)])
 def test_a_wrongly_predicted_breakaway_does_not_contradict_dry_friction(seed):
     # at each seed the fitted recordings do not determine the breakaway torque, or do not require it, although the
     # held-out one depends on it
@@ -56,6 +56,7 @@ def test_a_wrongly_predicted_breakaway_does_not_contradict_dry_friction(seed):
     assert abs(verdict.after.parameters[3] - 1.83) < 3.0 * verdict.after.sigma[3]
 
 
+@pytest.mark.sweep
 def test_a_limit_that_is_reached_once_is_named_or_its_only_alias():
     # it acts for a fraction of a second; if a second were left out at a time, the rest would not determine it. A torque
     # that falls with the speed explains it as well: the log-likelihoods differ by 0.1
@@ -71,8 +72,10 @@ def test_a_driven_body_without_its_command_is_unexplained_and_no_noisy_free_swin
 
 
 def test_friction_has_no_asymmetry_unless_the_zero_is_declared():
-    records = drawn_session({"coulomb_friction": {"torque": 2.0, "downward": 1.6}}, seed=2, sigma_deg=0.005)
-    free, known = ([replace(r, zero_known=one) for r in records if r.name in THREE] for one in (False, True))
+    records = drawn_session(
+        {"coulomb_friction": {"torque": 2.0, "downward": 1.6}}, seed=2, sigma_deg=0.005, names=THREE
+    )
+    free, known = ([replace(r, zero_known=one) for r in records] for one in (False, True))
     (even,), (uneven,) = ([e for e in applicable(rs) if e.id == "coulomb_friction"] for rs in (free, known))
     assert "asymmetry_deg_per_s2" not in [p.name for p in even.parameters]
     assert len(uneven.parameters) == len(even.parameters) + 1
@@ -90,7 +93,7 @@ def test_two_hidden_effects_are_both_named():
 
 def test_a_declared_centre_of_mass_is_not_fitted_and_makes_the_weight_more_certain():
     gravity = {"gravity_geometry": {"strength": 60.0, "gravity_deg": 20.0}}
-    records = [r for r in drawn_session(gravity, seed=4, sigma_deg=0.01) if r.name in THREE]
+    records = drawn_session(gravity, seed=4, sigma_deg=0.01, names=THREE)
     declaring = [replace(r, mass_from_upright=np.radians(20.0)) for r in records]
     verdict = close_without_rivals(declaring, held_out=HELD_OUT)
     assert [a.effect.id for a in verdict.accepted] == ["gravity_geometry"]
@@ -103,35 +106,27 @@ def test_a_declared_centre_of_mass_is_not_fitted_and_makes_the_weight_more_certa
     assert declared.sigma[3] < 0.25 * free.sigma[3]
 
 
-@pytest.fixture(scope="module")
-def clean():
-    """Return the verdicts on sessions in which nothing is hidden, every other one's noise being coloured."""
-    records = [session(TruePlant(), seed, phi=0.6 * (seed % 2)) for seed in range(4)]
-    return [close_records(r, held_out=HELD_OUT, seed=seed) for seed, r in enumerate(records)]
-
-
-def test_no_effect_is_named_if_none_is_hidden(clean):
+def test_no_effect_is_named_if_none_is_hidden(closed):
     # at 5 % a session the chance of two false alarms in four is 1 %
-    assert sum(v.verdict != "nothing_missing" for v in clean) <= 1
-    detectable = {d["id"]: d["smallest"] for d in verdict_as_dict(clean[0])["detectable"]}
+    assert sum(closed(f"clean {seed}").verdict != "nothing_missing" for seed in range(4)) <= 1
+    detectable = {d["id"]: d["smallest"] for d in verdict_as_dict(closed("clean 0"))["detectable"]}
     # a series without pixels has no rows, and a constant torque cannot be distinguished from an undeclared zero
     assert set(detectable) >= {"dead_time", "coulomb_friction", "backlash", "clock_scale"}
     assert not set(detectable) & {"rolling_shutter", "constant_torque"}
     assert all(smallest > 0.0 for smallest in detectable.values())
 
 
-def test_an_effect_outside_the_ledger_is_called_unexplained():
-    # the gusts act in each recording; the search adds an effect that takes away a part of them and does not stand
-    records = drawn_session({"wind_gusts": {"rms": 1.0, "number": 3}}, seed=10)
-    verdict = close_records([r for r in records if r.name in THREE], held_out=HELD_OUT, seed=10)
+@pytest.mark.parametrize("cause", ["magnet", pytest.param("gusts", marks=pytest.mark.sweep)])
+def test_an_effect_outside_the_ledger_is_called_unexplained(closed, cause):
+    verdict = closed(cause)
     assert verdict.verdict == "unexplained"
     assert verdict_as_dict(verdict)["effects"] == []
     assert "none" in sentence(verdict)
 
 
-def test_one_recording_alone_is_predicted_block_by_block():
-    alone = session(TruePlant(dead_time_s=0.05), 14)[-1]
-    verdict = close_records([alone])
+def test_one_recording_alone_is_predicted_block_by_block(closed):
+    verdict = closed("one recording")
+    (alone,) = verdict.fitted
     assert [a.effect.id for a in verdict.accepted] == ["dead_time"]
     (tested,) = verdict.before_held_out.records
     assert set(tested.time) <= set(alone.time)
@@ -181,8 +176,8 @@ def test_a_wrong_model_changes_the_robust_error_and_a_few_outliers_do_not():
     assert Prediction((record,), (wrong,), 0.0).robust_sigma > 0.005
 
 
-def test_a_torque_limit_is_detectable_only_where_it_acts(clean):
-    verdict = clean[0]
+def test_a_torque_limit_is_detectable_only_where_it_acts(closed):
+    verdict = closed("clean 0")
     (limit,) = [d for d in verdict_as_dict(verdict)["detectable"] if d["id"] == "torque_saturation"]
     # the servo is never required to give more than c·u + b·θ
     asked = max(508.0 * np.abs(r.command.angle).max() + 524.0 * np.abs(r.angle).max() for r in verdict.fitted)

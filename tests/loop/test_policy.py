@@ -13,7 +13,6 @@ from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.search_policy import StepwisePolicy
 from anglecam.loop.verdict_json import verdict_as_dict
 from anglecam.loop.verdict_policy import ResidualTestPolicy, VerdictPolicy
-from support.closing import close_without_rivals
 from support.motion import Plant
 from support.series import session
 
@@ -59,11 +58,11 @@ def test_a_held_out_recording_that_contradicts_the_model_is_accepted_only_with_a
     assert tolerant[0].verdict == "nothing_missing"
 
 
-def test_an_effect_is_named_only_if_its_p_value_is_below_the_level_of_its_round():
-    records = session(Plant(quadratic_drag=2.0), 21)[::2]
+def test_an_effect_is_named_only_if_its_p_value_is_below_the_level_of_its_round(closed):
+    usual = closed("dragging, none held out")
     strict = Policy(residual_test=ResidualTestPolicy(false_alarm_rate=0.001))  # of 999 draws the least p-value is 0.001
-    assert close_without_rivals(records).verdict == "attributed"
-    assert close_records(records, policy=strict).verdict == "nothing_missing"
+    assert usual.verdict == "attributed"
+    assert close_records(usual.fitted, policy=strict).verdict == "nothing_missing"
 
 
 def test_the_rounds_together_spend_the_false_alarm_rate():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ SIGMA = 2e-4
 """rad."""
 
 
+@cache
 def oscillation(name: str, seed: int) -> Record:
     """Return the response to random levels of 8 ms, at 600 Hz."""
     rng = np.random.default_rng(seed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from anglecam.effects import effect
 from anglecam.identification.output_error import fit_output_error
@@ -40,6 +41,15 @@ def test_a_tilt_of_which_the_motion_shows_little_more_than_the_scale_is_not_dete
     assert not sizes_determined(tilt, records)
 
 
+def test_the_stiffness_of_a_stop_that_is_not_touched_needs_no_limit():
+    records = session(TruePlant(), 0)[:1]
+    stopped = Plant((effect("end_stop"),))
+    at = fit_output_error(stopped, records, [np.array([26.0, 524.0, 508.0, 2000.0, 1.0, -1.0, 0.3])])
+    assert not np.any(at.slopes.projected[:, 3])  # nothing depends on it
+    assert sizes_determined(at, records)
+
+
+@pytest.mark.sweep
 def test_a_stop_too_stiff_to_be_measured_is_a_stop_and_no_spring():
     # the body touches the stops for a few frames, which a rigid stop explains as well
     stops = {"end_stop": {"upper_deg": 13.87, "lower_deg": -16.42, "stiffness": 1069.7, "dissipation": 0.33}}

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from anglecam.loop import close
-from anglecam.loop.close import close_records
 from support.closing import close_without_rivals
 from support.motion import Plant
-from support.outside import outside_session
 from support.series import session
 
 
@@ -28,10 +26,9 @@ def test_an_effect_that_takes_away_nearly_all_of_its_error_stands_beside_an_unkn
     assert verdict.after_held_out.rmse < 0.15 * verdict.before_held_out.rmse
 
 
-def test_an_effect_that_only_resembles_the_cause_does_not_stand():
+def test_an_effect_that_only_resembles_the_cause_does_not_stand(closed):
     # two effects are added in the search, one of them is left out again, and the other does not stand either
-    steps, *_, random = outside_session("magnet", 0)
-    verdict = close_records([steps, random], held_out=["random"])
+    verdict = closed("magnet")
     assert verdict.verdict == "unexplained"
     assert not verdict.accepted
 

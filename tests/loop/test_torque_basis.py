@@ -16,12 +16,16 @@ from anglecam.models.plant import Plant
 from benchmarks.blind.sessions import HELD_OUT, session
 
 
+@pytest.fixture(scope="module")
+def records():
+    return session({}, seed=5)
+
+
 @pytest.mark.parametrize(
     ("column", "effect_id", "size"),
     [("angle", "stiffening_spring", 60.0), ("velocity", "damping_asymmetry", 0.3), ("velocity", "quadratic_drag", 0.3)],
 )
-def test_the_change_by_a_torque_over_angle_or_speed_lies_in_the_span_of_its_basis(column, effect_id, size):
-    records = session({}, seed=5)
+def test_the_change_by_a_torque_over_angle_or_speed_lies_in_the_span_of_its_basis(records, column, effect_id, size):
     fit = fit_output_error(Plant(), records, [np.array([26.0, 524.0, 508.0])])
     richer = Plant((effect(effect_id),))
     paths = []

@@ -30,8 +30,8 @@ def _errors(path, truth, **declared):
 @pytest.mark.parametrize(
     ("thing", "truth"),
     [
-        pytest.param(ball(DARK, 12.0), SWING, id="dark ball"),
-        pytest.param(ball(WHITE, 12.0), SWING, id="white ball"),
+        pytest.param(ball(DARK, 12.0), SWING, id="dark ball", marks=pytest.mark.sweep),
+        pytest.param(ball(WHITE, 12.0), SWING, id="white ball", marks=pytest.mark.sweep),
         pytest.param(ball(GREEN, 4.0), SWING, id="small green ball"),
         pytest.param(stick((110, 110, 112), 8.0), SWING, id="grey stick"),
         pytest.param(wheel(DARK), TURNS, id="wheel"),
@@ -50,7 +50,7 @@ def test_a_declared_grey_some_tens_of_levels_off_is_found(tmp_path):
     assert np.abs(error / sigma).max() < 5.0
 
 
-@pytest.mark.parametrize("way", ["at", "box"])
+@pytest.mark.parametrize("way", ["at", pytest.param("box", marks=pytest.mark.sweep)])
 def test_of_two_balls_the_one_that_is_pointed_at_is_measured(way, tmp_path):
     one, other = ball(DARK, 9.0, (90.0, 20.0), 150.0), ball(DARK, 9.0, (230.0, 20.0), 150.0)
 

@@ -6,44 +6,37 @@ import cv2
 import numpy as np
 import pytest
 
-from anglecam.io.rig import Rig, RigPivot
 from anglecam.measurement import registration_pass
 from anglecam.measurement.clip import measure_clip
 from anglecam.video import film_rows
 from anglecam.video.open_film import open_film
 from support.drawn import Look, draw_frames, write_clip
+from support.films import FADING, rig_of
 
-N = 150
+SWING = FADING.angle
+N = len(SWING)
 TIME = np.arange(N) / 30
-SWING = 14.0 * np.sin(2 * np.pi * 0.7 * TIME) * np.cos(0.4 * TIME)
 
 
 @pytest.fixture(scope="module")
 def look():
-    return Look()
+    return FADING.look
 
 
 @pytest.fixture(scope="module")
-def clip(look, tmp_path_factory):
-    path = tmp_path_factory.mktemp("film") / "clip.avi"
-    write_clip(path, draw_frames(look, SWING, TIME, seed=3))
-    return path
+def clip(films):
+    return films.film(FADING)
 
 
 @pytest.fixture(scope="module")
-def short(look, clip):
-    return measure_clip(open_film(clip), _rig(look)).series
+def short(look, films):
+    return films.measured(FADING, rig_of(look)).series
 
 
 @pytest.fixture
 def long(monkeypatch):
     """Let the films be too long to be kept: every second frame is."""
-    monkeypatch.setattr(film_rows, "MOST_BYTES", 150 * 640 * 480)
-
-
-def _rig(look):
-    x, y = look.pivot
-    return Rig(pivot=RigPivot(near=(x + 5, y - 4)))
+    monkeypatch.setattr(film_rows, "MOST_BYTES", N * 640 * 480)
 
 
 def _off(series, angle):
@@ -56,7 +49,7 @@ def test_a_long_film_is_measured_as_a_short_one(clip, short, look, long, monkeyp
     monkeypatch.setattr(registration_pass, "learn_from_frames", lambda *args: readings.append(args))
     film = open_film(clip)
     assert film.thinned() is not None
-    measured = measure_clip(film, _rig(look))
+    measured = measure_clip(film, rig_of(look))
     assert measured.by == "whole body"
     assert not readings  # what was learnt ahead is used
     series = measured.series
@@ -72,7 +65,7 @@ def test_a_body_that_points_to_the_left_is_learnt_ahead(long, tmp_path, monkeypa
     path = tmp_path / "clip.avi"
     write_clip(path, draw_frames(left, SWING, TIME, seed=6))
     monkeypatch.setattr(registration_pass, "learn_from_frames", lambda *args: "not again")
-    measured = measure_clip(open_film(path), Rig(facing="left", pivot=RigPivot(near=tuple(left.pivot + [4.0, -5.0]))))
+    measured = measure_clip(open_film(path), rig_of(left))
     assert measured.by == "whole body"
     assert measured.series.ok.all()
     off, sigma = _off(measured.series, SWING)
@@ -88,7 +81,7 @@ def test_frames_in_which_the_mark_is_hidden_are_measured_afterwards(look, long, 
         cv2.circle(frames[k], (int(x), int(y)), 26, (60, 120, 60), -1)
     path = tmp_path / "clip.avi"
     write_clip(path, iter(frames))
-    series = measure_clip(open_film(path), _rig(look)).series
+    series = measure_clip(open_film(path), rig_of(look)).series
     seen = np.setdiff1d(np.arange(N), hidden)
     assert series.ok[seen].all()
     off, sigma = _off(series, SWING)
@@ -99,9 +92,9 @@ def test_a_film_whose_evenly_spaced_frames_show_too_few_poses_is_learnt_as_a_who
     steps = np.repeat([0.0, 8.0], [60, 90])
     steps[60:76] = 8.0 * (1.0 - np.cos(np.pi * np.arange(16) / 16)) / 2.0
     path = tmp_path / "clip.avi"
-    write_clip(path, draw_frames(look, steps, TIME, seed=5))
-    short = measure_clip(open_film(path), _rig(look)).series
+    write_clip(path, draw_frames(look, steps, seed=5))
+    short = measure_clip(open_film(path), rig_of(look)).series
     monkeypatch.setattr(film_rows, "MOST_BYTES", 30 * 640 * 480)
-    series = measure_clip(open_film(path), _rig(look)).series
+    series = measure_clip(open_film(path), rig_of(look)).series
     np.testing.assert_allclose(series.angle, short.angle, rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(series.sigma, short.sigma, rtol=1e-6)

@@ -8,7 +8,6 @@ import cv2
 import numpy as np
 import pytest
 
-from anglecam.data.command import Command
 from anglecam.errors import InputError
 from anglecam.io.command_csv import read_command
 from anglecam.io.rig import Rig, RigMark, RigPivot, read_rig
@@ -18,17 +17,17 @@ from anglecam.measurement.sigma import Sigma, angle_sigma, place_errors, scatter
 from anglecam.video.open_film import open_film
 from support import broken
 from support.drawn import Look, Recording, draw_frames, draw_session, write_clip
+from support.films import NOD, REST, rig_of
 
-N = 66
-TIME = np.arange(N) / 30
-SWING = 12.0 * np.sin(2 * np.pi * 0.8 * (TIME - 0.5)) * (TIME > 0.5)
-REST = Command(np.array([0.0, 0.51]), np.array([0.0, 0.1]))
-"""Its first change ends the rest at the start of `SWING`."""
+SWING = NOD.angle
+N = len(SWING)
 
 
-def _rig(look: Look, **more) -> Rig:
-    x, y = look.pivot
-    return Rig(**{"facing": look.facing, "pivot": RigPivot(near=(x + 8, y - 7))} | more)
+@pytest.fixture(params=["colour declared", pytest.param("nothing declared", marks=pytest.mark.sweep)])
+def rig_for(request):
+    """Return a function that declares a look's rig, with the mark's colour or, in the sweep, without it."""
+    mouth = {} if request.param == "colour declared" else {"mouth": "auto"}
+    return lambda look, **more: rig_of(look, **(mouth | more))
 
 
 def _film(folder: Path, look: Look, angle=SWING, edit=None) -> Path:
@@ -38,12 +37,6 @@ def _film(folder: Path, look: Look, angle=SWING, edit=None) -> Path:
         edit(frames, look.mouth(angle))
     write_clip(path, iter(frames))
     return path
-
-
-@pytest.fixture(scope="module")
-def film(tmp_path_factory):
-    """Draw once what several tests look at: the usual head at `SWING`."""
-    return _film(tmp_path_factory.mktemp("film"), Look())
 
 
 def _errors(series, angle) -> tuple[np.ndarray, np.ndarray]:
@@ -89,21 +82,24 @@ def drawn(request, tmp_path_factory):
     return look, limit, ratio, measure_clip(open_film(truth.clip), read_rig(folder / "rig.yaml"), command), truth
 
 
+IN_SWEEP = ("left, dark skin, red pendulum", "disc, book near")
 BIASED = pytest.mark.xfail(strict=True, reason="the mean error of the clip is larger than its stated uncertainty")
 
 
-@pytest.mark.parametrize(
-    "drawn",
-    [pytest.param(name, marks=BIASED if name == "no marker, no hint, red lamp" else ()) for name in SESSIONS],
-    indirect=True,
-)
+def _sessions(biased=()):
+    """Return the sessions, those that are like another with the mark `sweep`."""
+    marks = dict.fromkeys(IN_SWEEP, pytest.mark.sweep) | {"no marker, no hint, red lamp": biased}
+    return [pytest.param(name, marks=marks.get(name, ())) for name in SESSIONS]
+
+
+@pytest.mark.parametrize("drawn", _sessions(biased=BIASED), indirect=True)
 def test_the_whole_error_mean_and_scatter_is_as_large_as_sigma(drawn):
     _, _, ratio, measured, truth = drawn
     error, sigma = _errors(measured.series, truth.angle_deg)
     assert ratio[0] < np.sqrt(((error / sigma) ** 2).mean()) < ratio[1]
 
 
-@pytest.mark.parametrize("drawn", SESSIONS, indirect=True)
+@pytest.mark.parametrize("drawn", _sessions(), indirect=True)
 def test_angles_are_right_and_sigma_is_true_beside_a_second_red_object(drawn):
     look, limit, ratio, measured, truth = drawn
     series = measured.series
@@ -121,15 +117,15 @@ def test_angles_are_right_and_sigma_is_true_beside_a_second_red_object(drawn):
     np.testing.assert_allclose(series.time, truth.time_s, atol=1e-9)
 
 
-def test_a_lever_of_120_px_stays_below_a_tenth_of_a_degree(tmp_path):
+def test_a_lever_of_120_px_stays_below_a_tenth_of_a_degree(tmp_path, rig_for):
     look = Look(lever_px=120.0, skin="dark")
-    series = measure_clip(open_film(_film(tmp_path, look)), _rig(look), REST).series
+    series = measure_clip(open_film(_film(tmp_path, look)), rig_for(look), REST).series
     error, _ = _errors(series, SWING)
     assert np.sqrt((error**2).mean()) < 0.1
     assert series.ok.all()
 
 
-def test_occluded_frames_are_marked_and_no_wrong_row_is_ok(tmp_path):
+def test_occluded_frames_are_marked_and_no_wrong_row_is_ok(tmp_path, rig_for):
     look = Look()
     hidden = dict(zip(range(45, 58), (5, 9, 14, 25, 60, 60, 60, 60, 60, 25, 14, 9, 5), strict=True))
 
@@ -138,7 +134,7 @@ def test_occluded_frames_are_marked_and_no_wrong_row_is_ok(tmp_path):
             x, y = mouths[i].round().astype(int)
             cv2.rectangle(frames[i], (x + 24 - width, y - 90), (x + 24, y + 90), (90, 120, 60), -1)
 
-    series = measure_clip(open_film(_film(tmp_path, look, edit=cover)), _rig(look), REST).series
+    series = measure_clip(open_film(_film(tmp_path, look, edit=cover)), rig_for(look), REST).series
     wrong = np.zeros(N, bool)
     wrong[[i for i, width in hidden.items() if width >= 14]] = True
     assert all(series.status[i] == "occluded" for i in np.flatnonzero(wrong))
@@ -149,30 +145,30 @@ def test_occluded_frames_are_marked_and_no_wrong_row_is_ok(tmp_path):
     assert np.isnan(series.mark_px[~series.ok]).all()
 
 
-def test_a_repeated_frame_in_motion_is_a_duplicate_and_at_rest_it_is_not(tmp_path):
+def test_a_repeated_frame_in_motion_is_a_duplicate_and_at_rest_it_is_not(tmp_path, rig_for):
     def repeat(frames, _):
         for i in (30, 31, 48):
             frames[i] = frames[i - 1]
 
     look = Look(noise=0.0)
     # the same picture is the same bytes in MJPG too, and is read ten times as fast as FFV1
-    series = measure_clip(open_film(_film(tmp_path, look, edit=repeat)), _rig(look), REST).series
+    series = measure_clip(open_film(_film(tmp_path, look, edit=repeat)), rig_for(look), REST).series
     assert [i for i, s in enumerate(series.status) if s != "ok"] == [30, 31, 48]
     assert {series.status[i] for i in (30, 31, 48)} == {"duplicate"}
 
 
 def test_a_clip_at_rest_is_measured_beside_a_larger_red_mug(tmp_path):
     look = Look(lever_px=200.0)
-    measured = measure_clip(open_film(_film(tmp_path, look, np.zeros(40))), _rig(look))
+    measured = measure_clip(open_film(_film(tmp_path, look, np.zeros(40))), rig_of(look, mouth="auto"))
     assert measured.series.ok.all()
     assert np.hypot(*(measured.series.mark_px - look.mouth(np.zeros(40))).T).max() < 1.0
     assert np.degrees(np.abs(measured.series.angle)).max() < 0.01
 
 
-@pytest.mark.parametrize("rgb", [(225, 62, 70), (150, 20, 20)])
-def test_a_declared_colour_may_be_30_levels_off(film, rgb):
+@pytest.mark.parametrize("rgb", [(225, 62, 70), pytest.param((150, 20, 20), marks=pytest.mark.sweep)])
+def test_a_declared_colour_may_be_30_levels_off(films, rgb):
     look = Look()
-    measured = measure_clip(open_film(film), _rig(look, mouth=RigMark(rgb=rgb)), REST)
+    measured = films.measured(NOD, rig_of(look, mouth=RigMark(rgb=rgb)), REST)
     error, _ = _errors(measured.series, SWING)
     assert np.sqrt((error**2).mean()) < 0.03
     assert np.abs(np.array(measured.detections.colour_rgb) - look.lips_rgb).max() < 15
@@ -184,20 +180,20 @@ def test_flicker_and_pale_lips_do_no_harm(tmp_path):
             frames[i] = cv2.convertScaleAbs(frame, alpha=1 + 0.1 * np.sin(2.3 * i))
 
     look = Look(lips_rgb=(168, 92, 92))
-    series = measure_clip(open_film(_film(tmp_path, look, edit=flicker)), _rig(look), REST).series
+    series = measure_clip(open_film(_film(tmp_path, look, edit=flicker)), rig_of(look, mouth="auto"), REST).series
     error, _ = _errors(series, SWING)
     assert series.ok.mean() > 0.97
     assert np.sqrt((error**2).mean()) < 0.03
 
 
-def test_neutral_is_what_is_declared_else_the_rest_else_the_median(tmp_path, monkeypatch):
+def test_neutral_is_what_is_declared_else_the_rest_else_the_median(tmp_path, rig_for, monkeypatch):
     look = Look(marker="disc_bright", facing="left")
     clip = _film(tmp_path, look)
-    detections = detect_mark(open_film(clip), _rig(look))  # they do not depend on neutral, radii and command
+    detections = detect_mark(open_film(clip), rig_for(look))  # they do not depend on neutral, radii and command
     monkeypatch.setattr("anglecam.measurement.followed.detect_mark", lambda *_: detections)
-    declared = measure_clip(open_film(clip), _rig(look, neutral=look.neutral_deg - 3.0), REST).series
-    rest = measure_clip(open_film(clip), _rig(look, pixel_error_px=(4.0,)), REST).series
-    median = measure_clip(open_film(clip), _rig(look)).series
+    declared = measure_clip(open_film(clip), rig_for(look, neutral=look.neutral_deg - 3.0), REST).series
+    rest = measure_clip(open_film(clip), rig_for(look, pixel_error_px=(4.0,)), REST).series
+    median = measure_clip(open_film(clip), rig_for(look)).series
     np.testing.assert_allclose(np.degrees(declared.angle), SWING + 3.0, atol=0.5)  # centroid and centre differ a little
     np.testing.assert_allclose(np.degrees(rest.angle), SWING, atol=0.1)
     assert abs(np.median(median.angle)) < 1e-12
@@ -205,7 +201,7 @@ def test_neutral_is_what_is_declared_else_the_rest_else_the_median(tmp_path, mon
     assert set(rest.bounds) == {4.0, 6.0, 10.0}
 
 
-def test_a_marker_away_from_the_centre_of_rotation_is_reported(tmp_path):
+def test_a_marker_away_from_the_centre_of_rotation_is_reported(tmp_path, rig_for):
     look = Look(marker="none")
 
     def paint(frames, _):
@@ -213,7 +209,7 @@ def test_a_marker_away_from_the_centre_of_rotation_is_reported(tmp_path):
         for frame in frames:
             cv2.circle(frame, (int(x), int(y)), 9, (20, 20, 20), -1, cv2.LINE_AA)
 
-    measured = measure_clip(open_film(_film(tmp_path, look, edit=paint)), _rig(look), REST)
+    measured = measure_clip(open_film(_film(tmp_path, look, edit=paint)), rig_for(look), REST)
     assert any("px apart" in note for note in measured.detections.notes)
     error, _ = _errors(measured.series, SWING)
     assert np.abs(error).max() < 0.15
@@ -237,23 +233,23 @@ def test_a_clip_in_which_nothing_turns_is_one_line(tmp_path):
 
 def test_a_head_without_lipstick_is_measured_and_a_red_mug_is_no_mouth_of_it(tmp_path):
     look = Look(lips_rgb=(216, 182, 160))
-    measured = measure_clip(open_film(_film(tmp_path, look)), _rig(look), REST)
+    measured = measure_clip(open_film(_film(tmp_path, look)), rig_of(look, mouth="auto"), REST)
     error, sigma = _errors(measured.series, SWING)
     assert measured.series.ok.mean() > 0.9
     assert np.sqrt((error**2).mean()) < 0.05
     assert np.std(error / sigma) < 2.0
 
 
-def test_what_is_left_of_a_truncated_clip_is_measured_and_the_rest_is_said(film, tmp_path):
+def test_what_is_left_of_a_truncated_clip_is_measured_and_the_rest_is_said(films, tmp_path, rig_for):
     look = Look()
-    cut = broken.truncated_clip(tmp_path, film)
-    measured = measure_clip(open_film(cut), _rig(look), REST)
+    cut = broken.truncated_clip(tmp_path, films.film(NOD))
+    measured = measure_clip(open_film(cut), rig_for(look), REST)
     read = sum(s != "undecodable" for s in measured.series.status)
     assert 33 < read < 48
     assert measured.detections.truncated == f"truncated: {read} of {N} frames could be read"
     error, _ = _errors(measured.series, SWING[: len(measured.series.time)])
     assert np.sqrt((error**2).mean()) < 0.03
-    assert detect_mark(open_film(film), _rig(look)).truncated is None
+    assert films.measured(NOD, rig_for(look), REST).truncated is None
 
 
 def test_worst_cases_at_the_papers_arms():
@@ -319,7 +315,7 @@ def test_an_error_of_the_pose_is_random_as_far_as_it_scatters():
     assert np.median(parts.random(np.nan)) == pytest.approx(np.hypot(noise, pose))
 
 
-@pytest.mark.parametrize("off", [(-60, 30), (60, 20)])
+@pytest.mark.parametrize("off", [(-60, 30), pytest.param((60, 20), marks=pytest.mark.sweep)])
 def test_a_mouth_that_rests_in_two_places_is_found_though_the_hint_is_far_from_its_centre(tmp_path, off):
     look = Look()
     held = np.concatenate([np.full(45, -15.0), [-10.0, -2.0, 4.0, 3.0, 0.5, -0.3], np.zeros(25)])
@@ -330,7 +326,7 @@ def test_a_mouth_that_rests_in_two_places_is_found_though_the_hint_is_far_from_i
     assert np.hypot(*(measured.angles.pivot.centre_px - look.pivot)) < 3.0
 
 
-def test_a_red_thing_that_touches_the_mark_covers_nothing_and_the_body_measures_on(tmp_path):
+def test_a_red_thing_that_touches_the_mark_covers_nothing_and_the_body_measures_on(tmp_path, rig_for):
     look = Look()
     beside = 6.0  # degrees above rest, where the mark passes the thing
 
@@ -339,9 +335,8 @@ def test_a_red_thing_that_touches_the_mark_covers_nothing_and_the_body_measures_
         for frame in frames:
             cv2.rectangle(frame, (x + 22, y - 4), (x + 40, y + 4), look.lips_rgb[::-1], -1)
 
-    measured = measure_clip(open_film(_film(tmp_path, look, edit=place)), _rig(look), REST)
-    by_mark = detect_mark(open_film(tmp_path / "clip.avi"), _rig(look))
-    assert by_mark.status.count("occluded") >= 2
+    measured = measure_clip(open_film(_film(tmp_path, look, edit=place)), rig_for(look), REST)
+    assert measured.detections.status.count("occluded") >= 2  # by the mark alone
     assert measured.series.ok.all()
     error, sigma = _errors(measured.series, SWING)
     assert np.abs(error).max() < 0.02

@@ -34,7 +34,7 @@ SPEC = {
     "camera": {"size": [320, 240], "exposure_s": 0.01, "codec": "mjpeg"},
     "rig": {"lever_px": 100, "pivot_px": [120.3, 149.6]},
     "scene": {"lamp_px": [295, 20]},
-    "declare": {"sync": {"lamp": [295, 20]}},
+    "declare": {"mouth": {"rgb": [190, 35, 40]}, "sync": {"lamp": [295, 20]}},
     "recordings": [
         {"name": f"steps-{k}", "duration_s": 3.0, "command": {"kind": "random", "amplitude_deg": 12, "rest_s": rest}}
         for k, rest in enumerate(RESTS)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from anglecam.data.series import OK
-from anglecam.io.rig import Rig, RigCamera, RigPivot
+from anglecam.io.rig import Rig, RigCamera, RigMark, RigPivot
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.live_meter import LiveMeter
 from anglecam.measurement.live_model import live_model
@@ -47,7 +47,7 @@ def _pixel(angle_deg):
 
 def _rig(**camera):
     x, y = LOOK.pivot
-    return Rig(pivot=RigPivot(near=(x + 5, y - 4)), camera=RigCamera(**camera))
+    return Rig(mouth=RigMark(rgb=LOOK.lips_rgb), pivot=RigPivot(near=(x + 5, y - 4)), camera=RigCamera(**camera))
 
 
 def _first(film):

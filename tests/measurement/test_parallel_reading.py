@@ -8,18 +8,15 @@ import signal
 import numpy as np
 import pytest
 
-from anglecam.io.rig import Rig, RigPivot
 from anglecam.measurement import mark_pass, parallel_reading
 from anglecam.measurement.frame_reading import read_frames
 from anglecam.measurement.parallel_reading import read_in_parts, readers_for
 from anglecam.video import film_parts, film_rows
 from anglecam.video.from_key import IrregularFilmError
 from anglecam.video.open_film import open_film
-from support.drawn import Look, draw_frames, write_clip
+from support.films import FADING, rig_of
 
-N = 96
-TIME = np.arange(N) / 30
-SWING = 14.0 * np.sin(2 * np.pi * 0.7 * TIME) * np.cos(0.4 * TIME)
+N = len(FADING.angles_deg)
 
 
 @pytest.fixture(scope="module")
@@ -35,21 +32,18 @@ def patched():
 
 
 @pytest.fixture(scope="module")
-def clip(tmp_path_factory):
-    path = tmp_path_factory.mktemp("film") / "clip.avi"
-    write_clip(path, draw_frames(Look(), SWING, TIME, seed=3))
-    return path
+def clip(films):
+    return films.film(FADING)
 
 
 @pytest.fixture(scope="module")
 def found(patched, clip):
     """Return what a sample of the frames shows, and what two processes find in all of them."""
     sought = []
-    x, y = Look().pivot
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(mark_pass, "read_in_parts", lambda *args: sought.append(args[2]) or read_in_parts(*args))
         film = open_film(clip)
-        detections = mark_pass.detect_mark(film, Rig(pivot=RigPivot(near=(x + 5, y - 4))))
+        detections = mark_pass.detect_mark(film, rig_of(FADING.look))
     assert len(sought) == 1
     assert film.rows.is_read
     assert film.undecodable == 0

@@ -30,7 +30,7 @@ def measured_with(mouth):
     return measure_clip(open_film(FOLDER / "esempio.avi"), Rig(mouth=MOUTHS[mouth], pivot=RigPivot(marker="none")))
 
 
-@pytest.fixture(params=MOUTHS)
+@pytest.fixture(params=[pytest.param("auto", marks=pytest.mark.sweep), "declared"])
 def measured(request):
     return measured_with(request.param)
 

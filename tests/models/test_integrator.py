@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from copy import copy
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -75,7 +77,28 @@ def test_friction_of_no_size_is_no_friction():
     assert np.array_equal(run(friction, drag, parameters=([0.0] * 4, [1.0])), run(drag, parameters=([1.0],)))
 
 
+@pytest.mark.parametrize("beside", ["quadratic_drag", "elastic_coupling", "load_dependent_friction"])
+@pytest.mark.parametrize("effect_id", [e.id for e in INSIDE if any(p.staged for p in e.parameters)])
+def test_an_omitted_staged_parameter_is_zero_whatever_acts_beside_it(effect_id, beside):
+    whole, other = effect(effect_id), effect(beside)
+    kept = tuple(p for p in whole.parameters if not p.staged)
+    values = first_start(whole)[: len(kept)]
+    zeros = np.zeros(len(whole.parameters) - len(kept))
+    shorter = run(replace(whole, parameters=kept), other, parameters=(values, first_start(other)))
+    assert np.array_equal(shorter, run(whole, other, parameters=(np.append(values, zeros), first_start(other))))
+
+
 def test_a_command_and_instants_that_cannot_be_written_to_are_taken():
     time = TIME.copy()
     time.setflags(write=False)
     assert np.array_equal(Plant().predict(np.array(BASE), time, COMMAND, FIRST), run())
+
+
+def test_what_is_kept_of_a_plant_holds_no_addresses_of_this_process():
+    plant = Plant((effect("quadratic_drag"),))
+    parameters = np.array([*BASE, 1.0])
+    expected = plant.run(parameters, TIME, COMMAND, FIRST)
+    assert "pieces" in vars(plant)
+    copied = copy(plant)  # it takes what pickle takes
+    assert "pieces" not in vars(copied)
+    np.testing.assert_array_equal(copied.run(parameters, TIME, COMMAND, FIRST), expected)

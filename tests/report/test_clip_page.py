@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from html import unescape
 
 import matplotlib.pyplot as plt
@@ -14,13 +15,14 @@ from anglecam.report.figures import angle_panel, plot_series
 from anglecam.report.origin import Run
 from anglecam.workflow.clip import measure_source, open_source, write_clip_page, write_measurement
 from support.browser import Watched, chromium
-from support.drawn import Look, draw_frames, write_clip
+from support.films import SWING
 
 
 @pytest.fixture(scope="module")
-def measured(tmp_path_factory):
+def measured(films, tmp_path_factory):
     folder = tmp_path_factory.mktemp("film")
-    write_clip(folder / "swing.avi", draw_frames(Look(), 8.0 * np.sin(2.0 * np.pi * np.arange(45) / 30.0)))
+    shutil.copy(films.film(SWING), folder)
+    (folder / "rig.yaml").write_text(f"mouth: {{rgb: {list(SWING.look.lips_rgb)}}}\n")
     (folder / "swing.command.csv").write_text("time_s,command_deg\n0,0\n0.5,4\n")
     source = open_source(folder / "swing.avi")
     return source, measure_source(source)

@@ -20,7 +20,6 @@ from anglecam.identification.identify_records import identify_records
 from anglecam.identification.output_error import fit_output_error
 from anglecam.io.command_csv import read_command
 from anglecam.io.rig import Rig
-from anglecam.loop.close import close_records
 from anglecam.loop.next_experiment.design import Experiment
 from anglecam.loop.verdict import Accepted
 from anglecam.loop.verdict_json import next_experiment, verdict_as_dict, write_next_command
@@ -28,14 +27,6 @@ from anglecam.report import page
 from anglecam.report.page import p_in_words, validation_in_words, write_report
 from anglecam.report.session_tables import model_table
 from anglecam.report.wording import sentence
-from support.motion import Plant
-from support.series import session
-
-
-@pytest.fixture(scope="module")
-def dragged():
-    """Return the verdict on steps, a triangle and random steps of a body with drag, none of them held out."""
-    return close_records(session(Plant(quadratic_drag=2.0), 21)[::2])
 
 
 @pytest.fixture(scope="module")

@@ -12,12 +12,9 @@ import numpy as np
 import pytest
 
 from anglecam.data.series import AngleSeries
-from anglecam.loop.close import close_records
 from anglecam.loop.verdict_json import verdict_as_dict
 from anglecam.report.page import write_report
 from support.browser import Watched, chromium
-from support.motion import Plant
-from support.series import session
 
 BITS, HEIGHT, WIDTH = 14, 48, 14 * 8
 
@@ -53,8 +50,8 @@ def filmed(record, first_frame=0):
 
 
 @pytest.fixture(scope="module")
-def verdict():
-    return close_records(session(Plant(quadratic_drag=2.0), 21)[::2])
+def verdict(dragged):
+    return dragged
 
 
 @pytest.fixture(scope="module")

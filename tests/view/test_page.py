@@ -5,20 +5,27 @@ from __future__ import annotations
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
+import uvicorn
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from anglecam.camera.lens import lens_from_rig
+from anglecam.cli.app import main
 from anglecam.io.rig import read_rig
 from anglecam.io.series_csv import read_series, write_series
 from anglecam.measurement.mark_pass import seek_mark
 from anglecam.video.open_film import open_film
+from anglecam.view.folder import open_folder
+from anglecam.view.serve import application
 from anglecam.view.stages import LearntMark, found_in
 from anglecam.workflow.clip import measure_source, open_source
 from support.tiny import FRAMES, SIZE
@@ -32,6 +39,7 @@ QUIET = [
     "--disable-sync",
 ]
 PATIENCE_MS = 60_000
+TOKEN = "secret"
 COMMAND = [sys.executable, "-c", "from anglecam.cli.app import main; main()", "view"]
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
@@ -47,6 +55,20 @@ def browser() -> Iterator[Browser]:
 
 @pytest.fixture
 def address(lab: Path) -> Iterator[str]:
+    """Serve the folder from a thread of this process until the test ends."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        port = listener.getsockname()[1]
+        config = uvicorn.Config(application(open_folder(lab), port, TOKEN), log_level="critical")
+        server = uvicorn.Server(config)
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+        thread.start()
+        yield f"http://127.0.0.1:{port}/?token={TOKEN}"
+        server.should_exit = True
+        thread.join()
+
+
+@pytest.fixture
+def address_of_command(lab: Path) -> Iterator[str]:
     """Run the command until the test ends; Ctrl-C ends it without a trace."""
     run = subprocess.Popen([*COMMAND, str(lab), "--no-browser"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert run.stdout is not None
@@ -60,6 +82,13 @@ def address(lab: Path) -> Iterator[str]:
 
 @pytest.fixture
 def page(browser: Browser, address: str) -> Iterator[Page]:
+    """Open the page."""
+    with _opened(browser, address) as page:
+        yield page
+
+
+@contextmanager
+def _opened(browser: Browser, address: str) -> Iterator[Page]:
     """Open the page; nothing may be complained of, and no request may leave the machine."""
     page = browser.new_page(viewport={"width": 1280, "height": 900})
     page.set_default_timeout(PATIENCE_MS)
@@ -97,6 +126,11 @@ def _place_of_mark(clip: Path, number: int) -> tuple[float, float]:
     mark = LearntMark(seek_mark(film, rig), lens_from_rig(rig, film.size, clip))
     x, y = found_in(image, mark)["regions"][0]["centre_px"]
     return x, y
+
+
+def test_the_command_shows_the_page(browser: Browser, address_of_command: str) -> None:
+    with _opened(browser, address_of_command) as page:
+        assert "token" not in page.url
 
 
 def test_frames_are_stepped_and_scrubbed(page: Page) -> None:
@@ -214,15 +248,14 @@ def test_everything_has_a_name_and_fits_a_narrow_screen(page: Page) -> None:
     assert nameless == []
 
 
-def test_a_taken_port_is_one_line(address: str, lab: Path) -> None:
+def test_a_taken_port_is_one_line(
+    address: str, lab: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     port = re.search(r":(\d+)/", address)
     assert port is not None
-    run = subprocess.run(
-        [*COMMAND, str(lab), "--no-browser", "--port", port[1]],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert (run.returncode, run.stdout) == (2, "")
-    assert run.stderr == f"--port {port[1]}: Address already in use\n"
+    monkeypatch.setattr(sys, "argv", ["anglecam", "view", str(lab), "--no-browser", "--port", port[1]])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    said = capfd.readouterr()
+    assert (ended.value.code, said.out) == (2, "")
+    assert said.err == f"--port {port[1]}: Address already in use\n"

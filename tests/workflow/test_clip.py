@@ -8,18 +8,11 @@ import pytest
 from anglecam.errors import InputError
 from anglecam.io.netcdf_parquet import Also, read_netcdf
 from anglecam.workflow.clip import measure_source, open_source, write_clip_overlay, write_measurement
-from support.drawn import Look, draw_frames, write_clip
+from support.films import SWING
 
 
-@pytest.fixture(scope="module")
-def clip(tmp_path_factory):
-    path = tmp_path_factory.mktemp("film") / "swing.avi"
-    write_clip(path, draw_frames(Look(), 8.0 * np.sin(2.0 * np.pi * np.arange(45) / 30.0)))
-    return path
-
-
-def test_all_results_of_a_clip_come_from_one_open_film(clip, tmp_path, monkeypatch):
-    opened = []
+def test_all_results_of_a_clip_come_from_one_open_film(films, tmp_path, monkeypatch):
+    clip, opened = films.film(SWING), []
     real = __import__("anglecam.video.container", fromlist=["av"]).av.open
 
     def counted(file, *arguments, **options):

@@ -23,7 +23,7 @@ from anglecam.workflow.live import measure_live
 from support.drawn import Look, Recording, draw_session
 
 LOOK = Look()
-SECONDS, RATE_HZ = 10.0, 30
+SECONDS, RATE_HZ = 6.0, 30
 FIRST = 75
 """Frames that are written at once: enough to learn from."""
 PATIENCE_S = 240.0

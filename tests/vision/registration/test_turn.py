@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from anglecam.io.rig import Rig
+from anglecam.io.rig import Rig, RigMark
 from anglecam.measurement.clip import measure_clip
 from anglecam.video.open_film import open_film
 from anglecam.vision.registration.tile_weights import copied_share
@@ -29,7 +29,7 @@ def swing(tmp_path_factory):
     (folder / "spec.yaml").write_text(yaml.safe_dump(SPEC))
     render(folder / "spec.yaml", folder / "session", folder / "truth")
     truth = np.genfromtxt(folder / "truth" / "swing.truth.csv", delimiter=",", names=True, dtype=None, encoding="utf-8")
-    return measure_clip(open_film(folder / "session" / "swing.avi"), Rig()), truth
+    return measure_clip(open_film(folder / "session" / "swing.avi"), Rig(mouth=RigMark(rgb=(190, 35, 40)))), truth
 
 
 def test_the_whole_body_gives_the_angle_to_a_thousandth_of_a_degree(swing):

@@ -44,8 +44,8 @@ def _followed(path, draw, angles_deg, relief=25.0, known=None):
 @pytest.mark.parametrize(
     ("draw", "angles_deg", "pivot"),
     [
-        (things.stick(GREY, 12.0), SWING, (160.0, 30.0)),
-        (things.ball(GREY, 18.0), SWING, (160.0, 20.0)),
+        pytest.param(things.stick(GREY, 12.0), SWING, (160.0, 30.0), marks=pytest.mark.sweep),
+        pytest.param(things.ball(GREY, 18.0), SWING, (160.0, 20.0), marks=pytest.mark.sweep),
         (things.wheel(GREY), np.linspace(0.0, 200.0, 60), (160.0, 120.0)),
     ],
     ids=["stick", "ball", "wheel"],
@@ -107,7 +107,13 @@ def test_of_two_like_things_that_turn_differently_none_is_measured(tmp_path):
     assert "does not follow one rotation" in str(_followed(tmp_path, _two, SWING))
 
 
-@pytest.mark.parametrize(("lengths", "ratio"), [((80.0, 80.0), 1.8), ((56.0, 40.0), 1.41), ((52.0, 56.0), 1.88)])
+@pytest.mark.parametrize(
+    ("lengths", "ratio"),
+    [
+        ((80.0, 80.0), 1.8),
+        *(pytest.param(*one, marks=pytest.mark.sweep) for one in (((56.0, 40.0), 1.41), ((52.0, 56.0), 1.88))),
+    ],
+)
 def test_of_two_hinged_links_one_is_measured_or_none(tmp_path, lengths, ratio):
     first, second = lengths
 
@@ -132,7 +138,14 @@ def _gear(scene, angle):
     things.disc(scene, (160.0, 120.0), 64.0, GREY)
 
 
-@pytest.mark.parametrize(("covered", "goes_on", "known"), [(1, True, None), (6, False, None), (6, False, 1)])
+@pytest.mark.parametrize(
+    ("covered", "goes_on", "known"),
+    [
+        pytest.param(1, True, None, marks=pytest.mark.sweep),
+        pytest.param(6, False, None, marks=pytest.mark.sweep),
+        (6, False, 1),
+    ],
+)
 def test_a_gear_is_not_found_again_at_another_tooth(tmp_path, covered, goes_on, known):
     turned = 4.0 * np.arange(60)
     frames = iter(range(len(turned)))

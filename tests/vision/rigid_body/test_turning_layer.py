@@ -1,5 +1,7 @@
 """A servo's horn: it rests, jumps by many degrees from frame to frame, and is seen before two colours."""
 
+from functools import cache
+
 import av
 import cv2
 import numpy as np
@@ -73,16 +75,18 @@ def _error(series, turns):
 
 
 @pytest.fixture(scope="module")
-def films(tmp_path_factory):
-    """Film the horn before two desks, each with noise of its own."""
+def horn(tmp_path_factory):
+    """Return a function that films the horn once for each seed of desk and noise."""
     folder = tmp_path_factory.mktemp("horn")
-    return {seed: _film(folder / f"{seed}.mkv", TURNS, seed=seed) for seed in (4, 5, 10)}
+    return cache(lambda seed: _film(folder / f"{seed}.mkv", TURNS, seed=seed))
 
 
-@pytest.mark.parametrize("seed", [4, 5, 10])  # with 10, a few tiles near the pivot can be registered as well
-def test_a_horn_is_followed_about_a_hinted_pivot(films, seed):
-    measured = measure_clip(open_film(films[seed]), NEAR)
+# with 10, a few tiles near the pivot can be registered as well
+@pytest.mark.parametrize("seed", [4, *(pytest.param(seed, marks=pytest.mark.sweep) for seed in (5, 10))])
+def test_a_horn_is_followed_about_a_hinted_pivot(horn, seed):
+    measured = measure_clip(open_film(horn(seed)), NEAR)
     series = measured.series
+    assert measured.by == "layer"
     assert series.ok.mean() > 0.95
     assert (np.hypot(*(series.mark_px - series.pivot_px)[series.ok].T) > 20.0).all()  # the line shows the angle
     error = _error(series, TURNS)
@@ -91,9 +95,10 @@ def test_a_horn_is_followed_about_a_hinted_pivot(films, seed):
     assert np.hypot(*(measured.angles.pivot.centre_px - PIVOT)) < 1.0
 
 
-def test_without_a_hint_a_horn_is_measured_by_its_outline(films):
+@pytest.mark.sweep  # a stick is measured by its outline in `tests/measurement/test_without_mark.py`
+def test_without_a_hint_a_horn_is_measured_by_its_outline(horn):
     # its middle moves on another circle than the fitted one: the thin ends of the arms are not seen
-    measured = measure_clip(open_film(films[4]), Rig())
+    measured = measure_clip(open_film(horn(4)), Rig())
     assert measured.by == "outline"
     error = _error(measured.series, TURNS)
     assert measured.series.ok.mean() > 0.95
@@ -101,6 +106,7 @@ def test_without_a_hint_a_horn_is_measured_by_its_outline(films):
     assert np.abs(error / np.degrees(measured.series.sigma[measured.series.ok])).max() < 4.0
 
 
+@pytest.mark.sweep  # a horn at rest is measured above, a camera in the hand in `tests/measurement/test_hand_held.py`
 def test_in_the_hand_a_horn_is_measured_about_its_pivot(tmp_path):
     # the camera moves by 50 px, farther than windows are tracked from the first picture
     path = np.linspace(0.0, 1.0, len(TURNS))

@@ -90,7 +90,13 @@ def shaking(frames, rms_px):
     return rms_px * shift / np.sqrt((shift**2).mean(axis=0))
 
 
-@pytest.mark.parametrize("look", [Look(distractor="pendulum"), Look(facing="left", background="gradient")])
+@pytest.mark.parametrize(
+    "look",
+    [
+        Look(distractor="pendulum"),
+        pytest.param(Look(facing="left", background="gradient"), marks=pytest.mark.sweep),
+    ],
+)
 def test_a_camera_at_rest_does_not_shake_while_body_and_light_change(look):
     images = list(draw_frames(look, 20.0 * np.sin(np.arange(12))))
     lit = [np.clip(image * (1.0 + 0.1 * np.sin(k)), 0, 255).astype(np.uint8) for k, image in enumerate(images)]
