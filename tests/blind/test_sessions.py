@@ -60,7 +60,7 @@ def test_magnifying_an_effect_and_back_restores_it(name):
     "name",
     [
         "torque_saturation",
-        "rolling_shutter",
+        pytest.param("rolling_shutter", marks=pytest.mark.sweep),  # one over most of a frame is fitted below
         pytest.param("lens_distortion", marks=pytest.mark.sweep),
         pytest.param("clock_scale", marks=pytest.mark.sweep),
     ],
