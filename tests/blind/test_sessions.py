@@ -28,7 +28,9 @@ def test_a_seed_determines_everything_and_an_effect_changes_no_command():
 
 
 def test_noise_has_the_specified_standard_deviation_and_ar1_coefficient():
-    exact, noisy = (session({}, seed=SEED, sigma_deg=s, noise="coloured") for s in (0.0, 0.05))
+    exact, noisy = (
+        session({}, seed=SEED, sigma_deg=s, noise="coloured", names=("random", "triangle")) for s in (0.0, 0.05)
+    )
     rest = [n.angle - e.angle for n, e in zip(noisy, exact, strict=True)]
     rest = [r - r.mean() for r in rest]
     assert np.degrees(np.concatenate(rest).std()) == pytest.approx(0.05, rel=0.1)

@@ -81,6 +81,7 @@ def test_a_shaking_camera_is_followed_by_its_scenery(tmp_path, red):
     assert np.std(measured.series.pivot_px, axis=0).min() > 0.5
 
 
+@pytest.mark.sweep  # a clip at rest is measured beside a larger mug in `test_clip.py`, stairs beside one too
 def test_one_step_beside_a_larger_swaying_mug_of_the_lips_colour_is_measured_from_its_rest_on(tmp_path):
     measured, truth = _measure(
         tmp_path,
