@@ -85,7 +85,7 @@ def test_a_shaking_camera_is_followed_by_its_scenery(tmp_path, red):
 def test_one_step_beside_a_larger_swaying_mug_of_the_lips_colour_is_measured_from_its_rest_on(tmp_path):
     measured, truth = _measure(
         tmp_path,
-        seconds=1.8,
+        seconds=2.5,
         command={"kind": "step", "amplitude_deg": 12},
         camera={"codec": "h264", "shake": {"rms_px": 1.0}},
         rig={"head": "male", "skin": "brown", "lips": "plum"},
