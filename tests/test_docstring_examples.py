@@ -42,7 +42,7 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     session.mkdir()
     rng = np.random.default_rng(1)
     for kind in ("stairs", "chirp"):
-        recording = Recording(kind, kind)
+        recording = Recording(kind, kind, duration_s=5.0)
         rows = command_rows(recording, rng)
         time = np.arange(0.0, recording.duration_s, 1.0 / RATE_HZ)
         angle = move(Plant(), recording, time, rows) + rng.normal(0.0, NOISE_DEG, len(time))

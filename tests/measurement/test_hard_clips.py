@@ -70,6 +70,7 @@ def _all_right(measured: Measurement, truth: np.ndarray, rms_deg: float) -> None
     assert (np.abs(error) < np.degrees(measured.series.bounds[6.0])).all()
 
 
+@pytest.mark.sweep  # `test_hand_held.py` has a camera in the hand, `test_background_motion.py` one that shakes
 def test_a_shaking_camera_is_followed_by_its_scenery(tmp_path, red):
     measured, truth = _measure(tmp_path, camera={"shake": {"rms_px": 2.0}}, declare=red)
     error, sigma = _errors(measured, truth)
@@ -80,6 +81,7 @@ def test_a_shaking_camera_is_followed_by_its_scenery(tmp_path, red):
     assert np.std(measured.series.pivot_px, axis=0).min() > 0.5
 
 
+@pytest.mark.sweep  # a clip at rest is measured beside a larger mug in `test_clip.py`, stairs beside one too
 def test_one_step_beside_a_larger_swaying_mug_of_the_lips_colour_is_measured_from_its_rest_on(tmp_path):
     measured, truth = _measure(
         tmp_path,
@@ -95,6 +97,7 @@ def test_one_step_beside_a_larger_swaying_mug_of_the_lips_colour_is_measured_fro
     assert np.std(error / sigma) < 2.0
 
 
+@pytest.mark.sweep  # a drawn head is hidden for a while in `test_clip.py`
 def test_only_what_is_hidden_is_occluded_and_no_wrong_row_is_ok(tmp_path, red):
     scene = {"occluders": [{"from_s": 1.2, "for_s": 0.5}]}
     measured, truth = _measure(tmp_path, seconds=3.0, command=SWING | {"period_s": 1.6}, scene=scene, declare=red)

@@ -98,7 +98,11 @@ def _two(scene, angle):
     things.bar(scene, (240.0, 30.0), things.hanging((240.0, 30.0), 100.0, -0.7 * angle), 14.0, (60, 60, 60))
 
 
-@pytest.mark.parametrize("draw", [_disc, _cart, lambda scene, angle: None], ids=["disc", "cart", "nothing"])
+@pytest.mark.parametrize(
+    "draw",
+    [pytest.param(_disc, marks=pytest.mark.sweep), _cart, lambda scene, angle: None],
+    ids=["disc", "cart", "nothing"],
+)
 def test_what_shows_no_rotation_of_its_own_is_not_measured(tmp_path, draw):
     assert isinstance(_followed(tmp_path, draw, SWING), str)
 
