@@ -54,7 +54,13 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {"clip": str(folder / "clip.avi"), "session": str(session)}
 
 
-@pytest.mark.parametrize("module_name", _modules_with_examples())
+_WHOLE_WAY = "anglecam.api"  # `test_from_film_to_verdict` of `tests/cli/test_app.py` goes it by the command line
+
+
+@pytest.mark.parametrize(
+    "module_name",
+    [pytest.param(name, marks=pytest.mark.sweep) if name == _WHOLE_WAY else name for name in _modules_with_examples()],
+)
 def test_examples_print_what_they_state(module_name: str, names: dict[str, str]) -> None:
     module = importlib.import_module(module_name)
     outcome = doctest.testmod(module, extraglobs=names, optionflags=doctest.NORMALIZE_WHITESPACE)

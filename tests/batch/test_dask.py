@@ -39,6 +39,7 @@ def without_dask(lab, tmp_path_factory):
     return results(out)
 
 
+@pytest.mark.sweep  # beside a batch without Dask: `test_a_batch_that_is_killed_and_resumed_…` of `test_kill.py`
 def test_what_workers_finish_while_the_batch_is_killed_is_not_measured_again(cluster, lab, without_dask, tmp_path):
     address, out = cluster.address, tmp_path / "out"
     batch = subprocess.Popen(batch_command(lab, "--out", out, "--dask", address, "--quiet"))
@@ -101,6 +102,23 @@ def test_a_lost_scheduler_ends_the_batch_in_one_line_and_good_results_stay(clust
     killer.join()
     assert (out / "a.angles.csv").read_bytes() == good
     assert [row.status for row in run_batch([str(lab)], out, here).rows] == ["ok", "ok"]
+
+
+@pytest.mark.sweep  # one clip, so that the loss is noticed elsewhere: the test before
+def test_a_scheduler_that_is_lost_when_it_is_asked_for_its_workers_is_named_in_one_line(tmp_path):
+    lab = tiny_lab(tmp_path / "lab", [f"{k}.avi" for k in range(8)])  # more than the workers get at once
+    with dask_cluster(tmp_path) as cluster:
+
+        def kill():
+            while not list((tmp_path / "out").glob("*.angles.csv")):
+                time.sleep(0.005)
+            cluster.scheduler.kill()
+
+        killer = threading.Thread(target=kill)
+        killer.start()
+        with pytest.raises(InputError, match=r"^--dask .*: the scheduler is lost \(.*\); the same call goes on from"):
+            run_batch([str(lab)], tmp_path / "out", Options(jobs=1, quiet=True, dask=cluster.address))
+        killer.join()
 
 
 def test_an_invalid_scheduler_address_is_refused_at_once(tmp_path):
