@@ -54,7 +54,7 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {"clip": str(folder / "clip.avi"), "session": str(session)}
 
 
-_WHOLE_WAY = "anglecam.api"  # `test_from_film_to_verdict` of `tests/cli/test_app.py` goes it by the command line
+_WHOLE_WAY = "anglecam.api"  # `test_hidden_backlash` of `tests/test_tutorials.py` goes it by the command line
 
 
 @pytest.mark.parametrize(

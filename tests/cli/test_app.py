@@ -61,6 +61,7 @@ def status(monkeypatch, capfd):
     return call
 
 
+@pytest.mark.sweep  # the commands go the whole way in `test_hidden_backlash` of `tests/test_tutorials.py`, too
 def test_from_film_to_verdict(film, tmp_path, status):
     folder, truth = film
     assert status("close", folder, "--out", tmp_path) == (0, "")

@@ -41,12 +41,13 @@ def _followed(path, draw, angles_deg, relief=25.0, known=None):
     return follow_outline(film.frames(), replace(learnt, known=learnt.known[-known:] if known else learnt.known))
 
 
+@pytest.mark.sweep  # a stick is measured in `tests/measurement/test_without_mark.py`
 @pytest.mark.parametrize(
     ("draw", "angles_deg", "pivot"),
     [
         (things.stick(GREY, 12.0), SWING, (160.0, 30.0)),
-        pytest.param(things.ball(GREY, 18.0), SWING, (160.0, 20.0), marks=pytest.mark.sweep),
-        pytest.param(things.wheel(GREY), np.linspace(0.0, 200.0, 60), (160.0, 120.0), marks=pytest.mark.sweep),
+        (things.ball(GREY, 18.0), SWING, (160.0, 20.0)),
+        (things.wheel(GREY), np.linspace(0.0, 200.0, 60), (160.0, 120.0)),
     ],
     ids=["stick", "ball", "wheel"],
 )
