@@ -13,39 +13,22 @@ import pytest
 
 from anglecam.effects import LEDGER
 
+pytestmark = pytest.mark.sweep  # links and examples of the pages are checked in `tests/test_docs.py`
 ROOT = Path(__file__).parents[1]
 OFFLINE = dict.fromkeys(("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"), "http://127.0.0.1:9")
 """A proxy that nobody answers at."""
-GREY = """
-import sys
-from pathlib import Path
-
-import build_site
-from PIL import Image
 
 
-def draw(folder):
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in ("stick", "stick-overlay", "step", "linkage", "gallery"):
-        Image.new("L", (64, 48), 128).save(folder / f"{name}.png")
-
-
-build_site.pictures.draw = draw
-build_site.build(Path(sys.argv[1]))
-"""
-"""Builds the site without what takes half of the time."""
-
-
-@pytest.fixture(scope="module", params=["drawn in advance", pytest.param("as a whole", marks=pytest.mark.sweep)])
-def site(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the site, with grey pictures in place of those that the programs draw, or, in the sweep, as a whole."""
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("site")
-    program = [ROOT / "docs" / "build_site.py"] if request.param == "as a whole" else ["-c", GREY]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", f"{ROOT}:{ROOT / 'docs'}")
+        patch.setenv("PYTHONPATH", str(ROOT))
         for name, proxy in OFFLINE.items():
             patch.setenv(name, proxy)
-        done = subprocess.run([sys.executable, *program, out], capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [sys.executable, ROOT / "docs" / "build_site.py", out], capture_output=True, text=True, check=False
+        )
     assert done.returncode == 0, done.stdout + done.stderr
     return out / "site"
 

@@ -143,6 +143,7 @@ def test_the_recording_has_the_files_of_measure(lived, truth):
     assert not session.notes
 
 
+@pytest.mark.sweep  # that a frame is measured or counted is also claimed by the tests before
 def test_frames_that_cannot_keep_up_are_counted(truth, tmp_path, monkeypatch):
     writer = _Writer(truth.clip, tmp_path / "head")
     monkeypatch.setattr(workflow, "LATE_S", 0.0)  # every frame is later than that
