@@ -110,8 +110,8 @@ def series_columns(series: AngleSeries, command: Floats | None = None) -> dict[s
     Returns
     -------
     dict of str to (n,) ndarray
-        ``time`` in s, and in degrees ``angle`` and, where there are any, ``sigma``, its parts ``random`` and ``common``, ``bound6``, ``bound10``, …,
-        ``command``.
+        ``time`` in s, and in degrees ``angle`` and, where there are any, ``sigma``, its parts ``random`` and
+        ``common``, ``bound6``, ``bound10``, …, ``command``.
     """
     found = {"time": series.time, "angle": np.degrees(series.angle)}
     if np.isfinite(series.sigma).any():
