@@ -8,8 +8,8 @@ them is computed, at the measured arm.
 A worst case is not an uncertainty. The standard uncertainty combines the known sources of error (GUM 5.1.2): the noise
 of the picture, the mark's position on the pixel grid and in the codec's blocks, and the pivot, each times its
 sensitivity. Errors that differ from frame to frame are scatter, which a mean or a filter reduces. Errors of pivot, zero
-and view are common to all frames. An error that depends on the pose lies between: it scatters where the pose changes much
-from frame to frame, and not at rest. The scatter of the angles themselves says how much of it counts as random.
+and view are common to all frames. An error that depends on the pose lies between: it scatters where the pose changes
+much from frame to frame, and not at rest. The scatter of the angles themselves says how much of it counts as random.
 """
 
 from __future__ import annotations

@@ -120,7 +120,7 @@ def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[floa
 
 
 def _is_excursion(y: Floats, before: _Rest, after: _Rest) -> bool:
-    """Return whether the angle between two rests overshoots by more than 100 %, before the first or beyond the second."""
+    """Return whether the angle between two rests overshoots either by more than 100 % of the way."""
     way = after.level - before.level
     share = (y[before.last : after.first + 1] - before.level) / way
     return bool(share.max() > 2.0 or share.min() < -1.0)

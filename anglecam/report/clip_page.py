@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from anglecam.data.command import Command
+from anglecam.data.series import AngleSeries
 from anglecam.errors import printable
 from anglecam.io.session import SERIES_ENDING
 from anglecam.measurement.clip import Measurement
