@@ -13,6 +13,7 @@ matplotlib.use("Agg")  # draws without a display
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -59,12 +60,18 @@ def plot_series(series: AngleSeries, path: Path) -> None:
         _draw_angle(top, series)
         top.set_ylabel("angle from neutral, °")
         top.set_title(printable(series.name), parse_math=False)
-        figure.legend(*top.get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8)
         _draw_sigma(bottom, series)
+        figure.legend(*_labels(top, bottom), loc="outside upper right", ncols=3, fontsize=8)
         bottom.set_xlabel("time on the clip's clock, s")
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=110, format="png")
         plt.close(figure)
+
+
+def _labels(*axes: Axes) -> tuple[list[Artist], list[str]]:
+    """Return handles and labels of several axes for one legend."""
+    each = [one.get_legend_handles_labels() for one in axes]
+    return [handle for handles, _ in each for handle in handles], [label for _, labels in each for label in labels]
 
 
 def angle_panel(series: AngleSeries) -> str:
