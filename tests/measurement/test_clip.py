@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import cv2
@@ -166,6 +167,18 @@ def test_a_clip_at_rest_is_measured_beside_a_larger_red_mug(tmp_path):
     assert measured.series.ok.all()
     assert np.hypot(*(measured.series.mark_px - look.mouth(np.zeros(30))).T).max() < 1.0
     assert np.degrees(np.abs(measured.series.angle)).max() < 0.01
+
+
+@pytest.mark.parametrize("by", ["colour", "place"])
+def test_a_declared_mark_that_stands_still_is_no_success(tmp_path, by):
+    look = Look(lever_px=200.0)
+    (x, y) = look.mouth(np.zeros(1))[0].tolist()
+    mouth = RigMark(rgb=look.lips_rgb) if by == "colour" else RigMark(at=(x, y), frame=3)
+    doubt = measure_clip(open_film(_film(tmp_path, look, np.zeros(30))), rig_of(look, mouth=mouth)).doubt
+    assert doubt is not None
+    place = re.search(r"the declared mark stands still: around (\d+),(\d+) it travels 0\.\d+ px", doubt)
+    assert place is not None
+    assert np.hypot(int(place[1]) - x, int(place[2]) - y) < 2.0
 
 
 @pytest.mark.parametrize("rgb", [(225, 62, 70), pytest.param((150, 20, 20), marks=pytest.mark.sweep)])
