@@ -111,9 +111,9 @@ def scatter(time: NDArray[np.float64], angle: NDArray[np.float64]) -> float:
 
     Examples
     --------
-    >>> time = np.arange(300) / 30
-    >>> noise = 1e-3 * np.random.default_rng(0).standard_normal(300)
-    >>> round(1e3 * scatter(time, 0.2 * np.sin(3.0 * time) + noise), 1)
+    >>> time = np.arange(3000) / 30
+    >>> noise = 1e-3 * np.random.default_rng(0).standard_normal(3000)
+    >>> round(float(1e3 * scatter(time, 0.2 * np.sin(3.0 * time) + noise)), 1)
     1.0
     """
     if len(time) < _LEAST_DIFFERENCES + 4:

@@ -114,6 +114,7 @@ def test_a_declared_exposure_of_60_percent_of_the_interval_costs_no_row_and_is_i
     _all_right(measured, truth, 0.02)
 
 
+@pytest.mark.sweep  # a declared tilt leaves the angle exact in `tests/camera/test_lens.py`
 def test_a_declared_tilt_is_undone_for_parts_at_every_height(tmp_path, red):
     measured, truth = _measure(
         tmp_path,
