@@ -13,6 +13,7 @@ import pytest
 
 from anglecam.effects import LEDGER
 
+pytestmark = pytest.mark.sweep  # links and examples of the pages are checked in `tests/test_docs.py`
 ROOT = Path(__file__).parents[1]
 OFFLINE = dict.fromkeys(("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY"), "http://127.0.0.1:9")
 """A proxy that nobody answers at."""

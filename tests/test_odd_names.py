@@ -84,6 +84,7 @@ def test_what_anybody_can_read_is_left_as_it_is():
     assert printable("Kopfnicken über 10° – Länge.avi") == "Kopfnicken über 10° – Länge.avi"
 
 
+@pytest.mark.sweep  # a clip of any name is also measured in `tests/batch/test_trouble.py`
 def test_a_folder_of_odd_names_is_measured_a_line_for_each_that_cannot_be(tmp_path):
     folder, out = tmp_path / "clips", tmp_path / "out"
     folder.mkdir()

@@ -132,8 +132,17 @@ class DaskPool(Generic[Job, Done]):
 
     @property
     def capacity(self) -> int:
-        """Number of jobs to have under way so that no worker waits for its next job."""
-        return 2 * max(1, self._admitted())
+        """Number of jobs to have under way so that no worker waits for its next job.
+
+        Raises
+        ------
+        InputError
+            If the scheduler is lost.
+        """
+        try:
+            return 2 * max(1, self._admitted())
+        except (OSError, CommClosedError) as fault:
+            raise self._lost(fault) from fault
 
     def start(self, job: Job) -> None:
         """Submit a job to the scheduler."""
@@ -159,10 +168,13 @@ class DaskPool(Generic[Job, Done]):
                 self.start(job)
                 continue
             except (CancelledError, FutureCancelledError, CommClosedError) as fault:
-                raise InputError(
-                    f"--dask {self._address}: the scheduler is lost ({_line(fault)}); the same call goes on from here"
-                ) from fault
+                raise self._lost(fault) from fault
             return done
+
+    def _lost(self, fault: BaseException) -> InputError:
+        return InputError(
+            f"--dask {self._address}: the scheduler is lost ({_line(fault)}); the same call goes on from here"
+        )
 
 
 def _do(work: Callable[[Job, MeasuringProcess], Done], job: Job) -> Done:

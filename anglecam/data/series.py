@@ -38,6 +38,8 @@ SERIES_COLUMNS = (
     "pivot_x_px",
     "pivot_y_px",
     "status",
+    "sigma_random_deg",
+    "sigma_common_deg",
 )
 """Columns of a series as a table, in order."""
 
@@ -82,6 +84,8 @@ class AngleSeries:
     """Worst-case angle error, rad, for a mark anywhere within the radius (the key), px."""
     first_frame: int = 0
     """Number in the film of the first row's frame; the others follow without a gap."""
+    sigma_random: Floats | None = None
+    """Part of ``sigma`` that differs from frame to frame, rad; the rest, in squares, is common to all frames."""
     evidence: CameraEvidence = NO_EVIDENCE
     """Evidence of the film besides the angle; empty for a series without a film."""
 
@@ -90,13 +94,30 @@ class AngleSeries:
         """(n,) whether the angle of each frame is measured."""
         return np.array([s == OK for s in self.status])
 
+    @property
+    def sigma_common(self) -> Floats:
+        """(n,) part of ``sigma`` that all frames share, rad; NaN where the parts are not known."""
+        if self.sigma_random is None:
+            return np.full(len(self.time), np.nan)
+        return np.asarray(np.sqrt(np.maximum(self.sigma**2 - self.sigma_random**2, 0.0)))
+
+    @property
+    def common_share(self) -> float:
+        """Ratio of ``sigma_common`` to the angle, both RMS of the measured frames; NaN where it is not known.
+
+        The common part grows with the angle from neutral, as an error of the scale does.
+        """
+        ok = self.ok
+        motion = float(np.sqrt(np.mean(self.angle[ok] ** 2))) if ok.any() else 0.0
+        return float(np.sqrt(np.mean(self.sigma_common[ok] ** 2))) / motion if motion > 0.0 else float("nan")
+
     def columns(self) -> dict[str, NDArray]:
         """Return the series as the columns of its file, in order: degrees, pixels, NaN for an empty cell.
 
         Returns
         -------
         dict of str to ndarray
-            (n,) values by name. Radii of ``bounds`` other than 6 px and 10 px become columns after ``status``.
+            (n,) values by name. Radii of ``bounds`` other than 6 px and 10 px become the last columns.
         """
         n = len(self.time)
         empty = np.full((n, 2), np.nan)
@@ -109,7 +130,9 @@ class AngleSeries:
         contract_bounds = [bounds[r] for r in CONTRACT_RADII_PX]
         frame = np.arange(n) + self.first_frame
         cells = [frame, self.time, angle, sigma, *contract_bounds, np.degrees(line), *mark.T, *pivot.T]
-        columns = dict(zip(SERIES_COLUMNS, [*cells, np.array(self.status, dtype=str)], strict=True))
+        random = empty[:, 0] if self.sigma_random is None else self.sigma_random
+        parts = [np.degrees(random), np.degrees(self.sigma_common)]
+        columns = dict(zip(SERIES_COLUMNS, [*cells, np.array(self.status, dtype=str), *parts], strict=True))
         return columns | {f"bound_{r:g}px_deg": bounds[r] for r in further}
 
     def to_pandas(self) -> pd.DataFrame:

@@ -25,7 +25,7 @@ def write_series(series: AngleSeries, path: Path) -> None:
     Parameters
     ----------
     series : AngleSeries
-        The recording. Radii of ``series.bounds`` other than 6 px and 10 px become columns after ``status``.
+        The recording. Radii of ``series.bounds`` other than 6 px and 10 px become the last columns.
     path : Path
         The file; it is written whole or not at all.
     """
@@ -71,6 +71,7 @@ def read_series(path: Path) -> AngleSeries:
     if np.isfinite(angle).sum() < 3:
         raise InputError(f"{path}: fewer than 3 measured angles in {n} rows")
     sigma = np.radians(table["sigma_deg"]) if "sigma_deg" in table else np.full(n, np.nan)
+    random = np.radians(table["sigma_random_deg"]) if "sigma_random_deg" in table else None
     points = {
         point: np.column_stack([table[f"{point}_x_px"], table[f"{point}_y_px"]])
         for point in ("mouth", "pivot")
@@ -80,7 +81,16 @@ def read_series(path: Path) -> AngleSeries:
     name = path.name.removesuffix(".csv").removesuffix(".angles")
     first = _first_frame(table.get("frame"))
     return AngleSeries(
-        name, time, angle, sigma, status, line, points.get("mouth"), points.get("pivot"), first_frame=first
+        name,
+        time,
+        angle,
+        sigma,
+        status,
+        line,
+        points.get("mouth"),
+        points.get("pivot"),
+        first_frame=first,
+        sigma_random=random,
     )
 
 
@@ -96,5 +106,5 @@ def _cell(column: str, value: Any) -> str:
         return str(value)
     if column == "time_s":
         return f"{value:.9g}"
-    digits = 6 if column in ("angle_deg", "sigma_deg", "line_deg") else 4
+    digits = 4 if column.startswith("bound_") or column.endswith("_px") else 6
     return f"{value:.{digits}f}" if math.isfinite(value) else ""

@@ -18,7 +18,7 @@ from anglecam.data.typing import Flags, Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.registration_pass import Registered
-from anglecam.measurement.sigma import PlaceErrors, angle_sigma, place_errors
+from anglecam.measurement.sigma import PlaceErrors, Sigma, angle_sigma, place_errors
 from anglecam.vision.image.transforms import rotate_each
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
@@ -51,8 +51,8 @@ class Angles:
 
     line: Floats
     """Direction from pivot to mark from the picture's horizontal, upward positive for either facing, rad."""
-    sigma: Floats
-    """Standard uncertainty of ``line`` minus ``neutral``, rad."""
+    uncertainty: Sigma
+    """Of ``line`` minus ``neutral``."""
     mark_px: Floats
     """(n, 2) mark, px."""
     pivot: PivotEstimate
@@ -70,6 +70,11 @@ class Angles:
     """Source of the fine angles; ``None`` for coarse angles."""
     shared: float = 0.0
     """Standard uncertainty of neutral that all fine angles share, without the pivot's contribution, rad."""
+
+    @property
+    def sigma(self) -> Floats:
+        """(n,) standard uncertainty of ``line`` minus ``neutral``, rad."""
+        return self.uncertainty.total
 
     @property
     def lever_px(self) -> Floats:
@@ -173,7 +178,8 @@ def angles_of_places(
     aside = thick_px * np.hypot(*lens.parallax) * (line - neutral) / lever
     known = angle_sigma(mark_px, pivot.centre_px, pivot.covariance_px2, errors, resting)
     unsteady = mean_off_middle(time, line, rig.camera.exposure_s)
-    sigma = np.sqrt(known**2 + view.sigma**2 + aside**2 + unsteady**2)
+    common = np.sqrt(known.common**2 + view.sigma**2 + aside**2)
+    sigma = Sigma(known.noise, np.hypot(known.pose, unsteady), common)
     return Angles(line, sigma, mark_px, pivot, neutral, resting, errors, view, unsteady)
 
 
@@ -184,7 +190,7 @@ def _angles_of_body(
 
     The body reaches beyond a middle that is near the pivot, as a wheel's is: the line then ends where the body does.
     """
-    turn, sigma = body.turn[ok], body.sigma[ok]
+    turn, noise = body.turn[ok], body.sigma[ok]
     arm = detections.lens.rectify(body.centre_px) - detections.pivot.centre_px
     arm *= max(1.0, body.extent_px / max(float(np.hypot(*arm)), _LEAST_ARM_PX))
     mark = detections.pivot.centre_px + rotate_each(arm, turn)
@@ -192,7 +198,7 @@ def _angles_of_body(
     line = float(np.arctan2(-arm[1], _ahead(arm[:1], rig)[0])) + signed
     lever = np.full(len(turn), float(np.hypot(*arm)))
     neutral, resting = neutral_of(rig, command, time[ok], line, lever)
-    errors = PlaceErrors(sigma * lever, 0.0)
+    errors = PlaceErrors(noise * lever, 0.0)
     view = _view_errors(detections.lens, mark, detections.pivot.centre_px, line, neutral, resting, rig)
     known = angle_sigma(mark, detections.pivot.centre_px, np.zeros((2, 2)), errors, resting)
     moved = body.pivot_sensitivity[ok]
@@ -200,7 +206,8 @@ def _angles_of_body(
         moved = moved - moved[resting].mean(axis=0)
     by_pivot = np.einsum("ni,ij,nj->n", moved, body.pivot_covariance_px2, moved)
     unsteady = mean_off_middle(time[ok], line, rig.camera.exposure_s)
-    sigma = np.sqrt(known**2 + by_pivot + view.sigma**2 + unsteady**2)
+    common = np.sqrt(known.common**2 + by_pivot + view.sigma**2)
+    sigma = Sigma(known.noise, np.hypot(known.pose, unsteady), common)
     return Angles(line, sigma, mark, detections.pivot, neutral, resting, errors, view, unsteady)
 
 

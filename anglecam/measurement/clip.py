@@ -24,7 +24,7 @@ from anglecam.measurement.duplicates import duplicate_frames
 from anglecam.measurement.followed import Followed, follow_mark_or_body
 from anglecam.measurement.one_rigid_mark import why_not_rigid
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
-from anglecam.measurement.trust import why_elsewhere, why_few, why_unproven
+from anglecam.measurement.trust import why_elsewhere, why_few, why_still, why_unproven
 from anglecam.progress import Progress, Stage, unseen
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
@@ -148,7 +148,8 @@ def measure_clip(
     other = None
     if followed.angles.registered is None:
         other = (
-            why_elsewhere(followed.detections, rig)
+            why_still(followed.detections, followed.ok, rig)
+            or why_elsewhere(followed.detections, rig)
             or why_not_rigid(followed.detections, followed.ok)
             or why_unproven(followed.detections, hand_held=isinstance(held, FilmAtRest))
         )

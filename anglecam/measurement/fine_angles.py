@@ -17,6 +17,7 @@ from anglecam.data.typing import Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles, neutral_of
 from anglecam.measurement.registration_pass import Registered
+from anglecam.measurement.sigma import Sigma
 from anglecam.vision.pivot.estimate import PivotEstimate
 
 
@@ -73,15 +74,19 @@ def fine_angles(
     by_pivot = np.einsum("ni,ij,nj->n", against, found.pivot_covariance_px2, against)
     exposure = rig.camera.exposure_s
     unsteady = np.hypot(mean_off_middle(time, line, exposure), blur_error(time, line, coarse.lever_px, exposure))
-    sigma = np.sqrt(noise**2 + pose**2 + shared**2 + by_pivot + coarse.view.sigma**2 + unsteady**2)
-    if resting is None:
-        # an absolute direction depends on the mark's mean position on the body, and on the pivot
-        sigma = np.sqrt(sigma**2 + float(np.median(coarse.sigma[registered])) ** 2)
+    # an absolute direction depends on the mark's mean position on the body, and on the pivot
+    direction = float(np.median(coarse.sigma[registered])) if resting is None else 0.0
+    common = np.sqrt(shared**2 + by_pivot + coarse.view.sigma**2 + direction**2)
+    sigma = Sigma(
+        np.where(registered, noise, coarse.uncertainty.noise),
+        np.where(registered, np.hypot(pose, unsteady), coarse.uncertainty.pose),
+        np.where(registered, common, coarse.uncertainty.common),
+    )
     pivot = PivotEstimate(found.pivot_px, found.pivot_covariance_px2, f"{coarse.pivot.source} and the body's rotation")
     return replace(
         coarse,
         line=line,
-        sigma=np.where(registered, sigma, coarse.sigma),
+        uncertainty=sigma,
         pivot=pivot,
         neutral=neutral,
         resting=resting,

@@ -174,7 +174,7 @@ def live_model(first: Measurement, rig: Rig) -> LiveModel | str:
     path = MarkPath(detections.circle.centre_px, detections.circle.radius_px, area, detections.lens)
     coarse = angle_sigma(
         angles.mark_px, detections.pivot.centre_px, detections.pivot.covariance_px2, angles.errors, angles.resting
-    )
+    ).total
     body, terms = _body(first, path, rig), None
     if body is not None:
         terms = _body_terms(angles, first, rig, coarse)

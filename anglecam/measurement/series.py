@@ -12,7 +12,7 @@ from anglecam.data.series import CONTRACT_RADII_PX, OK, AngleSeries
 from anglecam.data.typing import Flags, Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
-from anglecam.measurement.sigma import worst_case
+from anglecam.measurement.sigma import scatter, worst_case
 
 
 def series_of_angles(
@@ -65,6 +65,7 @@ def series_of_angles(
         time=time,
         angle=lines - angles.neutral,
         sigma=in_all_frames(angles.sigma),
+        sigma_random=in_all_frames(angles.uncertainty.random(scatter(time[ok], angles.line))),
         status=tuple(status),
         line=lines,
         mark_px=np.where(measured[:, None], mark_px, np.nan),

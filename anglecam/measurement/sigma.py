@@ -7,7 +7,9 @@ them is computed, at the measured arm.
 
 A worst case is not an uncertainty. The standard uncertainty combines the known sources of error (GUM 5.1.2): the noise
 of the picture, the mark's position on the pixel grid and in the codec's blocks, and the pivot, each times its
-sensitivity.
+sensitivity. Errors that differ from frame to frame are scatter, which a mean or a filter reduces. Errors of pivot, zero
+and view are common to all frames. An error that depends on the pose lies between: it scatters where the pose changes
+much from frame to frame, and not at rest. The scatter of the angles themselves says how much of it counts as random.
 """
 
 from __future__ import annotations
@@ -17,6 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+_LEAST_DIFFERENCES = 30
+"""Fewest differences from which a scatter is estimated; its standard uncertainty is then about a fifth."""
 _FAR = 4.0
 """Standard deviations beyond which a position's distance from the circle counts as an error of that frame alone."""
 
@@ -58,6 +62,68 @@ def worst_case_both_ends(radius_px: float, lever_px: ArrayLike) -> NDArray[np.fl
         rad, in the shape of ``lever_px``; π where the circles meet.
     """
     return _asin_or_pi(2.0 * radius_px, lever_px)
+
+
+@dataclass(frozen=True)
+class Sigma:
+    """Standard uncertainty of n angles, in three independent parts, rad."""
+
+    noise: NDArray[np.float64]
+    """(n,) of what differs from frame to frame even at rest."""
+    pose: NDArray[np.float64]
+    """(n,) of what is equal whenever pose and motion recur."""
+    common: NDArray[np.float64]
+    """(n,) of what all frames share."""
+
+    @property
+    def total(self) -> NDArray[np.float64]:
+        """(n,) all parts, added in squares."""
+        return np.sqrt(self.noise**2 + self.pose**2 + self.common**2)
+
+    def random(self, scatter: float) -> NDArray[np.float64]:
+        """Return the part that is independent from frame to frame, given the `scatter` of the angles, rad.
+
+        The noise counts whole. Of the part that depends on the pose there counts what the scatter shows beyond the
+        noise. Where the scatter is not known (NaN), all of it counts.
+        """
+        noise2, pose2 = float(np.median(self.noise**2)), float(np.median(self.pose**2))
+        shown = (scatter**2 - noise2) / pose2 if pose2 > 0.0 and np.isfinite(scatter) else 1.0
+        return np.sqrt(self.noise**2 + min(max(shown, 0.0), 1.0) * self.pose**2)
+
+
+def scatter(time: NDArray[np.float64], angle: NDArray[np.float64]) -> float:
+    """Estimate the standard deviation of what differs from frame to frame in a smooth motion.
+
+    Fourth differences of five evenly spaced frames remove any cubic; of independent errors they have √70 times the
+    standard deviation. A motion that is not smooth makes the estimate larger.
+
+    Parameters
+    ----------
+    time : ndarray
+        (n,) s, increasing.
+    angle : ndarray
+        (n,) rad.
+
+    Returns
+    -------
+    float
+        rad, from the median of the absolute differences; NaN with fewer than `_LEAST_DIFFERENCES`.
+
+    Examples
+    --------
+    >>> time = np.arange(3000) / 30
+    >>> noise = 1e-3 * np.random.default_rng(0).standard_normal(3000)
+    >>> round(float(1e3 * scatter(time, 0.2 * np.sin(3.0 * time) + noise)), 1)
+    1.0
+    """
+    if len(time) < _LEAST_DIFFERENCES + 4:
+        return float("nan")
+    steps = np.lib.stride_tricks.sliding_window_view(np.diff(time), 4)
+    even = np.ptp(steps, axis=1) < 0.5 * steps.min(axis=1)  # no frame is missing; time stamps may be rounded
+    differences = np.diff(angle, n=4)[even]
+    if len(differences) < _LEAST_DIFFERENCES:
+        return float("nan")
+    return 1.4826 * float(np.median(np.abs(differences))) / np.sqrt(70.0)
 
 
 @dataclass(frozen=True)
@@ -124,7 +190,7 @@ def angle_sigma(
     pivot_covariance_px2: NDArray[np.float64],
     errors: PlaceErrors,
     neutral: NDArray[np.bool_] | None,
-) -> NDArray[np.float64]:
+) -> Sigma:
     """Return the standard uncertainty of the angle from neutral in each frame.
 
     With t the unit vector along the path and R the lever arm, an error e of the position rotates the line by t·e/R,
@@ -134,7 +200,7 @@ def angle_sigma(
         u² = [noise² + noise₀²/n₀ + pose²·(1 + 1/k − 2ρ/k) + (t − t₀)ᵀ·C·(t − t₀)] / R²
 
     where k is the number of poses in neutral and ρ = exp(−d²/2) is the correlation of a pose's error over a distance of
-    d pixels.
+    d pixels. noise₀ and C are common to all frames.
 
     Parameters
     ----------
@@ -149,14 +215,14 @@ def angle_sigma(
 
     Returns
     -------
-    ndarray
+    Sigma
         (n,) rad.
     """
     arm = mark_px - pivot_px
     lever = np.hypot(*arm.T)
     along = np.column_stack([-arm[:, 1], arm[:, 0]]) / lever[:, None]
     if neutral is None:
-        place = errors.noise_px**2 + errors.pose_px**2
+        pose, rest = np.full(len(lever), errors.pose_px**2), 0.0
         direction = along
     else:
         distance2 = ((mark_px - mark_px[neutral].mean(axis=0)) ** 2).sum(axis=1)
@@ -164,10 +230,9 @@ def angle_sigma(
         rest = float((errors.noise_px[neutral] ** 2).mean()) / int(neutral.sum())
         # the mean over many poses has a small error, and shares little of it with any single pose
         pose = errors.pose_px**2 * (1.0 + 1.0 / poses - 2.0 / poses * np.exp(-distance2 / 2.0))
-        place = errors.noise_px**2 + rest + pose
         direction = along - along[neutral].mean(axis=0)
     pivot = np.einsum("ni,ij,nj->n", direction, pivot_covariance_px2, direction)
-    return np.sqrt(place + pivot) / lever
+    return Sigma(errors.noise_px / lever, np.sqrt(pose) / lever, np.sqrt(rest + pivot) / lever)
 
 
 def _asin_or_pi(reach_px: float, lever_px: ArrayLike) -> NDArray[np.float64]:

@@ -78,7 +78,8 @@ def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[floa
     """Find every motion from one rest to another, and its figures.
 
     A rest is an interval in which the angle stays in a narrow band without curvature or drift, and which lasts at least
-    as long as the rises before and after it. A turning point of a swing and a short pause are not rests.
+    as long as the rises before and after it. A turning point of a swing and a short pause are not rests. A motion that
+    goes beyond its end by more than its height is an excursion: no stable system of second order answers a step so.
 
     Parameters
     ----------
@@ -87,7 +88,8 @@ def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[floa
     angle : ndarray
         (n,) rad; NaN where it was not measured.
     sigma : ndarray
-        (n,) standard uncertainty, rad; where it is NaN, it is estimated from the angle's second differences.
+        (n,) standard deviation of what differs from frame to frame, rad; where it is NaN, it is estimated from the
+        angle's second differences.
     changes : sequence of float
         Times at which a command changed, s, where they are known. A response then begins at the last change before the
         angle leaves its rest. A motion during which the command changed again is no response to one change and is
@@ -112,9 +114,16 @@ def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[floa
         leaves = t[before.last + int(np.argmax(away))]
         causes = [c for c in changes if t[before.first] <= c <= leaves]
         again = any(leaves < c < t[after.first] for c in changes)
-        if abs(after.level - before.level) >= _LEAST_WAY * band and not again:
+        if abs(after.level - before.level) >= _LEAST_WAY * band and not again and not _is_excursion(y, before, after):
             found.append(_response(t, y, s, before, after, causes[-1] if causes else None, frame))
     return tuple(found)
+
+
+def _is_excursion(y: Floats, before: _Rest, after: _Rest) -> bool:
+    """Return whether the angle between two rests overshoots either by more than 100 % of the way."""
+    way = after.level - before.level
+    share = (y[before.last : after.first + 1] - before.level) / way
+    return bool(share.max() > 2.0 or share.min() < -1.0)
 
 
 def responses_as_dicts(answers: Sequence[Response]) -> list[dict[str, dict[str, float]]]:

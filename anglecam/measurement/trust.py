@@ -185,6 +185,36 @@ def why_elsewhere(detections: Detections, rig: Rig) -> str | None:
     )
 
 
+def why_still(detections: Detections, ok: Flags, rig: Rig) -> str | None:
+    """Return a message where the mark that the rig declares stands still: another thing is meant, or none moves.
+
+    Parameters
+    ----------
+    detections : Detections
+        The coarse pass.
+    ok : ndarray
+        (frames,) the measured frames.
+    rig : Rig
+        Declares the mark by a place or by its colour.
+
+    Returns
+    -------
+    str or None
+        With place and travel; ``None`` where no mark is declared.
+    """
+    if rig.mouth == "auto" or detections.body is not None:
+        return None
+    places = detections.places_px[ok]
+    places = places[np.isfinite(places).all(axis=1)]
+    if len(places) == 0 or travel(places) >= _TRAVEL_PX:
+        return None
+    x, y = detections.lens.distort(np.median(places, axis=0))
+    return (
+        f"the declared mark stands still: around {x:.0f},{y:.0f} it travels {travel(places):.2g} px RMS;"
+        " declare what turns: mark: {at: [x, y], frame: k} in rig.yaml"
+    )
+
+
 def why_unproven(detections: Detections, *, hand_held: bool) -> str | None:
     """Return a message where nothing shows that what is followed is the mark.
 

@@ -84,7 +84,7 @@ def _from_marker(series: AngleSeries) -> AngleSeries | None:
     )
     sigma = np.where(ok, scatter, np.nan)
     pivot = np.where(ok[:, None], np.asarray(marker_px), np.nan)
-    return replace(series, angle=angle, line=line, sigma=sigma, pivot_px=pivot)
+    return replace(series, angle=angle, line=line, sigma=sigma, sigma_random=sigma, pivot_px=pivot)
 
 
 def _about_marker(series: AngleSeries) -> Floats:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from anglecam.data.command import Command
+from anglecam.data.series import AngleSeries
 from anglecam.errors import printable
 from anglecam.io.session import SERIES_ENDING
 from anglecam.measurement.clip import Measurement
@@ -78,7 +79,7 @@ def write_clip_html(
         "measure.html",
         contents=contents,
         made=made,
-        curves=curves_as_dict([recording], {"angle": angle_plot([recording]), "sigma": sigma_plot()}),
+        curves=curves_as_dict([recording], {"angle": angle_plot([recording]), "sigma": sigma_plot(recording)}),
         name=name,
         by=measurement.by,
         pivot=measurement.pivot,
@@ -87,6 +88,7 @@ def write_clip_html(
         measured=int(ok.sum()),
         frames=len(ok),
         sigma=_median_sigma(measurement),
+        common=common_part(series),
         bounded=bool(series.bounds),
         plots={"angle": "Angle", "sigma": "Standard uncertainty"},
         drawn={"angle": angle_panel(series), "sigma": sigma_panel(series)},
@@ -109,6 +111,12 @@ def write_thumbnail(folder: Path, measurement: Measurement | MeasuredTracks, fil
     if image is not None:
         path = folder / f"{measurement.series.name}{THUMBNAIL_ENDING}"
         path.write_bytes(thumbnail(image, THUMBNAIL_PX))
+
+
+def common_part(series: AngleSeries) -> str:
+    """Return the common part of the uncertainty as a scale, such as ``2.1 %``; empty where it is not known."""
+    share = series.common_share
+    return f"{100.0 * share:.2g} %" if np.isfinite(share) else ""
 
 
 def _median_sigma(measurement: Measurement | MeasuredTracks) -> str:

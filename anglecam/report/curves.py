@@ -70,14 +70,18 @@ class Columns:
 
 
 SIGMA_BAND = Band("95 % interval (1.96 σ)", SHADE, "sigma", "angle", NORMAL_95)
-"""What is known of a measured angle."""
+"""What is known of a measured angle whose uncertainty is not divided into parts."""
+RANDOM_BAND = Band("95 % interval of the random part", SHADE, "random", "angle", NORMAL_95)
+"""What differs from frame to frame."""
+TOTAL_BAND = Band("95 % interval with the common part", "#e3e7ec", "sigma", "angle", NORMAL_95, shown=False)
+"""Also what all frames share."""
 
 
 def angle_plot(series: Sequence[Columns], curves: Sequence[Curve] = ()) -> Plot:
     """Return the plot of the measured angle, with its uncertainty and, on demand, its worst-case bounds."""
     names = {name for one in series for name in one.columns}
     command = [Curve("command", "command", COMMAND, "step")] if "command" in names else []
-    bands = [SIGMA_BAND] if "sigma" in names else []
+    bands = [TOTAL_BAND, RANDOM_BAND] if "random" in names else [SIGMA_BAND] if "sigma" in names else []
     radii = sorted((n for n in names if n.startswith("bound")), key=lambda n: float(n.removeprefix("bound")))
     bands += [
         Band(f"worst case, mark off by {n.removeprefix('bound')} px", "#f3e3c3", n, "angle", shown=False)
@@ -86,9 +90,11 @@ def angle_plot(series: Sequence[Columns], curves: Sequence[Curve] = ()) -> Plot:
     return Plot("angle, °", (*command, *curves, Curve("angle", "angle", MEASURED)), tuple(bands))
 
 
-def sigma_plot() -> Plot:
-    """Return the plot of the standard uncertainty."""
-    return Plot("σ, °", (Curve("sigma", "σ of the angle", AFTER),), from_zero=True)
+def sigma_plot(columns: Columns) -> Plot:
+    """Return the plot of the standard uncertainty, in its two parts where they are known."""
+    parts = (Curve("common", "common part", COMMAND), Curve("random", "random part", AFTER))
+    whole = (Curve("sigma", "σ of the angle", AFTER),)
+    return Plot("σ, °", parts if "random" in columns.columns else whole, from_zero=True)
 
 
 def series_columns(series: AngleSeries, command: Floats | None = None) -> dict[str, Floats]:
@@ -104,12 +110,14 @@ def series_columns(series: AngleSeries, command: Floats | None = None) -> dict[s
     Returns
     -------
     dict of str to (n,) ndarray
-        ``time`` in s, and in degrees ``angle`` and, where there are any, ``sigma``, ``bound6``, ``bound10``, …,
-        ``command``.
+        ``time`` in s, and in degrees ``angle`` and, where there are any, ``sigma``, its parts ``random`` and
+        ``common``, ``bound6``, ``bound10``, …, ``command``.
     """
     found = {"time": series.time, "angle": np.degrees(series.angle)}
     if np.isfinite(series.sigma).any():
         found["sigma"] = np.degrees(series.sigma)
+    if series.sigma_random is not None:
+        found |= {"random": np.degrees(series.sigma_random), "common": np.degrees(series.sigma_common)}
     found |= {f"bound{radius:g}": np.degrees(bound) for radius, bound in series.bounds.items()}
     return found if command is None else found | {"command": np.degrees(command)}
 

@@ -13,6 +13,7 @@ matplotlib.use("Agg")  # draws without a display
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -59,12 +60,18 @@ def plot_series(series: AngleSeries, path: Path) -> None:
         _draw_angle(top, series)
         top.set_ylabel("angle from neutral, °")
         top.set_title(printable(series.name), parse_math=False)
-        figure.legend(*top.get_legend_handles_labels(), loc="outside upper right", ncols=3, fontsize=8)
         _draw_sigma(bottom, series)
+        figure.legend(*_labels(top, bottom), loc="outside upper right", ncols=3, fontsize=8)
         bottom.set_xlabel("time on the clip's clock, s")
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=110, format="png")
         plt.close(figure)
+
+
+def _labels(*axes: Axes) -> tuple[list[Artist], list[str]]:
+    """Return handles and labels of several axes for one legend."""
+    each = [one.get_legend_handles_labels() for one in axes]
+    return [handle for handles, _ in each for handle in handles], [label for _, labels in each for label in labels]
 
 
 def angle_panel(series: AngleSeries) -> str:
@@ -93,9 +100,13 @@ def panel(ylabel: str, draw: Callable[[Axes], None], xlabel: str = "time, s") ->
 
 
 def _draw_angle(axes: Axes, series: AngleSeries) -> None:
-    degrees, half = np.degrees(series.angle), NORMAL_95 * np.degrees(series.sigma)
+    parted = series.sigma_random is not None
+    shaded = series.sigma if series.sigma_random is None else series.sigma_random
+    degrees, half = np.degrees(series.angle), NORMAL_95 * np.degrees(shaded)
     if np.isfinite(half).any():
-        label = "95 % interval (1.96 σ)"
+        share = series.common_share
+        common = f"; {100.0 * share:.2g} % of the angle in common" if np.isfinite(share) else ""
+        label = f"95 % interval of the random part{common}" if parted else "95 % interval (1.96 σ)"
         axes.fill_between(series.time, degrees - half, degrees + half, color=SHADE, label=label)
     axes.plot(series.time, degrees, color=MEASURED, lw=1.0, marker=".", ms=2, label="angle")
     lost = ~series.ok
@@ -106,7 +117,11 @@ def _draw_angle(axes: Axes, series: AngleSeries) -> None:
 
 
 def _draw_sigma(axes: Axes, series: AngleSeries) -> None:
-    axes.plot(series.time, np.degrees(series.sigma), color=AFTER, lw=1.0)
+    if series.sigma_random is None:
+        axes.plot(series.time, np.degrees(series.sigma), color=AFTER, lw=1.0)
+    else:
+        axes.plot(series.time, np.degrees(series.sigma_common), color=COMMAND, lw=1.0, label="common part")
+        axes.plot(series.time, np.degrees(series.sigma_random), color=AFTER, lw=1.0, label="random part")
     axes.set(ylabel="σ, °", ylim=(0.0, None))
 
 

@@ -160,7 +160,8 @@ def write_measurement(
     command = on_clip_clock(command, offset_of(command, series.evidence.lamp_s))
     write_series(series, out / f"{series.name}{SERIES_ENDING}")
     changes = [] if command is None else command.time[1:][np.diff(command.angle) != 0.0].tolist()
-    answers = responses(series.time, series.angle, series.sigma, changes)
+    noise = series.sigma if series.sigma_random is None else series.sigma_random
+    answers = responses(series.time, series.angle, noise, changes)
     if answers:
         write_json(out / f"{series.name}.responses.json", responses_as_dicts(answers))
     plot_series(series, out / f"{series.name}.png")

@@ -11,19 +11,19 @@ import time
 import pytest
 
 from anglecam.batch.run import Options
-from anglecam.errors import RigError
+from anglecam.errors import InputError, RigError
 from support.dask_cluster import dask_cluster
 from support.measured_here import run_batch
-from support.tiny import batch_command, children, is_alive, results, tiny_lab
+from support.tiny import batch_command, children, is_alive, results, tiny_clip, tiny_lab
 
 pytest.importorskip("distributed")
 
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory):
-    """Start a scheduler and two workers as a user does; the last test that uses them kills one."""
+    """Start a scheduler and two workers as a user does; the last tests that use them kill one, and the scheduler."""
     with dask_cluster(tmp_path_factory.mktemp("cluster")) as started:
-        yield started.address, started.workers
+        yield started
 
 
 @pytest.fixture(scope="module")
@@ -39,8 +39,9 @@ def without_dask(lab, tmp_path_factory):
     return results(out)
 
 
+@pytest.mark.sweep  # beside a batch without Dask: `test_a_batch_that_is_killed_and_resumed_…` of `test_kill.py`
 def test_what_workers_finish_while_the_batch_is_killed_is_not_measured_again(cluster, lab, without_dask, tmp_path):
-    (address, _), out = cluster, tmp_path / "out"
+    address, out = cluster.address, tmp_path / "out"
     batch = subprocess.Popen(batch_command(lab, "--out", out, "--dask", address, "--quiet"))
     until = time.monotonic() + 120.0
     unfinished = out / ".anglecam" / "unfinished"
@@ -60,7 +61,7 @@ def test_what_workers_finish_while_the_batch_is_killed_is_not_measured_again(clu
 
 
 def test_a_worker_that_is_killed_loses_no_clip(cluster, lab, without_dask, tmp_path):
-    (address, workers), out = cluster, tmp_path / "out"
+    address, workers, out = cluster.address, cluster.workers, tmp_path / "out"
     killed = []
 
     def kill_one():
@@ -81,6 +82,43 @@ def test_a_worker_that_is_killed_loses_no_clip(cluster, lab, without_dask, tmp_p
     assert not result.problems
     assert [row.status for row in result.rows] == ["ok"] * 6
     assert results(out) == without_dask
+
+
+def test_a_lost_scheduler_ends_the_batch_in_one_line_and_good_results_stay(cluster, tmp_path):
+    lab, out, here = tiny_lab(tmp_path / "lab", ["a.avi"]), tmp_path / "out", Options(jobs=1, quiet=True)
+    assert not run_batch([str(lab)], out, here).problems
+    good = (out / "a.angles.csv").read_bytes()
+    tiny_clip(lab / "b.avi", 1)
+
+    def kill():
+        while not list((out / ".anglecam" / "unfinished").glob("*/*/out")):  # a worker measures
+            time.sleep(0.005)
+        cluster.scheduler.kill()
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    with pytest.raises(InputError, match=r"^--dask .*: the scheduler is lost \(.*\); the same call goes on from here$"):
+        run_batch([str(lab)], out, Options(jobs=1, quiet=True, dask=cluster.address))
+    killer.join()
+    assert (out / "a.angles.csv").read_bytes() == good
+    assert [row.status for row in run_batch([str(lab)], out, here).rows] == ["ok", "ok"]
+
+
+@pytest.mark.sweep  # one clip, so that the loss is noticed elsewhere: the test before
+def test_a_scheduler_that_is_lost_when_it_is_asked_for_its_workers_is_named_in_one_line(tmp_path):
+    lab = tiny_lab(tmp_path / "lab", [f"{k}.avi" for k in range(8)])  # more than the workers get at once
+    with dask_cluster(tmp_path) as cluster:
+
+        def kill():
+            while not list((tmp_path / "out").glob("*.angles.csv")):
+                time.sleep(0.005)
+            cluster.scheduler.kill()
+
+        killer = threading.Thread(target=kill)
+        killer.start()
+        with pytest.raises(InputError, match=r"^--dask .*: the scheduler is lost \(.*\); the same call goes on from"):
+            run_batch([str(lab)], tmp_path / "out", Options(jobs=1, quiet=True, dask=cluster.address))
+        killer.join()
 
 
 def test_an_invalid_scheduler_address_is_refused_at_once(tmp_path):

@@ -33,7 +33,9 @@ from support.tiny import results
 pytestmark = pytest.mark.usefixtures("measured_here")
 
 HERE = [trial for trial in TRIALS if trial.cause is not only_another_version]
-"""`test_dask.py` sees a batch of another version refused before it measures; `benchmarks/batch_trials.py` runs all."""
+"""`test_dask.py` sees a batch of another version refused before it measures; `benchmarks/batch_trials.py` runs all.
+
+Of those in the sweep, `test_dask.py` also loses a scheduler, and `test_trouble.py` fills a disk."""
 
 
 def but(*causes):
@@ -60,7 +62,9 @@ def assert_says(call, said):
         assert part in line
 
 
-@pytest.mark.parametrize("trial", but(killed_scheduler, disk_full), ids=lambda trial: trial.cause.__name__)
+@pytest.mark.parametrize(
+    "trial", but(killed_scheduler, disk_full, other_version), ids=lambda trial: trial.cause.__name__
+)
 def test_trouble_in_the_first_batch_costs_only_what_it_concerns(trial, made, tmp_path):
     out = tmp_path / "out"
     with restored(made):
@@ -73,7 +77,9 @@ def test_trouble_in_the_first_batch_costs_only_what_it_concerns(trial, made, tmp
     assert results(out) == made.files
 
 
-@pytest.mark.parametrize("trial", but(other_version), ids=lambda trial: trial.cause.__name__)
+@pytest.mark.parametrize(
+    "trial", but(killed_scheduler, disk_full, other_version), ids=lambda trial: trial.cause.__name__
+)
 def test_trouble_in_a_second_batch_leaves_every_good_file(trial, made, tmp_path):
     out = shutil.copytree(made.out, tmp_path / "out")
     with restored(made):

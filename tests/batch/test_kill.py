@@ -56,9 +56,12 @@ def unbroken(lab, tmp_path_factory):
     return results(out)
 
 
-def test_a_batch_that_is_killed_and_resumed_gives_the_files_of_one_that_is_not_killed(lab, unbroken, tmp_path):
+@pytest.mark.parametrize("instants", [(1,), pytest.param((1, 3), marks=pytest.mark.sweep)], ids=["once", "twice"])
+def test_a_batch_that_is_killed_and_resumed_gives_the_files_of_one_that_is_not_killed(
+    lab, unbroken, tmp_path, instants
+):
     out = tmp_path / "out"
-    for done in (1, 3):
+    for done in instants:
         batch = start(lab, "--out", out, "--jobs", 2, "--quiet")
         wait_until(lambda done=done: len(list(out.glob("*/*.angles.csv"))) >= done)
         workers = children(batch.pid)

@@ -9,9 +9,10 @@ from benchmarks.blind.judged import true_values
 
 CASES = sorted(path.parent for path in Path(__file__).parent.glob("*/spec.yaml"))
 SMALL = ("0029",)
-"""Filmed in every run of the tests; tests/cli/test_app.py closes the loop on a small film with an effect."""
+"""Filmed in the sweep; `tests/cli/test_app.py` closes the loop on a small film with an effect."""
 
 
+@pytest.mark.sweep
 @pytest.mark.parametrize("name", SMALL)
 def test_a_small_film_gets_the_expected_verdict(name, tmp_path):
     case = read_case(Path(__file__).parent / name)

@@ -28,7 +28,9 @@ def test_a_seed_determines_everything_and_an_effect_changes_no_command():
 
 
 def test_noise_has_the_specified_standard_deviation_and_ar1_coefficient():
-    exact, noisy = (session({}, seed=SEED, sigma_deg=s, noise="coloured") for s in (0.0, 0.05))
+    exact, noisy = (
+        session({}, seed=SEED, sigma_deg=s, noise="coloured", names=("random", "triangle")) for s in (0.0, 0.05)
+    )
     rest = [n.angle - e.angle for n, e in zip(noisy, exact, strict=True)]
     rest = [r - r.mean() for r in rest]
     assert np.degrees(np.concatenate(rest).std()) == pytest.approx(0.05, rel=0.1)
@@ -60,7 +62,7 @@ def test_magnifying_an_effect_and_back_restores_it(name):
     "name",
     [
         "torque_saturation",
-        "rolling_shutter",
+        pytest.param("rolling_shutter", marks=pytest.mark.sweep),  # one over most of a frame is fitted below
         pytest.param("lens_distortion", marks=pytest.mark.sweep),
         pytest.param("clock_scale", marks=pytest.mark.sweep),
     ],

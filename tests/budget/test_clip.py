@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 
 from anglecam.budget.clip import budget_as_dict, budget_of, implied_lever, pixel_bound
+from anglecam.budget.gum import propagate
 from support.nod import N, nod_sources
+
+
+@pytest.fixture(autouse=True)
+def million_trials(monkeypatch):
+    """Draw a quarter of the trials, which decide these comparisons as all do."""
+    monkeypatch.setattr("anglecam.budget.clip.propagate", partial(propagate, most=1_000_000))
 
 
 def test_the_budget_states_degrees_and_is_validated_where_uncertainties_are_known():

@@ -28,7 +28,7 @@ def _spread(sources: ErrorSources, i: int, m: int = 400_000) -> float:
 def test_terms_combine_to_the_sigma_of_the_series(mirrored, neutral):
     sources, mouth = nod_sources(mirrored=mirrored, neutral=neutral)
     sigma = angle_sigma(mouth, PIVOT, COVARIANCE, PlaceErrors(sources.noise_px, sources.pose_px), neutral)
-    assert _combined(sources) == pytest.approx(sigma, rel=1e-9)
+    assert _combined(sources) == pytest.approx(sigma.total, rel=1e-9)
 
 
 @pytest.mark.parametrize("mirrored", [False, True])

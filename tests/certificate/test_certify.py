@@ -82,6 +82,7 @@ def test_a_dead_time_is_measured_and_the_lag_is_bounded_with_it():
     assert any("No lamp" in line for line in late["aliases"])
 
 
+@pytest.mark.sweep  # a dead time is measured above, and bounds of friction hold where nothing acts
 def test_sliding_and_breakaway_friction_are_measured():
     true_sizes = {"coulomb_friction": 2.0, "breakaway_friction": 2.6}
     certificate = certified(RUBBING, only=tuple(true_sizes))

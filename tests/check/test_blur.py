@@ -32,7 +32,7 @@ def _film(folder, exposure_s):
     return write(Film("swing", (frame(t) for t in TIME), times_s=TIME), folder)
 
 
-@pytest.mark.parametrize("exposure_s", [0.012, 0.025])
+@pytest.mark.parametrize("exposure_s", [pytest.param(0.012, marks=pytest.mark.sweep), 0.025])
 def test_the_exposure_is_found_within_its_uncertainty(tmp_path, exposure_s):
     found = exposure_from_blur(measure_source(open_source(_film(tmp_path, exposure_s))))
     assert found is not None

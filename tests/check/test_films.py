@@ -31,7 +31,7 @@ BALLS = {
 }
 """A ball of several sizes, lengths and colours."""
 THINGS = {name: Thing("ball", ball, tuple(SWING_DEG), f"{name}.avi") for name, ball in BALLS.items()}
-IN_SWEEP = ("small", "short")
+IN_SWEEP = ("small", "short", "pale")
 
 
 @pytest.fixture(scope="module")

@@ -36,6 +36,7 @@ def test_sizes_grow_with_the_uncertainty(sizes):
     assert coarse["coulomb_friction"] > 2.0 * sizes["coulomb_friction"].size
 
 
+@pytest.mark.sweep  # `check` proposes a command in `test_films.py`
 def test_a_command_that_shows_more_keeps_within_the_limits(sizes):
     found = best_command(plan(), TRUE, SCATTER)
     assert found is not None

@@ -5,9 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
-import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,12 +17,6 @@ from anglecam.io.series_csv import write_series
 from support import broken
 from support.drawn import Look, Plant, Recording, draw_session
 from support.series import session as make_records
-
-ANGLECAM = Path(sys.executable).parent / "anglecam"
-
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([ANGLECAM, *map(str, arguments)], capture_output=True, text=True, timeout=300, check=False)
 
 
 @pytest.fixture(scope="module")
@@ -69,11 +61,10 @@ def status(monkeypatch, capfd):
     return call
 
 
-def test_from_film_to_verdict(film, tmp_path):
+@pytest.mark.sweep  # the commands go the whole way in `test_hidden_backlash` of `tests/test_tutorials.py`, too
+def test_from_film_to_verdict(film, tmp_path, status):
     folder, truth = film
-    done = run("close", folder, "--out", tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+    assert status("close", folder, "--out", tmp_path) == (0, "")
     for name, true in truth.items():
         header, *rows = list(csv.reader((tmp_path / f"{name}.angles.csv").open()))
         assert tuple(header[: len(COLUMNS)]) == COLUMNS

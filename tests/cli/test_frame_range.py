@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
 
+from anglecam.budget.gum import propagate
 from anglecam.cli import app as cli
 from anglecam.errors import RigError
 from anglecam.io.netcdf_parquet import read_netcdf
@@ -68,7 +70,8 @@ def test_the_rows_of_a_range_keep_their_numbers_and_times(clip, tmp_path, status
     assert overlay[0].time == pytest.approx(12 / 30.0, abs=1e-3)
 
 
-def test_the_rig_files_range_holds_and_the_command_line_overrides_it(clip, tmp_path, status):
+def test_the_rig_files_range_holds_and_the_command_line_overrides_it(clip, tmp_path, status, monkeypatch):
+    monkeypatch.setattr("anglecam.budget.clip.propagate", partial(propagate, most=50_000))
     rig = tmp_path / "rig.yaml"
     rig.write_text("frames: {from: 12, to: 47}\n")
     assert status("budget", clip, "--rig", rig, "--from", 20, "--out", tmp_path) == (0, "")

@@ -9,6 +9,7 @@ import json
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, fields
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
 
 from anglecam.batch.row import Row
+from anglecam.budget.gum import propagate
 from anglecam.camera.calibrate import BoardCalibration
 from anglecam.camera.calibration import Calibration
 from anglecam.certificate.certificate_json import certificate_as_dict
@@ -95,7 +97,7 @@ def clip(tmp_path_factory) -> Path:
 def session(tmp_path_factory) -> Path:
     """Write a session of angle series of a plant that answers 40 ms late."""
     folder = tmp_path_factory.mktemp("session")
-    for record in make_records(Plant(dead_time_s=0.04), 4):
+    for record in make_records(Plant(dead_time_s=0.04), 4, duration_s=5.0):
         if record.name not in ("stairs", "chirp"):
             continue
         n = len(record.time)
@@ -140,7 +142,8 @@ def test_measure(clip, tmp_path, capsys):
     assert faults("responses", json.loads((tmp_path / "swing.responses.json").read_text())) == []
 
 
-def test_budget(clip, tmp_path, capsys):
+def test_budget(clip, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("anglecam.budget.clip.propagate", partial(propagate, most=50_000))
     status, document = call(capsys, "budget", clip, "--out", tmp_path)
     assert status == 0
     assert faults("budget.output", document) == []

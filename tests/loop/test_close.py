@@ -31,7 +31,8 @@ THREE = ("stairs", "chirp", "random")
     [
         ("late", "dead_time", "tau_s", 0.040),
         ("rubbing", "coulomb_friction", "friction_deg_per_s2", np.degrees(2.0)),
-        ("dragging", "quadratic_drag", "q_per_rad", 1.0),
+        # drag is named with its size in `tests/loop/test_windows_asked_again.py`
+        pytest.param("dragging", "quadratic_drag", "q_per_rad", 1.0, marks=pytest.mark.sweep),
     ],
 )
 def test_the_hidden_effect_is_named_with_its_true_size(closed, session_name, effect_id, name, value):
@@ -46,7 +47,8 @@ def test_the_hidden_effect_is_named_with_its_true_size(closed, session_name, eff
     assert result["effects"][0]["alias_set"][0] == effect_id
 
 
-@pytest.mark.parametrize("seed", [105, pytest.param(108, marks=pytest.mark.sweep)])
+@pytest.mark.sweep  # friction is named at another seed in `test_the_hidden_effect_is_named_with_its_true_size`
+@pytest.mark.parametrize("seed", [105, 108])
 def test_a_wrongly_predicted_breakaway_does_not_contradict_dry_friction(seed):
     # at each seed the fitted recordings do not determine the breakaway torque, or do not require it, although the
     # held-out one depends on it
@@ -67,7 +69,7 @@ def test_a_limit_that_is_reached_once_is_named_or_its_only_alias():
 
 
 def test_a_driven_body_without_its_command_is_unexplained_and_no_noisy_free_swing():
-    driven = session(TruePlant(a=5.0, b=60.0, c=55.0), 11)[3]
+    driven = session(TruePlant(a=5.0, b=60.0, c=55.0), 11, duration_s=5.0)[3]
     assert close_records([replace(driven, command=None)]).verdict == "unexplained"
 
 
@@ -86,7 +88,9 @@ def test_friction_has_no_asymmetry_unless_the_zero_is_declared():
 
 def test_two_hidden_effects_are_both_named():
     result = verdict_as_dict(
-        close_without_rivals(session(TruePlant(dead_time_s=0.03, coulomb=2.0), 12)[::2], held_out=HELD_OUT)
+        close_without_rivals(
+            session(TruePlant(dead_time_s=0.03, coulomb=2.0), 12, duration_s=5.0)[::2], held_out=HELD_OUT
+        )
     )
     assert {e["id"] for e in result["effects"]} == {"dead_time", "coulomb_friction"}
 
@@ -137,7 +141,7 @@ def test_a_clock_offset_below_zero_is_found_as_a_dead_time_below_zero():
     def lagging(record):
         return replace(record, command=replace(record.command, time=record.command.time + 0.02))
 
-    verdict = close_without_rivals([lagging(r) for r in session(TruePlant(), 15)], held_out=HELD_OUT)
+    verdict = close_without_rivals([lagging(r) for r in session(TruePlant(), 15)[::2]], held_out=HELD_OUT)
     (found,) = verdict_as_dict(verdict)["effects"]
     assert found["id"] == "dead_time"
     assert found["parameters"]["tau_s"]["value"] == pytest.approx(-0.02, abs=0.001)

@@ -17,7 +17,10 @@ STEP = np.radians(0.088)
 
 
 def closed(plant, seed):
-    records = [replace(r, angle=STEP * np.round(r.angle / STEP)) for r in session(plant, seed, sigma_deg=0.0)[::2]]
+    records = [
+        replace(r, angle=STEP * np.round(r.angle / STEP))
+        for r in session(plant, seed, sigma_deg=0.0, duration_s=5.0)[::2]
+    ]
     return close_without_rivals(records, held_out=["random"], seed=seed)
 
 
@@ -36,7 +39,7 @@ def test_rounding_alone_is_nothing_missing():
 
 
 def test_unknown_noise_is_reported_as_such():
-    records = [r.between(1.0, np.inf) for r in session(Plant(coulomb=2.0), 1)[::2]]
+    records = [r.between(1.0, np.inf) for r in session(Plant(coulomb=2.0), 1, duration_s=5.0)[::2]]
     result = verdict_as_dict(close_without_rivals(records, held_out=["random"]))
     assert result["verdict"] == "attributed"
     assert not result["noise"]["known"]

@@ -28,8 +28,8 @@ FEW = ("stairs", "release", "random")
 """Recordings that name the effect as all five of a session do; perspective is named by its alias without the others."""
 
 
-IN_EVERY_RUN = ("speed_dependent_torque", "elastic_coupling", "periodic_disturbance")
-"""One at each port: the servo's torque, additional states, and a torque over the time; the others are in the sweep."""
+IN_EVERY_RUN = ("speed_dependent_torque", "elastic_coupling")
+"""The servo's torque, and additional states; the others are in the sweep."""
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,7 @@ def scaled(record: Record, factor: float) -> Record:
     return Record(record.name, record.time, factor * record.angle, command, True, factor * record.sigma)
 
 
-@pytest.mark.parametrize("factor", [1.0, 0.05])
+@pytest.mark.parametrize("factor", [pytest.param(1.0, marks=pytest.mark.sweep), 0.05])
 def test_a_cubic_spring_of_a_fast_oscillator_is_named_in_any_unit_of_the_angle(factor):
     records = [scaled(oscillation(name, seed), factor) for name, seed in (("one", 0), ("other", 1))]
     verdict = close_without_rivals(records, held_out=["other"])

@@ -33,7 +33,7 @@ def _errors(path, truth, **declared):
         pytest.param(ball(DARK, 12.0), SWING, id="dark ball", marks=pytest.mark.sweep),
         pytest.param(ball(WHITE, 12.0), SWING, id="white ball", marks=pytest.mark.sweep),
         pytest.param(ball(GREEN, 4.0), SWING, id="small green ball"),
-        pytest.param(stick((110, 110, 112), 8.0), SWING, id="grey stick"),
+        pytest.param(stick((110, 110, 112), 8.0), SWING, id="grey stick", marks=pytest.mark.sweep),
         pytest.param(wheel(DARK), TURNS, id="wheel"),
     ],
 )

@@ -60,6 +60,7 @@ def test_a_long_film_is_measured_as_a_short_one(clip, short, look, long, monkeyp
     assert np.sqrt(np.mean((off / sigma) ** 2)) < 1.5
 
 
+@pytest.mark.sweep  # one that points to the right is measured above
 def test_a_body_that_points_to_the_left_is_learnt_ahead(long, tmp_path, monkeypatch):
     left = Look(facing="left", neutral_deg=2.0)  # its directions are on both sides of 180°
     path = tmp_path / "clip.avi"

@@ -36,7 +36,7 @@ SPEC = {
     "scene": {"lamp_px": [295, 20]},
     "declare": {"mouth": {"rgb": [190, 35, 40]}, "sync": {"lamp": [295, 20]}},
     "recordings": [
-        {"name": f"steps-{k}", "duration_s": 3.0, "command": {"kind": "random", "amplitude_deg": 12, "rest_s": rest}}
+        {"name": f"steps-{k}", "duration_s": 2.0, "command": {"kind": "random", "amplitude_deg": 12, "rest_s": rest}}
         for k, rest in enumerate(RESTS)
     ],
 }

@@ -70,6 +70,7 @@ def _all_right(measured: Measurement, truth: np.ndarray, rms_deg: float) -> None
     assert (np.abs(error) < np.degrees(measured.series.bounds[6.0])).all()
 
 
+@pytest.mark.sweep  # `test_hand_held.py` has a camera in the hand, `test_background_motion.py` one that shakes
 def test_a_shaking_camera_is_followed_by_its_scenery(tmp_path, red):
     measured, truth = _measure(tmp_path, camera={"shake": {"rms_px": 2.0}}, declare=red)
     error, sigma = _errors(measured, truth)
@@ -80,6 +81,7 @@ def test_a_shaking_camera_is_followed_by_its_scenery(tmp_path, red):
     assert np.std(measured.series.pivot_px, axis=0).min() > 0.5
 
 
+@pytest.mark.sweep  # a clip at rest is measured beside a larger mug in `test_clip.py`, stairs beside one too
 def test_one_step_beside_a_larger_swaying_mug_of_the_lips_colour_is_measured_from_its_rest_on(tmp_path):
     measured, truth = _measure(
         tmp_path,
@@ -95,6 +97,7 @@ def test_one_step_beside_a_larger_swaying_mug_of_the_lips_colour_is_measured_fro
     assert np.std(error / sigma) < 2.0
 
 
+@pytest.mark.sweep  # a drawn head is hidden for a while in `test_clip.py`
 def test_only_what_is_hidden_is_occluded_and_no_wrong_row_is_ok(tmp_path, red):
     scene = {"occluders": [{"from_s": 1.2, "for_s": 0.5}]}
     measured, truth = _measure(tmp_path, seconds=3.0, command=SWING | {"period_s": 1.6}, scene=scene, declare=red)
@@ -111,6 +114,7 @@ def test_a_declared_exposure_of_60_percent_of_the_interval_costs_no_row_and_is_i
     _all_right(measured, truth, 0.02)
 
 
+@pytest.mark.sweep  # a declared tilt leaves the angle exact in `tests/camera/test_lens.py`
 def test_a_declared_tilt_is_undone_for_parts_at_every_height(tmp_path, red):
     measured, truth = _measure(
         tmp_path,
@@ -142,12 +146,13 @@ def test_a_declared_rolling_shutter_moves_the_time_of_each_row(tmp_path, red):
     assert np.sqrt((error**2).mean()) < 0.02
 
 
+@pytest.mark.sweep  # a declared colour that is off is found in `tests/measurement/test_clip.py`
 @pytest.mark.parametrize(
     ("camera", "rms_deg"),
     [
         ({"codec": "h264", "crf": 20, "noise_grey": 5.0, "focus_blur_px": 0.8}, 0.1),
         # every pixel with noise of its own: by one alone lips and skin are hardly told apart
-        pytest.param({"codec": "ffv1", "noise_grey": 2.4, "focus_blur_px": 0.1}, 0.01, marks=pytest.mark.sweep),
+        ({"codec": "ffv1", "noise_grey": 2.4, "focus_blur_px": 0.1}, 0.01),
     ],
 )
 def test_brick_red_lips_on_brown_skin_are_found_by_the_colour_that_is_declared(tmp_path, camera, rms_deg):

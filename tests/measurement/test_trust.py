@@ -102,7 +102,7 @@ def test_a_swing_too_small_to_show_its_pivot_is_right_within_sigma_or_refused(tm
 SCREWS = [
     (screw, amplitude_deg) for screw in ((120, 60), (120, 45), (150, 30), (90, 40)) for amplitude_deg in (2.5, 4.0)
 ]
-FEW = (((120, 60), 2.5), ((90, 40), 4.0))
+FEW = (((120, 60), 2.5),)
 
 
 @pytest.mark.parametrize(

@@ -89,7 +89,9 @@ def test_every_impossible_constant_is_reported():
         known(PAPER, {"Q": 1.0})
 
 
-@pytest.mark.parametrize("route", [by_inertia, by_inertia_and_motor, by_motor])
+@pytest.mark.parametrize(
+    "route", [by_inertia, *(pytest.param(r, marks=pytest.mark.sweep) for r in (by_inertia_and_motor, by_motor))]
+)
 def test_propagated_uncertainty_agrees_with_monte_carlo(route):
     # a, b and c of a fit are correlated; mass and arm are in inertia and weight alike
     sigma, correlation = np.array([0.3, 4.0, 5.0]), np.array([[1.0, 0.5, 0.7], [0.5, 1.0, 0.9], [0.7, 0.9, 1.0]])

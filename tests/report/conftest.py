@@ -2,13 +2,11 @@
 
 import pytest
 
-from anglecam.loop.close import close_records
 from anglecam.loop.verdict import Verdict
-from support.motion import Plant
-from support.series import session
+from support.closed import ClosedSessions
 
 
 @pytest.fixture(scope="session")
-def dragged() -> Verdict:
+def dragged(closed: ClosedSessions) -> Verdict:
     """Return the verdict on steps, a triangle and random steps of a body with drag, none of them held out."""
-    return close_records(session(Plant(quadratic_drag=2.0), 21)[::2])
+    return closed("dragging, none held out")

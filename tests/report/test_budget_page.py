@@ -78,7 +78,7 @@ def test_the_page_holds_the_numbers_and_the_figures(written):
     assert "nan" not in read.replace("provenance", "")
 
 
-@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("width", [pytest.param(1280, marks=pytest.mark.sweep), 390])
 def test_no_table_is_cut(written, width):
     _, _, out = written
     with chromium() as browser:

@@ -38,7 +38,7 @@ def browser():
         yield started
 
 
-@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("width", [pytest.param(1280, marks=pytest.mark.sweep), 390])
 def test_nothing_is_cut_and_every_quantity_has_a_figure_that_can_be_read(page_file, browser, width):
     page = browser.new_page(viewport={"width": width, "height": 900})
     page.goto(page_file.as_uri())

@@ -167,7 +167,7 @@ def test_a_recording_without_a_film_has_curves_and_no_pictures(opened, verdict):
     assert section.locator(".film").is_hidden()
 
 
-@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("width", [pytest.param(1280, marks=pytest.mark.sweep), 390])
 def test_nothing_is_asked_of_the_network_and_nothing_lies_beside_the_screen(browser, report, width):
     watched = Watched(browser, report, width)
     assert watched.overflow() == 0

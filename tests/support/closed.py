@@ -62,7 +62,8 @@ CANONICAL = {
     ),
     **{  # nothing is hidden, and every other one's noise is coloured
         f"clean {seed}": Canonical(
-            lambda seed=seed: session(Plant(), seed, phi=0.6 * (seed % 2)), {"held_out": ["random"], "seed": seed}
+            lambda seed=seed: session(Plant(), seed, phi=0.6 * (seed % 2), duration_s=5.0),
+            {"held_out": ["random"], "seed": seed},
         )
         for seed in range(4)
     },

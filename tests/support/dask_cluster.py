@@ -67,7 +67,7 @@ def dask_cluster(folder: Path, versions: Sequence[str | None] = (None, None)) ->
             process.terminate()
         for process in (*workers, scheduler):
             try:
-                process.wait(3)
+                process.wait(1)
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()

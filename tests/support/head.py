@@ -101,8 +101,8 @@ class Head:
         side = 2 * self._half + 1
         shape, lever = (side, side), self.look.lever_px * FINE
         skin, hair = (np.array(c, np.float32) for c in SKIN[self.look.skin])
-        v, h = np.mgrid[0:side, 0:side].astype(np.float32)
-        forward, up = (h - self._half) / lever, (self._half - v) / lever
+        along = np.arange(side, dtype=np.float32)
+        forward, up = (along[None, :] - self._half) / lever, (self._half - along[:, None]) / lever
         shade = 1 - 0.10 * np.clip(0.5 - forward, 0, 1.2) - 0.12 * np.clip(0.1 - up, 0, 0.6)
         shade = shade * (1 + 0.035 * relief(rng, shape, 0.22 * lever) + 0.02 * relief(rng, shape, 1.5 * FINE))
         freckles = np.clip(relief(rng, shape, 0.02 * lever) - 1.6, 0, 1)
@@ -112,11 +112,17 @@ class Head:
         face *= 1 - np.array([0.0, 0.10, 0.09], np.float32) * blush[..., None]
         strands = relief(rng, (side, side), 0.012 * lever) + np.sin(60 * np.hypot(forward + 0.1, up - 0.2))
         locks = hair * (1 + 0.22 * strands[..., None])
-        lips = np.array(self.look.lips_rgb, np.float32) * (1 + 1.2 * (up - 0.12) + 0.5 * (forward - 0.97))[..., None]
         seam = self._mask([(0.87, 0.124), (0.95, 0.130), (1.03, 0.124)], smooth=False, width=0.014)
-        lips *= 1 - 0.5 * seam[..., None]
-        iris = ((forward - 0.80) ** 2 + (up - 0.508) ** 2 < 0.032**2)[..., None]
-        eye = np.where(iris, np.float32([52, 62, 40]), np.float32([232, 230, 226]))
+
+        def lips(rows: slice, columns: slice) -> np.ndarray:
+            light = 1 + 1.2 * (up[rows] - 0.12) + 0.5 * (forward[:, columns] - 0.97)
+            red = np.array(self.look.lips_rgb, np.float32) * light[..., None]
+            return red * (1 - 0.5 * seam[rows, columns][..., None])
+
+        def eye(rows: slice, columns: slice) -> np.ndarray:
+            iris = ((forward[:, columns] - 0.80) ** 2 + (up[rows] - 0.508) ** 2 < 0.032**2)[..., None]
+            return np.where(iris, np.float32([52, 62, 40]), np.float32([232, 230, 226]))
+
         jaw = self._mask([(0.50, -0.13), (0.22, -0.02), (0.10, 0.16)], smooth=False, width=0.02)
         nostril = self._mask([(1.00, 0.232), (1.05, 0.238)], smooth=False, width=0.02)
 
@@ -133,6 +139,7 @@ class Head:
         ]:
             x, y, w, h = cv2.boundingRect((cover > 0).view(np.uint8))  # most parts cover little of the head
             box = slice(y, y + h), slice(x, x + w)
-            rgb[box] += cover[box][..., None] * (np.broadcast_to(colour, rgb.shape)[box] - rgb[box])
+            paint = colour(*box) if callable(colour) else np.broadcast_to(colour, rgb.shape)[box]
+            rgb[box] += cover[box][..., None] * (paint - rgb[box])
             alpha[box] += cover[box] * (1 - alpha[box])
         return np.dstack([rgb[..., ::-1], alpha])

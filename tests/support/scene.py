@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import cv2
@@ -90,6 +91,7 @@ def background(look: Look) -> np.ndarray:
 
 @lru_cache(maxsize=2)
 def _prepared(look: Look) -> tuple[Head, np.ndarray]:
+    """Prepare a look; its noise, marker and distractor are added to each picture."""
     return Head(look), background(look)
 
 
@@ -98,7 +100,9 @@ class Scene:
 
     def __init__(self, look: Look) -> None:
         self.look = look
-        self.head, self._still = _prepared(look)
+        self.head, self._still = _prepared(
+            replace(look, noise=0.0, marker="none", marker_radius_px=1.0, distractor=None)
+        )
         low = np.maximum(np.floor(look.pivot - self.head.reach).astype(int), 0)
         high = np.minimum(np.ceil(look.pivot + self.head.reach).astype(int) + 1, SIZE)
         self._corner, self._size = (int(low[0]), int(low[1])), (int(high[0] - low[0]), int(high[1] - low[1]))

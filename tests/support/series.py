@@ -40,8 +40,10 @@ def record(
     return Record(recording.name, time, angle, command, False, np.full(len(time), np.nan))
 
 
-def session(plant: Plant, seed: int, *, sigma_deg: float = 0.05, phi: float = 0.0) -> list[Record]:
+def session(
+    plant: Plant, seed: int, *, sigma_deg: float = 0.05, phi: float = 0.0, duration_s: float = 8.0
+) -> list[Record]:
     """Return records of steps, stairs, triangle, chirp and random steps; the last is meant to be held out."""
     rng = np.random.default_rng(seed)
     kinds = ("steps", "stairs", "triangle", "chirp", "random")
-    return [record(plant, Recording(kind, kind), rng, sigma_deg=sigma_deg, phi=phi) for kind in kinds]
+    return [record(plant, Recording(kind, kind, duration_s), rng, sigma_deg=sigma_deg, phi=phi) for kind in kinds]

@@ -12,8 +12,8 @@ from synth.spec import Spec
 TIMES = np.linspace(0.0, 3.0, 1501)
 
 
-OF_A_NECK = ("step", "nod")
-"""Commands by which the neck moves too; by the others it does in the sweep."""
+OF_A_NECK, OF_THE_PLANT = ("nod",), ("step", "chirp", "free", "random")
+"""Commands by which each moves; by the others it does in the sweep."""
 
 
 def step_response(times: np.ndarray, at: float, level: float) -> np.ndarray:
@@ -52,7 +52,7 @@ def test_a_released_head_rests_until_its_release_and_then_swings_about_zero():
     ("effects", "potential"),
     [
         ({}, lambda th: 0.0),
-        ({"stiffening_spring": {"k3": 3000.0}}, lambda th: 750.0 * th**4),
+        pytest.param({"stiffening_spring": {"k3": 3000.0}}, lambda th: 750.0 * th**4, marks=pytest.mark.sweep),
         ({"one_sided_spring": {"stiffness": 400.0, "slack_deg": 2.0}}, lambda th: slack_energy(th, 400.0, 2.0)),
         ({"constant_torque": {"torque": 12.0}}, lambda th: -12.0 * th),
     ],
@@ -115,7 +115,7 @@ def test_a_motion_is_defined_a_second_before_and_after_for_times_of_any_shape():
 @pytest.mark.parametrize(
     ("plant", "kind"),
     [
-        *(("linear", kind) for kind in COMMANDS),
+        *(pytest.param("linear", kind, marks=() if kind in OF_THE_PLANT else pytest.mark.sweep) for kind in COMMANDS),
         *(pytest.param("neck", kind, marks=() if kind in OF_A_NECK else pytest.mark.sweep) for kind in COMMANDS),
     ],
 )

@@ -202,7 +202,11 @@ def test_through_the_linkage_the_head_settles_at_the_commanded_crank_angle():
 
 
 @pytest.mark.parametrize(
-    "effects", [{"linkage_geometry": {"share": 0.6}}, {"gravity_geometry": {"strength": 190.0, "gravity_deg": 45.0}}]
+    "effects",
+    [
+        pytest.param({"linkage_geometry": {"share": 0.6}}, marks=pytest.mark.sweep),
+        {"gravity_geometry": {"strength": 190.0, "gravity_deg": 45.0}},
+    ],
 )
 def test_geometry_vanishes_with_the_amplitude_in_the_second_order(effects):
     times = np.linspace(0.7, 2.0, 400)

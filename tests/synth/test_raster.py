@@ -161,12 +161,13 @@ def test_bands_of_rows_are_the_whole_picture_bit_for_bit(quality):
 @pytest.mark.parametrize("quality", ONE_QUALITY)
 def test_a_layer_of_what_does_not_move_leaves_every_bit_as_it_is(quality):
     rest, rows = dataclasses.replace(pinhole(160, 120, 50.0, SLANTED), k1=0.2), slice(0, 120)
-    shaken, raster = rest.shaken(0.4, -0.7, 0.01), Raster(build(SPEC), rest, quality, 1.0)
+    parts = build(SPEC)
+    shaken, raster = rest.shaken(0.4, -0.7, 0.01), Raster(parts, rest, quality, 1.0)
     # the layer is drawn with the second picture from one place, and again after the camera has moved
     views = [(rest, 0.0, rows), (rest, 0.2, rows), (rest, -0.2, rows), (rest, 0.1, slice(20, 70)), (rest, 0.1, rows)]
     for camera, angle, band in [*views, (shaken, 0.1, rows), (shaken, 0.12, rows), *views]:
         placed = poses(SPEC.rig, angle)
-        alone = Raster(build(SPEC), rest, quality, 1.0).draw(camera, placed, band)
+        alone = Raster(parts, rest, quality, 1.0).draw(camera, placed, band)
         np.testing.assert_array_equal(raster.draw(camera, placed, band), alone)
 
 

@@ -162,7 +162,7 @@ def test_a_film_with_fewer_frames_than_its_container_states_is_sampled_as_densel
 
 def test_of_a_long_film_whose_pictures_are_predicted_key_frames_alone_are_sampled(monkeypatch, tmp_path):
     clip = tmp_path / "clip.mp4"
-    wall = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 255, (480, 640, 3), np.uint8), (0, 0), 2.0)
+    wall = cv2.GaussianBlur(np.random.default_rng(0).integers(0, 255, (240, 320, 3), np.uint8), (0, 0), 2.0)
     encode(clip, (np.roll(wall, k, axis=1) for k in range(300)), options={"g": "2"})
     whole = list(open_film(clip).frames())
     monkeypatch.setattr(film_rows, "MOST_BYTES", 30 * whole[0].image.size)
@@ -180,7 +180,7 @@ def test_of_a_long_film_whose_pictures_are_predicted_key_frames_alone_are_sample
     assert [frame.time for frame in film.frames()] == [frame.time for frame in whole]
 
 
-@pytest.mark.parametrize("damage", [0, 1, *(pytest.param(k, marks=pytest.mark.sweep) for k in (2, 3))])
+@pytest.mark.parametrize("damage", [0, *(pytest.param(k, marks=pytest.mark.sweep) for k in (1, 2, 3))])
 def test_a_damaged_film_has_the_rows_that_one_thread_decodes(tmp_path, monkeypatch, damage):
     clip = tmp_path / "clip.mp4"
     encode(clip, draw_frames(Look(), np.linspace(-8.0, 8.0, 60)), options={"bf": "3", "g": "20"})

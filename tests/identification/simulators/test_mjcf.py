@@ -34,7 +34,7 @@ EXPRESSED = {
 """Effect → its keys in `synth`, where the fit starts, and parameters that are not fitted."""
 
 
-IN_EVERY_RUN = ("linear", "dead_time", "coulomb_friction", "gravity_geometry")
+IN_EVERY_RUN = ("dead_time", "coulomb_friction")
 """Fitted to a session in every run of the tests; the others are in the sweep."""
 
 

@@ -104,7 +104,7 @@ def ratio_gained(fits: list[Fit], records: list[Record], new: Record) -> float:
     [
         ({"actuator_lag": {"tau_s": 0.008}}, "dead_time", 0.0),
         ({"dead_time": {"tau_s": 0.008}}, "actuator_lag", 0.6),
-        ({"coulomb_friction": {"torque": 0.5}}, "quadratic_drag", 0.0),
+        pytest.param({"coulomb_friction": {"torque": 0.5}}, "quadratic_drag", 0.0, marks=pytest.mark.sweep),
     ],
 )
 def test_the_proposed_recording_gains_the_predicted_likelihood_ratio_and_faster_than_repetition(

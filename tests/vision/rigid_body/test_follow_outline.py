@@ -41,11 +41,12 @@ def _followed(path, draw, angles_deg, relief=25.0, known=None):
     return follow_outline(film.frames(), replace(learnt, known=learnt.known[-known:] if known else learnt.known))
 
 
+@pytest.mark.sweep  # a stick is measured in `tests/measurement/test_without_mark.py`
 @pytest.mark.parametrize(
     ("draw", "angles_deg", "pivot"),
     [
-        pytest.param(things.stick(GREY, 12.0), SWING, (160.0, 30.0), marks=pytest.mark.sweep),
-        pytest.param(things.ball(GREY, 18.0), SWING, (160.0, 20.0), marks=pytest.mark.sweep),
+        (things.stick(GREY, 12.0), SWING, (160.0, 30.0)),
+        (things.ball(GREY, 18.0), SWING, (160.0, 20.0)),
         (things.wheel(GREY), np.linspace(0.0, 200.0, 60), (160.0, 120.0)),
     ],
     ids=["stick", "ball", "wheel"],
@@ -98,7 +99,11 @@ def _two(scene, angle):
     things.bar(scene, (240.0, 30.0), things.hanging((240.0, 30.0), 100.0, -0.7 * angle), 14.0, (60, 60, 60))
 
 
-@pytest.mark.parametrize("draw", [_disc, _cart, lambda scene, angle: None], ids=["disc", "cart", "nothing"])
+@pytest.mark.parametrize(
+    "draw",
+    [pytest.param(_disc, marks=pytest.mark.sweep), _cart, lambda scene, angle: None],
+    ids=["disc", "cart", "nothing"],
+)
 def test_what_shows_no_rotation_of_its_own_is_not_measured(tmp_path, draw):
     assert isinstance(_followed(tmp_path, draw, SWING), str)
 
