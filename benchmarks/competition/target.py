@@ -100,6 +100,10 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
         [cv2.warpAffine(used[j], m, size, flags=back, borderValue=np.nan) for j, m in zip(known, maps, strict=True)]
     )
     appearance, variance = _typical(held)
+    often = np.isfinite(held).sum(axis=0).astype(np.float32)
+    # a mean and a variance from n values predict another one with the variance (n + 1)/(n − 1); from 3 they do not
+    appearance = np.where(often > 3, appearance, np.nan)
+    variance = variance * (often + 1.0) / np.maximum(often - 1.0, 1.0)
     variance = variance + sample.noise**2 + _FRACTION2 * _slope2(appearance)
     visibility = blank
     for _ in range(_ROUNDS):
