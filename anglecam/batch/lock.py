@@ -20,6 +20,9 @@ from filelock import FileLock, Timeout
 from anglecam.batch.output_folder import OutputFolder
 from anglecam.errors import RigError
 
+_PATIENCE_S = 1.0
+"""A process that a killed batch was just starting holds the lock too, until it runs its own program."""
+
 
 @contextmanager
 def locked(folder: OutputFolder) -> Iterator[str | None]:
@@ -47,7 +50,7 @@ def locked(folder: OutputFolder) -> Iterator[str | None]:
     except OSError as problem:
         raise RigError(f"{shown}: cannot be written to ({problem.strerror})") from problem
     try:
-        lock = FileLock(folder.lock_file, fallback_to_soft=False).acquire(blocking=False)
+        lock = FileLock(folder.lock_file, fallback_to_soft=False).acquire(timeout=_PATIENCE_S)
     except Timeout:
         holder = (_lines(folder.run_file) or ["unknown"])[0]
         raise RigError(f"{shown}: another batch is at work there ({holder})") from None
