@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.competition.films import Contest, contest
-from benchmarks.competition.score import Proposal, Score, best_rival, score
+from anglecam.engine.score import Proposal, Score, best_rival, score
 from benchmarks.drawn.kinds import KINDS
 
 ROOT = Path(__file__).resolve().parents[2]

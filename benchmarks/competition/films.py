@@ -27,8 +27,8 @@ from anglecam.measurement.rigid_body_pass import detect_outline, detect_rigid_bo
 from anglecam.progress import unseen
 from anglecam.video.film import Frame
 from anglecam.video.open_film import open_film
-from benchmarks.competition.sample import FRAMES, Sample, cut, sample_of
-from benchmarks.competition.score import Proposal
+from anglecam.engine.sample import FRAMES, Sample, cut, sample_of
+from anglecam.engine.score import Proposal
 from benchmarks.drawn.film import Drawn, draw
 
 TRACKERS: dict[str, Callable[[HeldCamera, Rig], Detections | str]] = {

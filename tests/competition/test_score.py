@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.competition.sample import Sample, cut, sample_of, steady_light
-from benchmarks.competition.score import NOTHING, Proposal, best_rival, score
-from benchmarks.competition.target import learn_target
+from anglecam.engine.sample import Sample, cut, sample_of, steady_light
+from anglecam.engine.score import NOTHING, Proposal, best_rival, score
+from anglecam.engine.target import learn_target
 
 CENTRE = np.array([60.0, 20.0])
 TURN = 0.4 * np.sin(np.arange(24))

@@ -14,8 +14,9 @@ import numpy as np
 from scipy import special
 
 from anglecam.data.typing import Floats
-from benchmarks.competition.sample import Sample
-from benchmarks.competition.target import learn_target, log_density, turned
+from anglecam.engine.likelihood import log_density
+from anglecam.engine.sample import Sample
+from anglecam.engine.target import learn_target, turned
 
 NOTHING, SHIFTED = "nothing moves", "moves without turning"
 
@@ -75,7 +76,7 @@ def score(sample: Sample, name: str, poses: Sequence[Floats | None]) -> Score:
         target = learn_target(sample, known, np.arange(half, count, 2))
         for k in range(1 - half, count, 2):
             picture, variance = target.predict(known[k])
-            per_frame[k] = float(log_density(sample.pictures[k] - picture, variance).sum(dtype=float))
+            per_frame[k] = float(log_density(sample.pictures[k], picture, variance).sum(dtype=float))
     return Score(name, per_frame)
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
-from benchmarks.competition.sample import Sample
+from anglecam.engine.likelihood import log_density
+from anglecam.engine.sample import Sample
 
 Picture = NDArray[np.float32]
 _ROUNDS = 2
@@ -110,9 +111,8 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
         behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
         gain = blank.copy()
         for frame, j, m in zip(held, known, maps, strict=True):
-            as_background = cv2.warpAffine(log_density(used[j] - background, behind), m, size, flags=back)
-            as_body = log_density(frame - appearance, variance)
-            gain += np.where(np.isfinite(frame), as_body - as_background, 0.0).astype(np.float32)
+            as_background = cv2.warpAffine(log_density(used[j], background, behind), m, size, flags=back)
+            gain += np.where(np.isfinite(frame), log_density(frame, appearance, variance) - as_background, 0.0)
         # a pixel of the body has two parameters, mean and variance (Schwarz, Annals of Statistics 6, 1978)
         seen = np.isfinite(appearance) & (cv2.GaussianBlur(gain, (0, 0), 1.0) > np.log(len(known)))
         visibility = seen.astype(np.float32)
@@ -127,12 +127,6 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
         )
     behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
     return Target(np.nan_to_num(appearance), visibility, np.nan_to_num(variance), background, behind, pad)
-
-
-def log_density(off: Picture, variance: Picture, outliers: float = 0.02) -> Picture:
-    """Return the logarithm of the density of pixels: normal, and a share that may have any of 256 grey levels."""
-    normal = np.exp(-0.5 * off * off / variance) / np.sqrt(2.0 * np.pi * variance)
-    return np.asarray(np.log((1.0 - outliers) * normal + outliers / 256.0), dtype=np.float32)
 
 
 def _typical(pictures: Picture) -> tuple[Picture, Picture]:

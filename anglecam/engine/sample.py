@@ -1,6 +1,6 @@
 """A few frames of a film as a camera at rest would see them under steady light, cut to where something changes.
 
-Explanations of what moves are compared on such a sample (`benchmarks.competition.score`). Its frames are grey and
+Explanations of what moves are compared on such a sample (`anglecam.engine.score`). Its frames are grey and
 reduced, so that memory and time do not grow with the film.
 """
 
@@ -49,6 +49,10 @@ class Sample:
     def place(self, point_px: Floats) -> Floats:
         """Map points (…, 2) of the film, px, to the sample."""
         return np.asarray((np.asarray(point_px) - self.corner_px + 0.5) * self.scale - 0.5)
+
+    def in_film(self, place: Floats) -> Floats:
+        """Map places (…, 2) of the sample to the film, px."""
+        return np.asarray((np.asarray(place) + 0.5) / self.scale - 0.5 + self.corner_px)
 
 
 def cut(

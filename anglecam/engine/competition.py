@@ -1,0 +1,124 @@
+"""Explanations of what moves compete on held-out frames; the best are fitted, and what they may be mistaken for too.
+
+Every proposal is fitted to a small sample first. Those that predict best are fitted to the whole sample. What remains
+unexplained by the best one is what the next body is sought in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from anglecam.data.typing import Floats
+from anglecam.engine.refine import Fit, refine
+from anglecam.engine.sample import Sample, noise_of
+from anglecam.engine.score import Proposal, Score, score
+from anglecam.engine.target import turned
+
+_FINALISTS = 4
+"""Proposals that are fitted to the whole sample."""
+_APART_PX = 3.0
+"""Of the sample: places of one body by two explanations that are the same."""
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A body that turns, and how well it predicts frames that it was not learnt from."""
+
+    fit: Fit
+    score: Score
+    nothing: Score
+    """Of the same frames without it."""
+    slides: Score
+    """Of the same body that moves along a straight line and does not turn."""
+
+    @property
+    def turns(self) -> float:
+        """Probability that it predicts a further frame better than its rivals."""
+        return min(self.score.ahead_of(self.nothing), self.score.ahead_of(self.slides))
+
+
+def compete(sample: Sample, proposals: Sequence[Proposal]) -> list[Explanation]:
+    """Return the explanations of a sample, the one that predicts best first.
+
+    Parameters
+    ----------
+    sample : Sample
+        K frames.
+    proposals : sequence of Proposal
+        Many, of which most are wrong.
+    """
+    small = halved(sample)
+    rough: list[tuple[float, Proposal]] = []
+    for proposal in proposals:
+        fit = refine(small, _every_other(proposal), 1)
+        if fit is not None:
+            total = score(small, proposal.name, fit.proposal.poses(small)).total
+            rough.append((total, replace(proposal, centre_px=fit.proposal.centre_px, turn=_all_turns(proposal, fit))))
+    finalists: list[Proposal] = []
+    for _, proposal in sorted(rough, key=lambda one: -one[0]):
+        if len(finalists) < _FINALISTS and not any(_alike(sample, proposal, other) for other in finalists):
+            finalists.append(proposal)
+    fits = [fit for proposal in finalists if (fit := refine(sample, proposal)) is not None]
+    nothing = score(sample, "nothing moves", [None] * len(sample.pictures))
+    found = [
+        Explanation(fit, score(sample, fit.proposal.name, fit.proposal.poses(sample)), nothing, _sliding(sample, fit))
+        for fit in fits
+    ]
+    return sorted(found, key=lambda one: -one.score.total)
+
+
+def halved(sample: Sample) -> Sample:
+    """Return every other frame of a sample at half its size."""
+    pictures = np.stack([cv2.pyrDown(picture) for picture in sample.pictures[::2]])
+    # a pixel of the reduced picture lies on every other pixel of the first one
+    corner = sample.corner_px + 0.5 / sample.scale - 0.5 * 2.0 / sample.scale
+    return Sample(pictures, sample.frames[::2], sample.scale / 2.0, corner, noise_of(pictures))
+
+
+def _every_other(proposal: Proposal) -> Proposal:
+    return replace(proposal, turn=proposal.turn[::2])
+
+
+def _all_turns(proposal: Proposal, fit: Fit) -> Floats:
+    """Return the turns of a proposal with those of every other frame as they were fitted."""
+    turn, fitted = proposal.turn.copy(), fit.proposal.turn
+    both = np.isfinite(turn[::2]) & np.isfinite(fitted)
+    turn -= np.median(turn[::2][both] - fitted[both]) if both.any() else 0.0
+    turn[::2] = np.where(np.isfinite(fitted), fitted, turn[::2])
+    return turn
+
+
+def _alike(sample: Sample, one: Proposal, other: Proposal) -> bool:
+    """Return whether two proposals move what turns about the first one's centre to the same places."""
+    both = np.isfinite(one.turn) & np.isfinite(other.turn)
+    if both.sum() < 4:
+        return False
+    height, width = sample.pictures.shape[1:]
+    corners = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]]) * [width, height]
+    first, second = (
+        np.stack([turned(sample.place(p.centre_px), float(t)) for t in p.turn[both]]) for p in (one, other)
+    )
+    base = np.median(one.turn[both] - other.turn[both])
+    back = turned(sample.place(other.centre_px), float(base))
+    placed = corners @ first[:, :, :2].swapaxes(1, 2) + first[:, None, :, 2]
+    moved = (corners @ back[:, :2].T + back[:, 2]) @ second[:, :, :2].swapaxes(1, 2) + second[:, None, :, 2]
+    return float(np.median(np.hypot(*np.moveaxis(placed - moved, -1, 0)))) < _APART_PX
+
+
+def _sliding(sample: Sample, fit: Fit) -> Score:
+    """Return the score of the same body where its middle moves on a straight line, as far as it does, unturned."""
+    poses = fit.proposal.poses(sample)
+    rows, columns = np.nonzero(fit.target.visibility)
+    middle = np.array([columns.mean(), rows.mean()]) - fit.target.pad
+    shifts = np.array([np.full(2, np.nan) if p is None else p[:, :2] @ middle + p[:, 2] - middle for p in poses])
+    known = np.isfinite(shifts[:, 0])
+    mean = shifts[known].mean(axis=0)
+    axis = np.linalg.svd(shifts[known] - mean)[2][0]
+    straight = mean + ((shifts - mean) @ axis)[:, None] * axis
+    return score(
+        sample, "slides", [turned(middle, 0.0, one) if np.isfinite(one).all() else None for one in straight]
+    )

@@ -1,0 +1,101 @@
+"""How much better a frame is explained with a body in a pose than without it: the sum over the body's pixels.
+
+    L(pose) = Σᵢ log p(picture(xᵢ) | body's pixel i) − log p(picture(xᵢ) | background at xᵢ),     xᵢ = pose(yᵢ)
+
+Pixels that the body does not cover are the same in both explanations and cancel.
+"""
+
+from __future__ import annotations
+
+from math import exp, log, pi, sqrt
+
+import numpy as np
+from numba import njit
+
+_OUTLIERS = 0.02
+"""Share of pixels that may have any of 256 grey levels: an occluder, a glint."""
+
+
+@njit("float32[:, ::1](float32[:, ::1], float32[:, ::1], float32[:, ::1])", cache=True, nogil=True)
+def log_density(picture, mean, variance):  # type: ignore[no-untyped-def]
+    """Return the log density of each pixel: normal, and a share that may have any of 256 grey levels.
+
+    Parameters
+    ----------
+    picture, mean, variance : ndarray
+        (h, w) float32; grey levels, and grey levels².
+    """
+    result = np.empty_like(picture)
+    floor = _OUTLIERS / 256.0
+    for i in range(picture.shape[0]):
+        for j in range(picture.shape[1]):
+            off, spread = picture[i, j] - mean[i, j], variance[i, j]
+            if not (off * off >= 0.0 and spread > 0.0):  # unknown
+                result[i, j] = log(1.0 / 256.0)
+                continue
+            normal = exp(-0.5 * off * off / spread) / sqrt(2.0 * pi * spread)
+            result[i, j] = log((1.0 - _OUTLIERS) * normal + floor)
+    return result
+
+
+@njit(inline="always")
+def _between(picture, x, y):  # type: ignore[no-untyped-def]
+    """Interpolate linearly; the place lies inside."""
+    column, row = int(x), int(y)
+    u, v = x - np.float32(column), y - np.float32(row)
+    above = picture[row, column] + u * (picture[row, column + 1] - picture[row, column])
+    below = picture[row + 1, column] + u * (picture[row + 1, column + 1] - picture[row + 1, column])
+    return above + v * (below - above)
+
+
+@njit(
+    "float64[:, ::1](float32[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], int64[::1], int64, "
+    "float64[:, :, ::1])",
+    cache=True,
+    nogil=True,
+    fastmath=True,
+)
+def pose_gains(picture, behind, places, body, part, parts, poses):  # type: ignore[no-untyped-def]
+    """Return the gain L of each pose, by parts of the body.
+
+    Parameters
+    ----------
+    picture : ndarray
+        (h, w) float32.
+    behind : ndarray
+        (h, w) float32, log density of its pixels as background.
+    places : ndarray
+        (n, 2) float32, the body's pixels in its own coordinates.
+    body : ndarray
+        (n, 2) float32, their mean, grey levels, and variance, grey levels².
+    part : ndarray
+        (n,) part to which each of them belongs.
+    parts : int
+        Number of parts.
+    poses : ndarray
+        (m, 2, 3) from the body's coordinates to the picture.
+
+    Returns
+    -------
+    ndarray
+        (m, parts) nats.
+    """
+    height, width = picture.shape
+    gains = np.zeros((len(poses), parts))
+    floor = np.float32(_OUTLIERS / 256.0)
+    n = len(places)
+    scale, half = np.empty(n, np.float32), np.empty(n, np.float32)
+    for i in range(n):
+        scale[i] = (1.0 - _OUTLIERS) / sqrt(2.0 * pi * body[i, 1])
+        half[i] = -0.5 / body[i, 1]
+    for m in range(len(poses)):
+        a, b, c = np.float32(poses[m, 0, 0]), np.float32(poses[m, 0, 1]), np.float32(poses[m, 0, 2])
+        d, e, f = np.float32(poses[m, 1, 0]), np.float32(poses[m, 1, 1]), np.float32(poses[m, 1, 2])
+        for i in range(n):
+            x = a * places[i, 0] + b * places[i, 1] + c
+            y = d * places[i, 0] + e * places[i, 1] + f
+            if x < 0.0 or y < 0.0 or x >= width - 1 or y >= height - 1:
+                continue
+            off = _between(picture, x, y) - body[i, 0]
+            gains[m, part[i]] += log(scale[i] * exp(half[i] * off * off) + floor) - _between(behind, x, y)
+    return gains

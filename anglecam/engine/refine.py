@@ -1,0 +1,376 @@
+"""Make a proposal as good as its idea: poses of most likelihood in the sampled frames, and the centre that they share.
+
+A free pose has three numbers, the turn and the shift of the body's middle. Where its likelihood is greatest, the
+curvature is its information matrix, so that the common centre is a weighted least-squares solution, also for a ball
+that shows no turn of its own, or for a stick that may slide along itself. The turns about that centre follow by a
+search in one dimension.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+
+from anglecam.data.typing import Flags, Floats
+from anglecam.engine.likelihood import log_density, pose_gains
+from anglecam.engine.sample import Sample
+from anglecam.engine.score import Proposal
+from anglecam.engine.target import Picture, Target, learn_target, turned
+
+_STEPS_PX = (2.0, 1.0, 0.5)
+"""Steps of the difference quotients: a pose may begin some pixels off."""
+_MOST_PIXELS = 1500
+"""Pixels of the body by which a pose is found; the information of the others is of the same kind."""
+_LEAST_PIXELS = 6
+_SECTORS = 6
+PARTS = 2 * _SECTORS
+"""Of a body: neighbouring pixels are off together, and how much parts contradict each other shows by how much."""
+_FINE_PX = 0.5
+"""Step of the last search, px."""
+_LEAST_INFORMATION = 1e-4
+"""1/px²: a place that nothing shows is uncertain by 100 px."""
+_ODDS = float(special.logit(0.95))
+"""Logarithm of the odds at which a body counts as seen."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """The pixels by which a body is located."""
+
+    places: Picture
+    """(n, 2) in the coordinates of the body, px."""
+    values: Picture
+    """(n, 2) mean, grey levels, and variance, grey levels²."""
+    middle: Floats
+    """(2,) mean of the places, px."""
+    reach: float
+    """Root mean square distance of the places from it, px."""
+    stands_for: float
+    """Pixels of the body for each of them."""
+    part: NDArray[np.int64]
+    """(n,) part of the body to which each belongs, by direction and distance from the middle."""
+
+    def gains(self, picture: Picture, behind: Picture, poses: Floats) -> Floats:
+        """Return the gains of poses (m, 2, 3), for each of the body's parts (m, `PARTS`)."""
+        of_parts = pose_gains(picture, behind, self.places, self.values, self.part, PARTS, poses)
+        return np.asarray(of_parts) * self.stands_for
+
+    def thinned(self, every: int) -> Body:
+        """Return every so many-th pixel."""
+        places, values, part = (np.ascontiguousarray(a[::every]) for a in (self.places, self.values, self.part))
+        return replace(self, places=places, values=values, part=part, stands_for=self.stands_for * every)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A body that was fitted to a sample."""
+
+    proposal: Proposal
+    target: Target = field(repr=False)
+    gain: Floats
+    """(K,) log likelihood of each frame with the body over that without it, nats."""
+    sigma: Floats
+    """(K,) standard uncertainty of each turn about a known centre, rad."""
+    covariance_px2: Floats
+    """(2, 2) of the centre, in the film, px²."""
+
+    @property
+    def seen(self) -> Flags:
+        """(K,) frames in which the body is seen."""
+        return np.isfinite(self.proposal.turn)
+
+
+def body_of(target: Target, most: int = _MOST_PIXELS) -> Body | None:
+    """Return evenly drawn pixels of a target; ``None`` where it has hardly any."""
+    rows, columns = np.nonzero(target.visibility > 0.5)
+    if len(rows) < _LEAST_PIXELS:
+        return None
+    chosen = np.random.default_rng(0).permutation(len(rows))[:most] if len(rows) > most else np.arange(len(rows))
+    rows_of, columns_of = rows[chosen], columns[chosen]
+    places = np.column_stack([columns_of, rows_of]) - float(target.pad)
+    values = np.column_stack([target.appearance[rows_of, columns_of], target.variance[rows_of, columns_of]])
+    middle = np.array([columns.mean(), rows.mean()]) - target.pad
+    reach = max(2.0, float(np.sqrt(((places - middle) ** 2).sum(axis=1).mean())))
+    away = np.hypot(*(places - middle).T)
+    sector = (np.arctan2(*(places - middle).T) / (2.0 * np.pi) + 0.5) * _SECTORS
+    part = np.minimum(sector.astype(np.int64), _SECTORS - 1) + _SECTORS * (away > np.median(away))
+    values = values.astype(np.float32)
+    return Body(places.astype(np.float32), values, middle, reach, len(rows) / len(chosen), part)
+
+
+def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
+    """Fit a body to a sample, starting from a proposal.
+
+    Parameters
+    ----------
+    sample : Sample
+        K frames.
+    proposal : Proposal
+        Off by some pixels at most.
+    rounds : int
+        Of learning and locating in turn.
+
+    Returns
+    -------
+    Fit or None
+        ``None`` where nothing follows the proposal.
+    """
+    fit = None
+    for _ in range(rounds):
+        target = learn_target(sample, proposal.poses(sample), np.arange(len(sample.pictures)))
+        body = body_of(target)
+        if body is None:
+            return fit
+        behind = [log_density(p, target.background, target.background_variance) for p in sample.pictures]
+        centre = sample.place(proposal.centre_px)
+        turn = _searched(sample, behind, body, centre, proposal.turn)
+        seen = np.isfinite(turn)
+        if seen.sum() < 4:
+            return fit
+        free = [
+            _free_pose(sample.pictures[k], behind[k], body, _as_parameters(turned(centre, turn[k]), body))
+            for k in np.flatnonzero(seen)
+        ]
+        q, information = np.array([one[0] for one in free]), np.array([one[1] for one in free])
+        centre, covariance, turn[seen] = common_centre(q, information, centre, body.middle)
+        turn, sigma, gain = _about(sample, behind, body, centre, turn)
+        if np.isfinite(turn).sum() < 4:
+            return fit
+        turn = turn - np.nanmedian(turn)
+        proposal = replace(proposal, centre_px=sample.in_film(centre), turn=turn)
+        fit = Fit(proposal, target, gain, sigma, covariance / sample.scale**2)
+    return fit
+
+
+def gains_about(picture: Picture, behind: Picture, body: Body, centre: Floats, turns: Floats) -> Floats:
+    """Return the gains of turns (m,) about a centre, for each of the body's parts (m, `PARTS`)."""
+    return body.gains(picture, behind, poses_about(centre, turns))
+
+
+def poses_about(centre: Floats, turns: Floats) -> Floats:
+    """Return the (m, 2, 3) maps of a body that is turned about a centre (2,), px, by angles (m,), rad."""
+    rotation = _rotations(turns)[0]
+    return np.concatenate([rotation, (centre - rotation @ centre)[:, :, None]], axis=2)
+
+
+def _searched(sample: Sample, behind: list[Picture], body: Body, centre: Floats, turn: Floats) -> Floats:
+    """Return the turns with those that are unknown sought in the whole range of the known ones."""
+    known = np.isfinite(turn)
+    arm = max(body.reach, float(np.hypot(*(body.middle - centre))))
+    low, high = np.min(turn[known]) - 0.2, np.max(turn[known]) + 0.2
+    if high - low > 2.0 * np.pi:
+        low, high = -np.pi, np.pi
+    tried = np.linspace(low, high, int(np.clip((high - low) * arm / 2.0, 8, 720)))
+    few = body.thinned(4)
+    found = turn.copy()
+    for k in np.flatnonzero(~known):
+        gains = gains_about(sample.pictures[k], behind[k], few, centre, tried).sum(axis=1)
+        best = int(np.argmax(gains))
+        if gains[best] > np.log(len(tried)) + _ODDS:
+            found[k] = tried[best]
+    return found
+
+
+def _free_pose(picture: Picture, behind: Picture, body: Body, start: Floats) -> tuple[Floats, Floats, float]:
+    """Return the pose of most likelihood near a first guess, its information and its gain.
+
+    The pose is the turn, rad, and the shift of the middle, px. The gain is approximated by a quadratic function.
+    """
+    units = np.array([1.0 / body.reach, 1.0, 1.0])
+    q, best, curvature = start.copy(), -np.inf, np.zeros((3, 3))
+    for h in _STEPS_PX:
+        for _ in range(2):
+            points = q + h * _STENCIL * units
+            gains = body.gains(picture, behind, _poses(points, body)).sum(axis=1)
+            best = gains[0]
+            slope, curvature = _quadratic(gains, h)
+            values, axes = np.linalg.eigh(curvature)
+            along = axes.T @ slope
+            steps = np.where(values < 0.0, along / np.maximum(-values, 1e-9), 2.0 * h * np.sign(along))
+            steps = axes @ np.clip(steps, -2.0 * h, 2.0 * h)
+            trial = q + steps * units
+            reached = float(body.gains(picture, behind, _poses(trial[None], body)).sum())
+            top = int(np.argmax(gains))
+            if reached > gains[top]:
+                moved, q, best = float(np.abs(steps).max()), trial, reached
+            else:
+                moved, q, best = (h if top else 0.0), points[top], gains[top]
+            if moved < 0.5 * h:
+                break
+    values, axes = np.linalg.eigh(-curvature)
+    information = (axes * np.maximum(values, _LEAST_INFORMATION)) @ axes.T
+    return q, information / np.outer(units, units), best
+
+
+_PAIRS = ((0, 1), (0, 2), (1, 2))
+_STENCIL = np.array(
+    [
+        [0, 0, 0],
+        *(sign * np.eye(3)[i] for i in range(3) for sign in (1, -1)),
+        *(sign * (np.eye(3)[i] + np.eye(3)[j]) for i, j in _PAIRS for sign in (1, -1)),
+    ],
+    float,
+)
+"""(13, 3) points by which a quadratic function of three variables is found."""
+
+
+def _quadratic(gains: Floats, h: float) -> tuple[Floats, Floats]:
+    """Return gradient and curvature from the gains at the stencil's points."""
+    above, below = gains[1:7:2], gains[2:7:2]
+    slope = (above - below) / (2.0 * h)
+    curvature = np.diag((above + below - 2.0 * gains[0]) / h**2)
+    for (i, j), both, neither in zip(_PAIRS, gains[7::2], gains[8::2], strict=True):
+        mixed = both + neither - above[i] - below[i] - above[j] - below[j] + 2.0 * gains[0]
+        curvature[i, j] = curvature[j, i] = mixed / (2.0 * h**2)
+    return slope, curvature
+
+
+def _poses(q: Floats, body: Body) -> Floats:
+    return np.stack([turned(body.middle, float(one[0]), one[1:]) for one in q])
+
+
+def _as_parameters(pose: Floats, body: Body) -> Floats:
+    turn = np.arctan2(pose[0, 1], pose[0, 0])
+    return np.array([turn, *(pose[:, :2] @ body.middle + pose[:, 2] - body.middle)])
+
+
+def common_centre(q: Floats, information: Floats, start: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
+    """Fit one centre of rotation to free poses.
+
+    A body that turns by θ about a centre C, from a pose that is s₀ off, displaces its middle m by
+    s = s₀ + (R(θ) − 1)(m − C + s₀).
+
+    Parameters
+    ----------
+    q : ndarray
+        (n, 3) turn, rad, and shift of the middle, px.
+    information : ndarray
+        (n, 3, 3) inverse covariances.
+    start, middle : ndarray
+        (2,) first guess of the centre, and middle of the body, px.
+
+    Returns
+    -------
+    centre : ndarray
+        (2,) px.
+    covariance : ndarray
+        (2, 2) px²; scaled by how far the poses are from turns about it.
+    turn : ndarray
+        (n,) turns about it that are nearest to the poses.
+    """
+    pivot, shift = np.asarray(start, float), np.zeros(2)  # the pivot in the coordinates of the body
+    arm_px = max(1.0, float(np.hypot(*(middle - pivot))))
+    turn = q[:, 0].copy()
+    normal, scale = np.eye(4), 1.0
+    for step in range(12):
+        turn = _nearest(q, information, turn, pivot, shift, middle)
+        rotation, slope = _rotations(turn)
+        arm = middle - pivot
+        off = q - np.column_stack([turn, shift + rotation @ arm - arm])
+        chi2 = np.einsum("ni,nij,nj->n", off, information, off)
+        scale = max(1.0, float(np.median(chi2)))
+        weighted = information * np.minimum(1.0, 3.0 / np.sqrt(np.maximum(chi2 / scale, 1e-9)))[:, None, None]
+        by_turn = np.concatenate([np.ones((len(q), 1)), slope @ arm], axis=1)
+        by_rest = np.zeros((len(q), 3, 4))
+        by_rest[:, 1:, :2] = np.eye(2)
+        by_rest[:, 1:, 2:] = np.eye(2) - rotation
+        of_turn = np.einsum("ni,nij,nj->n", by_turn, weighted, by_turn)
+        mixed = np.einsum("ni,nij,njk->nk", by_turn, weighted, by_rest)
+        force_turn = np.einsum("ni,nij,nj->n", by_turn, weighted, off) / of_turn
+        normal = np.einsum("nji,njk,nkl->il", by_rest, weighted, by_rest) - (mixed / of_turn[:, None]).T @ mixed
+        force = np.einsum("nji,njk,nk->i", by_rest, weighted, off) - mixed.T @ force_turn
+        ridge = 1e-9 * np.trace(normal) * np.eye(4)
+        change = np.linalg.solve(normal + ridge, force)
+        length = float(np.hypot(*change[2:]))
+        change *= min(1.0, 0.5 * arm_px / max(length, 1e-9))
+        shift, pivot = shift + change[:2], pivot + change[2:]
+        if step > 2 and length < 0.01:
+            break
+    to_centre = np.hstack([np.eye(2), np.eye(2)])
+    covariance = scale * to_centre @ np.linalg.pinv(normal) @ to_centre.T
+    turn = _nearest(q, information, turn, pivot, shift, middle)
+    return pivot + shift, covariance, turn
+
+
+def _nearest(q: Floats, information: Floats, turn: Floats, pivot: Floats, shift: Floats, middle: Floats) -> Floats:
+    """Return the turns about a pivot that are nearest to free poses, in the metric of their information."""
+    arm = middle - pivot
+    for _ in range(3):
+        rotation, slope = _rotations(turn)
+        off = q - np.column_stack([turn, shift + rotation @ arm - arm])
+        tangent = np.concatenate([np.ones((len(q), 1)), slope @ arm], axis=1)
+        along = np.einsum("ni,nij->nj", tangent, information)
+        step = np.einsum("ni,ni->n", along, off) / np.maximum(np.einsum("ni,ni->n", along, tangent), 1e-12)
+        turn = turn + np.clip(step, -0.5, 0.5)
+    return turn
+
+
+def _rotations(turn: Floats) -> tuple[Floats, Floats]:
+    """Return the (n, 2, 2) matrices of `turned`, and their derivatives."""
+    cos, sin = np.cos(turn), np.sin(turn)
+    return (
+        np.stack([np.stack([cos, sin], -1), np.stack([-sin, cos], -1)], 1),
+        np.stack([np.stack([-sin, cos], -1), np.stack([-cos, -sin], -1)], 1),
+    )
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Turn of a body about its centre in one frame."""
+
+    turn: float
+    """Rad."""
+    sigma: float
+    """Standard uncertainty if all pixels were independent, rad."""
+    ratio: float
+    """Variance by which the body's parts contradict each other, over that of independent pixels."""
+    gain: float
+    """Nats."""
+
+
+NOT_SEEN = Turn(float("nan"), float("nan"), float("nan"), 0.0)
+
+
+def turn_near(picture: Picture, behind: Picture, body: Body, centre: Floats, guess: float) -> Turn:
+    """Return the turn of most likelihood within some pixels of a guess."""
+    arm = float(np.hypot(body.reach, np.hypot(*(body.middle - centre))))
+    step = _FINE_PX / arm
+    tried = guess + step * np.arange(-6, 7)
+    of_parts = gains_about(picture, behind, body, centre, tried)
+    gains = of_parts.sum(axis=1)
+    at = int(np.clip(np.argmax(gains), 1, len(tried) - 2))
+    curvature = float(gains[at - 1] + gains[at + 1] - 2.0 * gains[at])
+    if curvature >= 0.0:
+        return NOT_SEEN
+    along = float(np.clip(0.5 * (gains[at - 1] - gains[at + 1]) / curvature, -1.0, 1.0))
+    # the slopes of the parts add up to zero at the maximum; how far they scatter shows by how much it is off
+    slopes = 0.5 * (of_parts[at + 1] - of_parts[at - 1]) + along * (
+        of_parts[at + 1] + of_parts[at - 1] - 2.0 * of_parts[at]
+    )
+    ratio = float((slopes**2).sum()) / -curvature * PARTS / (PARTS - 1)
+    return Turn(tried[at] + step * along, step / np.sqrt(-curvature), ratio, float(gains.max()))
+
+
+def _about(
+    sample: Sample, behind: list[Picture], body: Body, centre: Floats, turn: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return the turns about a centre near first guesses, their standard uncertainties, and the gains."""
+    found = [
+        turn_near(sample.pictures[k], behind[k], body, centre, guess) if np.isfinite(guess) else NOT_SEEN
+        for k, guess in enumerate(turn)
+    ]
+    seen = [one if one.gain > _ODDS else NOT_SEEN for one in found]
+    turns, sigma = np.array([one.turn for one in seen]), np.array([one.sigma for one in seen])
+    return turns, with_ratio(sigma, np.array([one.ratio for one in seen])), np.array([one.gain for one in found])
+
+
+def with_ratio(sigma: Floats, ratio: Floats) -> Floats:
+    """Return standard uncertainties that contain what the parts of the body contradict each other.
+
+    A frame's ratio rests on few parts, so that it counts half, and the usual one of all frames half.
+    """
+    usual = float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else 1.0
+    return np.asarray(sigma * np.sqrt(np.maximum(1.0, 0.5 * (usual + ratio))))
