@@ -76,7 +76,7 @@ def halved(sample: Sample) -> Sample:
     pictures = np.stack([cv2.pyrDown(picture) for picture in sample.pictures[::2]])
     # a pixel of the reduced picture lies on every other pixel of the first one
     corner = sample.corner_px + 0.5 / sample.scale - 0.5 * 2.0 / sample.scale
-    return Sample(pictures, sample.frames[::2], sample.scale / 2.0, corner, noise_of(pictures))
+    return Sample(pictures, sample.frames[::2], sample.scale / 2.0, corner, noise_of(pictures), np.median(pictures, axis=0))
 
 
 def _every_other(proposal: Proposal) -> Proposal:

@@ -28,6 +28,8 @@ _LEAST_PIXELS = 6
 _SECTORS = 6
 PARTS = 2 * _SECTORS
 """Of a body: neighbouring pixels are off together, and how much parts contradict each other shows by how much."""
+_OUTER = 0.95
+"""Share of a body's pixels that are nearer to the centre than its outer ones."""
 _FINE_PX = 0.5
 """Step of the last search, px."""
 _LEAST_INFORMATION = 1e-4
@@ -58,6 +60,10 @@ class Body:
         of_parts = pose_gains(picture, behind, self.places, self.values, self.part, PARTS, poses)
         return np.asarray(of_parts) * self.stands_for
 
+    def arm(self, centre: Floats) -> float:
+        """Return how far the body's outer pixels move for each rad of a turn about a centre, px."""
+        return max(self.reach, float(np.quantile(np.hypot(*(self.places - centre).T), _OUTER)))
+
     def thinned(self, every: int) -> Body:
         """Return every so many-th pixel."""
         places, values, part = (np.ascontiguousarray(a[::every]) for a in (self.places, self.values, self.part))
@@ -76,6 +82,8 @@ class Fit:
     """(K,) standard uncertainty of each turn about a known centre, rad."""
     covariance_px2: Floats
     """(2, 2) of the centre, in the film, px²."""
+    ratio: float
+    """Usual variance by which the body's parts contradict each other, over that of independent pixels."""
 
     @property
     def seen(self) -> Flags:
@@ -136,12 +144,15 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
         ]
         q, information = np.array([one[0] for one in free]), np.array([one[1] for one in free])
         centre, covariance, turn[seen] = common_centre(q, information, centre, body.middle)
-        turn, sigma, gain = _about(sample, behind, body, centre, turn)
+        near = _about(sample, behind, body, centre, turn)
+        turn, gain = np.array([one.turn for one in near]), np.array([one.gain for one in near])
+        ratios = np.array([one.ratio for one in near])
+        sigma = with_ratio(np.array([one.sigma for one in near]), ratios)
         if np.isfinite(turn).sum() < 4:
             return fit
         turn = turn - np.nanmedian(turn)
         proposal = replace(proposal, centre_px=sample.in_film(centre), turn=turn)
-        fit = Fit(proposal, target, gain, sigma, covariance / sample.scale**2)
+        fit = Fit(proposal, target, gain, sigma, covariance / sample.scale**2, float(np.nanmedian(ratios)))
     return fit
 
 
@@ -159,7 +170,7 @@ def poses_about(centre: Floats, turns: Floats) -> Floats:
 def _searched(sample: Sample, behind: list[Picture], body: Body, centre: Floats, turn: Floats) -> Floats:
     """Return the turns with those that are unknown sought in the whole range of the known ones."""
     known = np.isfinite(turn)
-    arm = max(body.reach, float(np.hypot(*(body.middle - centre))))
+    arm = body.arm(centre)
     low, high = np.min(turn[known]) - 0.2, np.max(turn[known]) + 0.2
     if high - low > 2.0 * np.pi:
         low, high = -np.pi, np.pi
@@ -336,7 +347,7 @@ NOT_SEEN = Turn(float("nan"), float("nan"), float("nan"), 0.0)
 
 def turn_near(picture: Picture, behind: Picture, body: Body, centre: Floats, guess: float) -> Turn:
     """Return the turn of most likelihood within some pixels of a guess."""
-    arm = float(np.hypot(body.reach, np.hypot(*(body.middle - centre))))
+    arm = body.arm(centre)
     step = _FINE_PX / arm
     tried = guess + step * np.arange(-6, 7)
     of_parts = gains_about(picture, behind, body, centre, tried)
@@ -354,17 +365,13 @@ def turn_near(picture: Picture, behind: Picture, body: Body, centre: Floats, gue
     return Turn(tried[at] + step * along, step / np.sqrt(-curvature), ratio, float(gains.max()))
 
 
-def _about(
-    sample: Sample, behind: list[Picture], body: Body, centre: Floats, turn: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Return the turns about a centre near first guesses, their standard uncertainties, and the gains."""
+def _about(sample: Sample, behind: list[Picture], body: Body, centre: Floats, turn: Floats) -> list[Turn]:
+    """Return the turns about a centre near first guesses; not seen where the body gains nothing."""
     found = [
         turn_near(sample.pictures[k], behind[k], body, centre, guess) if np.isfinite(guess) else NOT_SEEN
         for k, guess in enumerate(turn)
     ]
-    seen = [one if one.gain > _ODDS else NOT_SEEN for one in found]
-    turns, sigma = np.array([one.turn for one in seen]), np.array([one.sigma for one in seen])
-    return turns, with_ratio(sigma, np.array([one.ratio for one in seen])), np.array([one.gain for one in found])
+    return [one if one.gain > _ODDS else NOT_SEEN for one in found]
 
 
 def with_ratio(sigma: Floats, ratio: Floats) -> Floats:

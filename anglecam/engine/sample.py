@@ -22,10 +22,15 @@ LONGEST_PX = 240
 _CHANGE = 6.0
 """Standard deviations by which a smoothed pixel has to differ from its median to count as changed. Only what is cut off
 depends on it; every pixel that is kept is compared. Of 10⁵ pixels in 48 frames none differs as much by chance."""
-_MARGIN = 0.1
+_LEFT_OUT = 0.01
+"""Share of the change that may lie beyond each side of the part that is kept."""
+_MARGIN = 0.15
 """Of the longer side of what changes: the part of the surroundings that is kept."""
 _LEAST_NOISE = 0.5
 """Grey levels; pixels are whole numbers."""
+_LEAST_FRAMES = 8
+"""Fewest frames from which a body and its background can be learnt, each half from the other."""
+_LEAST_SIDE_PX = 8
 _MAD = 1.4826
 _DARK, _BRIGHT = 16.0, 235.0
 """Grey levels between which a pixel follows the light; black and white of television."""
@@ -45,49 +50,90 @@ class Sample:
     """(2,) place of the sample's corner in the film, px."""
     noise: float
     """Standard deviation of a pixel where nothing moves, grey levels, the codec's errors included."""
+    median: NDArray[np.float32] = field(repr=False)
+    """(h, w) of the pictures; the light of other frames is compared with it."""
 
     def place(self, point_px: Floats) -> Floats:
         """Map points (…, 2) of the film, px, to the sample."""
         return np.asarray((np.asarray(point_px) - self.corner_px + 0.5) * self.scale - 0.5)
+
+    def seen(self, image: Image, move: Floats | None = None) -> NDArray[np.float32]:
+        """Return another frame of the film as `pictures` shows those of the sample.
+
+        Parameters
+        ----------
+        image : ndarray
+            (height, width, 3) BGR or (height, width[, 1]) brightness.
+        move : (2, 3) ndarray, optional
+            The affine map from the picture of a camera at rest to the frame, px.
+        """
+        height, width = self.median.shape
+        left, top = self.corner_px.astype(int)
+        part = np.s_[top : top + round(height / self.scale), left : left + round(width / self.scale)]
+        return in_light(_seen(image, move, self.scale, part, (width, height)), self.median)
 
     def in_film(self, place: Floats) -> Floats:
         """Map places (…, 2) of the sample to the film, px."""
         return np.asarray((np.asarray(place) + 0.5) / self.scale - 0.5 + self.corner_px)
 
 
-def cut(
-    images: Sequence[Image], moves: Sequence[Floats] | None = None
-) -> tuple[NDArray[np.float32], float, Floats] | None:
+@dataclass(frozen=True)
+class Stills:
+    """K frames spread over a film."""
+
+    images: Sequence[Image] = field(repr=False)
+    """(height, width, 3), BGR."""
+    moves: Sequence[Floats | None]
+    """For each the (2, 3) affine map from the picture of a camera at rest to the frame, px; ``None`` for none."""
+    frames: NDArray[np.int64]
+    """(K,) their numbers in the film."""
+
+
+def sample_stills(stills: Stills, box_px: Floats | None = None) -> Sample | None:
     """Cut frames to where something changes, and reduce them.
 
     Parameters
     ----------
-    images : sequence of ndarray
-        K pictures (height, width, 3), BGR, spread over the film.
-    moves : sequence of (2, 3) ndarray, optional
-        For each frame the affine map from the picture of a camera at rest to the frame, px; without it the camera is
-        at rest.
+    stills : Stills
+        Of the film.
+    box_px : (4,) ndarray, optional
+        Left, top, right, bottom of the part to look at, px; by default where most of the change is.
 
     Returns
     -------
-    tuple or None
-        (K, h, w) grey levels, `Sample.scale` and `Sample.corner_px`; ``None`` where nothing changes.
+    Sample or None
+        Without frames that show another picture altogether, such as black ones; ``None`` where nothing changes.
     """
-    still = [None] * len(images) if moves is None else moves
-    small = min(1.0, LONGEST_PX / max(images[0].shape[:2]))
-    box = _changed_box(steady_light(np.stack([_seen(*one, small) for one in zip(images, still, strict=True)])))
-    if box is None:
+    height, width = stills.images[0].shape[:2]
+    small = min(1.0, LONGEST_PX / max(width, height))
+    whole = np.stack([_seen(*one, small) for one in zip(stills.images, stills.moves, strict=True)])
+    shown = np.flatnonzero(_alike(whole))
+    if box_px is None:
+        box = _changed_box(steady_light(whole[shown]))
+        box_px = None if box is None else box / small
+    if box_px is None or len(shown) < _LEAST_FRAMES:
         return None
-    left, top, right, bottom = (box / small).round().astype(int).tolist()
+    left, top, right, bottom = np.clip(np.round(box_px), 0, [width, height] * 2).astype(int).tolist()
+    if min(right - left, bottom - top) < _LEAST_SIDE_PX:
+        return None
     scale = min(1.0, LONGEST_PX / max(right - left, bottom - top))
     part = np.s_[top:bottom, left:right]
-    return np.stack([_seen(*one, scale, part) for one in zip(images, still, strict=True)]), scale, np.array([left, top])
+    pictures = np.stack([_seen(stills.images[k], stills.moves[k], scale, part) for k in shown])
+    return sample_of(pictures, stills.frames[shown], scale, np.array([left, top]))
+
+
+def _alike(pictures: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Return (K,) which pictures show at least half of what the median of all shows neither black nor saturated."""
+    median = np.median(pictures, axis=0)
+    fair = (median > _DARK) & (median < _BRIGHT)
+    shown = (pictures[:, fair] > _DARK) & (pictures[:, fair] < _BRIGHT)
+    return np.asarray(shown.mean(axis=1) > 0.5 if fair.any() else np.ones(len(pictures), bool))
 
 
 def sample_of(pictures: NDArray[np.generic], frames: NDArray[np.int64], scale: float, corner_px: Floats) -> Sample:
-    """Return the sample of (K, h, w) pictures that were `cut`; ``frames`` are their numbers."""
+    """Return the sample of (K, h, w) pictures; ``frames`` are their numbers."""
     steady = steady_light(np.asarray(pictures, np.float32))
-    return Sample(steady, frames, scale, corner_px, noise_of(steady))
+    return Sample(steady, frames, scale, corner_px, noise_of(steady), np.median(steady, axis=0))
 
 
 def steady_light(pictures: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -97,11 +143,13 @@ def steady_light(pictures: NDArray[np.float32]) -> NDArray[np.float32]:
     level. What moves does not count, because the median of the ratios is taken, nor what is black or saturated.
     """
     median = np.median(pictures, axis=0)
-    result = np.empty_like(pictures)
-    for i, picture in enumerate(pictures):
-        fair = (median > _DARK) & (picture > _DARK) & (median < _BRIGHT) & (picture < _BRIGHT)
-        result[i] = picture / np.median(picture[fair] / median[fair]) if fair.any() else picture
-    return result
+    return np.stack([in_light(picture, median) for picture in pictures])
+
+
+def in_light(picture: NDArray[np.float32], median: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return a picture divided by its brightness relative to a median picture."""
+    fair = (median > _DARK) & (picture > _DARK) & (median < _BRIGHT) & (picture < _BRIGHT)
+    return np.asarray(picture / np.median(picture[fair] / median[fair]) if fair.any() else picture, np.float32)
 
 
 def noise_of(pictures: NDArray[np.float32]) -> float:
@@ -114,31 +162,35 @@ def noise_of(pictures: NDArray[np.float32]) -> float:
 
 
 def _seen(
-    image: Image, move: Floats | None, scale: float, part: tuple[slice, slice] = np.s_[:, :]
+    image: Image,
+    move: Floats | None,
+    scale: float,
+    part: tuple[slice, slice] = np.s_[:, :],
+    size: tuple[int, int] | None = None,
 ) -> NDArray[np.float32]:
     """Return a part of a frame as a camera at rest sees it, grey and reduced."""
-    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 and image.shape[2] == 3 else image.squeeze()
     if move is not None:
         still = cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR
         grey = cv2.warpAffine(grey, move, grey.shape[::-1], flags=still, borderMode=cv2.BORDER_REPLICATE)
-    return cv2.resize(grey[part], None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA).astype(np.float32)
+    factor = {"fx": scale, "fy": scale} if size is None else {}
+    return cv2.resize(grey[part], size, interpolation=cv2.INTER_AREA, **factor).astype(np.float32)
 
 
 def _changed_box(pictures: NDArray[np.float32]) -> Floats | None:
-    """Return left, top, right, bottom of what changes, with a margin, px."""
+    """Return left, top, right, bottom of where most of the change is, with a margin, px."""
     noise = noise_of(pictures)
-    off = np.abs(pictures - np.median(pictures, axis=0)).max(axis=0)
-    smooth = cv2.GaussianBlur(off, (0, 0), 1.0)
-    rows, columns = np.nonzero(smooth > _CHANGE * noise)
-    if len(rows) == 0:
+    off = np.abs(pictures - np.median(pictures, axis=0))
+    smooth = np.stack([cv2.GaussianBlur(one, (0, 0), 1.0) for one in off])
+    change = np.where(smooth > _CHANGE * noise, smooth**2, 0.0).mean(axis=0)
+    if not change.any():
         return None
-    height, width = off.shape
-    margin = max(4.0, _MARGIN * float(max(np.ptp(rows), np.ptp(columns))))
-    return np.array(
-        [
-            max(0.0, columns.min() - margin),
-            max(0.0, rows.min() - margin),
-            min(float(width), columns.max() + 1 + margin),
-            min(float(height), rows.max() + 1 + margin),
-        ]
-    )
+    sides = []
+    for axis in (0, 1):
+        share = np.cumsum(change.sum(axis=axis)) / change.sum()
+        sides.append((np.searchsorted(share, _LEFT_OUT), np.searchsorted(share, 1.0 - _LEFT_OUT) + 1))
+    (left, right), (top, bottom) = sides
+    height, width = change.shape
+    margin = max(4.0, _MARGIN * float(max(right - left, bottom - top)))
+    low = np.maximum([left - margin, top - margin], 0.0)
+    return np.concatenate([low, np.minimum([right + margin, bottom + margin], [width, height])])

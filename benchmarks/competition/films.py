@@ -25,10 +25,10 @@ from anglecam.measurement.detections import Detections
 from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.rigid_body_pass import detect_outline, detect_rigid_body
 from anglecam.progress import unseen
-from anglecam.video.film import Frame
 from anglecam.video.open_film import open_film
-from anglecam.engine.sample import FRAMES, Sample, cut, sample_of
+from anglecam.engine.sample import FRAMES, Sample, Stills, sample_of, sample_stills
 from anglecam.engine.score import Proposal
+from anglecam.vision.stabilise.background_motion import CameraMove
 from benchmarks.drawn.film import Drawn, draw
 
 TRACKERS: dict[str, Callable[[HeldCamera, Rig], Detections | str]] = {
@@ -100,37 +100,39 @@ def _followed(kind: str, seed: int) -> dict[str, Any]:
             camera = hold_camera(opened)
         except AnglecamError as problem:
             return {**common, "why": str(problem).replace(f"{film.path}: ", "")}
-        frames, moves = _steadied(camera)
-        found = cut([frame.image for frame in frames], moves) if len(frames) >= 8 else None
-        if found is None:
+        sample = sample_stills(_steadied(camera))
+        if sample is None:
             return {**common, "why": "the sample shows no change"}
-        pictures, scale, corner_px = found
-        numbers = np.array([frame.index for frame in frames])
+        numbers = sample.frames
         proposals = [*_by_trackers(camera, numbers), *_truth(film, numbers)]
     return {
         **common,
-        "cut": pictures.round().astype(np.uint8),
+        "cut": sample.pictures.round().astype(np.uint8),
         "frames": numbers,
-        "scale": scale,
-        "corner_px": corner_px,
+        "scale": sample.scale,
+        "corner_px": sample.corner_px,
         "names": [one.name for one in proposals],
         "centres_px": np.array([one.centre_px for one in proposals]),
         "turns": np.array([one.turn for one in proposals]),
     }
 
 
-def _steadied(camera: HeldCamera) -> tuple[list[Frame], list[Floats] | None]:
-    """Return the sampled frames in which the camera's motion is known, and the map to each from a camera at rest."""
+def _steadied(camera: HeldCamera) -> Stills:
+    """Return the sampled frames in which the camera's motion is known, as a camera at rest would see them."""
     frames = [frame for frame in camera.film.sample(FRAMES).frames if frame.image is not None]
-    if camera.steady is None:
-        return frames, None
-    moves = [camera.steady.at(frame.image) for frame in frames if frame.image is not None]
-    known = [(frame, move) for frame, move in zip(frames, moves, strict=True) if move.known]
-    maps = []
-    for _, move in known:
-        origin, x, y = (move.to_frame(np.array(point, float)) for point in ((0, 0), (1, 0), (0, 1)))
-        maps.append(np.column_stack([x - origin, y - origin, origin]))
-    return [frame for frame, _ in known], maps
+    images = [frame.image for frame in frames if frame.image is not None]
+    maps: list[Floats | None] = [None] * len(images)
+    if camera.steady is not None:
+        moves = [camera.steady.at(image) for image in images]
+        known = [k for k, move in enumerate(moves) if move.known]
+        frames, images = [frames[k] for k in known], [images[k] for k in known]
+        maps = [_affine(moves[k]) for k in known]
+    return Stills(images, maps, np.array([frame.index for frame in frames]))
+
+
+def _affine(move: CameraMove) -> Floats:
+    origin, x, y = (move.to_frame(np.array(point, float)) for point in ((0, 0), (1, 0), (0, 1)))
+    return np.column_stack([x - origin, y - origin, origin])
 
 
 def _by_trackers(camera: HeldCamera, numbers: Floats) -> Iterator[Proposal]:

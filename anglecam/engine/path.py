@@ -1,0 +1,104 @@
+"""The most probable way through the turns that a body may have in each frame, if it goes on as it went before.
+
+The change of its speed from frame to frame has a distribution with long tails (Cauchy): mostly small, and sometimes
+sudden. The cost of a way is found by dynamic programming over the turns of two neighbouring frames.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.data.typing import Floats
+
+_TURN = 2.0 * np.pi
+_ROUNDS = 3
+"""Of the way and of the usual change along it."""
+
+
+def steadiest_path(
+    turns: Sequence[Floats], gains: Sequence[Floats], times: Floats, resolution: float
+) -> tuple[NDArray[np.int64], Floats]:
+    """Choose one turn in each frame that has any.
+
+    Parameters
+    ----------
+    turns, gains : sequence of ndarray
+        For each of n frames (m,) turns, rad, and their log likelihoods, nats; any number of them.
+    times : ndarray
+        (n,) s.
+    resolution : float
+        Change of a turn that counts as none, rad.
+
+    Returns
+    -------
+    path : ndarray
+        (n,) index of the turn; -1 in a frame without any.
+    margin : ndarray
+        (n,) nats by which the best way through another turn of that frame is less probable; infinite without another.
+    """
+    path, margin = np.full(len(turns), -1), np.full(len(turns), np.inf)
+    used = [k for k, of_frame in enumerate(turns) if len(of_frame)]
+    if len(used) < 3:
+        for k in used:
+            path[k] = int(np.argmax(gains[k]))
+        return path, margin
+    angle, gain, time = [turns[k] for k in used], [gains[k] for k in used], times[used]
+    steps = [_wrapped(b[None, :] - a[:, None]) for a, b in zip(angle, angle[1:], strict=False)]
+    n = len(used)
+    scale = resolution
+    for _ in range(_ROUNDS):
+        order, apart = _least_cost(steps, gain, time, scale)
+        scale = max(resolution, _usual_change(np.array([a[k] for a, k in zip(angle, order, strict=True)]), time))
+    path[used], margin[used] = order, apart
+    return path, margin
+
+
+def _least_cost(steps: list[Floats], gain: list[Floats], time: Floats, scale: float) -> tuple[list[int], list[float]]:
+    """Return the turns of the way of least cost, and for each by how much the best way through another costs more."""
+    n = len(gain)
+    # the cost of ways that end with a pair of turns in frames k and k + 1, and that begin with it
+    until = [-gain[0][:, None] - gain[1][None, :]]
+    arrived: list[NDArray[np.int64]] = []
+    for k in range(1, n - 1):
+        cost = until[-1][:, :, None] + _change_cost(steps[k - 1], steps[k], time[k - 1 : k + 2], scale)
+        arrived.append(cost.argmin(axis=0))
+        until.append(cost.min(axis=0) - gain[k + 1][None, :])
+    since = [np.zeros((len(gain[-2]), len(gain[-1])))]
+    for k in range(n - 2, 0, -1):
+        change = _change_cost(steps[k - 1], steps[k], time[k - 1 : k + 2], scale)
+        since.append((change + (since[-1] - gain[k + 1][None, :])[None]).min(axis=2))
+    since.reverse()
+    a, b = np.unravel_index(int(until[-1].argmin()), until[-1].shape)
+    order = [int(b), int(a)]
+    for k in range(n - 3, -1, -1):
+        order.append(int(arrived[k][order[-1], order[-2]]))
+    order.reverse()
+    apart = []
+    for j in range(n):
+        pair = min(j, n - 2)
+        whole = until[pair] + since[pair]
+        through = whole.min(axis=1 if pair == j else 0)
+        others = np.delete(through, order[j])
+        apart.append(float(others.min() - through[order[j]]) if len(others) else np.inf)
+    return order, apart
+
+
+def _wrapped(turn: Floats) -> Floats:
+    return np.asarray((turn + np.pi) % _TURN - np.pi)
+
+
+def _change_cost(before: Floats, after: Floats, time: Floats, scale: float) -> Floats:
+    """Return (a, b, c) cost of the change between the steps (a, b) and (b, c); a step may lead around either way."""
+    first, second = time[1] - time[0], time[2] - time[1]
+    expected = before[:, :, None] * (second / first)
+    change = _wrapped(after[None] - expected) / (scale * max(1.0, second / first))
+    return np.asarray(np.log1p(change**2))
+
+
+def _usual_change(angle: Floats, time: Floats) -> float:
+    """Return the median change of the steps between turns, rad."""
+    step = _wrapped(np.diff(angle)) / np.diff(time)
+    return float(np.median(np.abs(_wrapped(np.diff(step) * np.diff(time)[1:]))))

@@ -1,0 +1,171 @@
+"""Follow a learnt body through all frames of a film: where it may be in each, and the steadiest way through them.
+
+In every frame the turn is sought in the whole circle; the likeliest poses are refined. Poses in which the body looks
+the same, as a wheel does from spoke to spoke, and frames in which it is hidden are told apart by its motion through
+all frames: the path of least cost (Viterbi, IEEE Transactions on Information Theory 13, 1967).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from anglecam.data.typing import Flags, Floats
+from anglecam.engine.likelihood import log_density
+from anglecam.engine.path import steadiest_path
+from anglecam.engine.refine import Body, Fit, Turn, body_of, gains_about, poses_about, turn_near, with_ratio
+from anglecam.engine.sample import Sample
+from anglecam.engine.target import Picture
+
+_STEP_PX = 2.0
+"""Of the search for a turn."""
+_MOST_TURNS = 720
+_FEW_PIXELS = 250
+"""By which the whole circle is searched."""
+_PEAKS, _CANDIDATES = 24, 12
+"""Poses of a frame of which the likelihood is computed, and of those the ones that are refined, at most."""
+_HOPELESS = 60.0
+"""Nats by which a pose may be less probable than the best one: the steadiest motion does not make up for more."""
+_APART_PX = 6.0
+"""Least distance of poses that count as two."""
+_IN_PICTURE = 0.25
+"""Share of a body that lies in the picture in a pose where it is sought."""
+_BEYOND_PX = 20.0
+"""By which the body is sought beyond its poses in the sample, even outside of its picture."""
+
+
+@dataclass(frozen=True)
+class Track:
+    """A body in all n frames of a film."""
+
+    turn: Floats
+    """(n,) rad; NaN where it is not seen."""
+    sigma: Floats
+    """(n,) standard uncertainty about a known centre, rad."""
+    gain: Floats
+    """(n,) nats."""
+    ambiguous: Flags
+    """(n,) frames in which another pose is nearly as probable."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """A body, and the turns at which it is sought in a frame."""
+
+    sample: Sample
+    fit: Fit
+    body: Body
+    few: Body
+    centre: Floats
+    """(2,) of the sample, px."""
+    arm: float
+    """Pixels of the sample by which the body moves for each rad."""
+    turns: Floats
+    """(m,) rad."""
+    temper: float
+    """Independent pixels for which one counts: neighbours are off together."""
+
+
+def search_for(sample: Sample, fit: Fit) -> Search:
+    """Prepare the search for a body that was fitted to a sample."""
+    body = body_of(fit.target)
+    assert body is not None
+    centre = sample.place(fit.proposal.centre_px)
+    arm = body.arm(centre)
+    count = int(2.0 * np.pi * arm / _STEP_PX)
+    turns = np.pi * (np.arange(count) * 2.0 / count - 1.0)
+    few = body.thinned(max(1, len(body.places) // _FEW_PIXELS))
+    poses = poses_about(centre, turns)
+    height, width = sample.median.shape
+    inside = np.empty(len(turns))
+    for k, pose in enumerate(poses):
+        x, y = pose[:, :2] @ few.places.T + pose[:, 2:]
+        inside[k] = ((x >= 0) & (y >= 0) & (x < width - 1) & (y < height - 1)).mean()
+    swept = np.ptp(fit.proposal.turn[fit.seen]) / 2.0 + _BEYOND_PX / arm
+    middle = np.nanmin(fit.proposal.turn) + np.ptp(fit.proposal.turn[fit.seen]) / 2.0
+    turns = turns[(inside >= _IN_PICTURE) | (np.abs(np.angle(np.exp(1j * (turns - middle)))) < swept)]
+    turns = turns[:: max(1, -(-len(turns) // _MOST_TURNS))]
+    search = Search(sample, fit, body, few, centre, arm, turns, max(1.0, fit.ratio))
+    return replace(search, temper=max(search.temper, _temper(search)))
+
+
+def _temper(search: Search) -> float:
+    """Return by what the gains of two poses are divided, so that their difference is their log odds.
+
+    The difference between the right pose and the best of the wrong ones has a mean and a variance over the frames of
+    the sample. Of two normal distributions with these means of either sign, the log odds of a difference d are
+    2·mean·d/variance.
+    """
+    ahead = []
+    for k in np.flatnonzero(search.fit.seen):
+        found = candidates(search, search.sample.pictures[k])
+        right = search.fit.proposal.turn[k]
+        wrong = [one.gain for one in found if abs(_wrapped(one.turn - right)) * search.arm > _APART_PX]
+        ahead.append(search.fit.gain[k] - max(wrong, default=0.0))
+    mean, variance = float(np.mean(ahead)), float(np.var(ahead))
+    return variance / (2.0 * mean) if mean > 0.0 else variance
+
+
+def candidates(search: Search, picture: Picture) -> list[Turn]:
+    """Return the turns at which a body may be in a picture, those of most likelihood."""
+    behind = log_density(picture, search.fit.target.background, search.fit.target.background_variance)
+    gains = gains_about(picture, behind, search.few, search.centre, search.turns).sum(axis=1)
+    peaks: list[float] = []
+    for at in np.argsort(-gains):
+        turn = float(search.turns[at])
+        if all(abs(_wrapped(turn - peak)) * search.arm > _APART_PX for peak in peaks):
+            peaks.append(turn)
+        if len(peaks) == _PEAKS:
+            break
+    around = np.array(peaks)[:, None] + np.array([-1.0, 0.0, 1.0]) * 0.5 * _STEP_PX / search.arm
+    whole = gains_about(picture, behind, search.body, search.centre, around.ravel()).sum(axis=1).reshape(-1, 3)
+    best = float(whole.max())
+    floor = max(best - _HOPELESS * search.temper, float(np.log(len(search.turns))) * search.fit.ratio)
+    order = [k for k in np.argsort(-whole.max(axis=1)) if whole[k].max() > floor][:_CANDIDATES]
+    near = [float(around[k, int(np.argmax(whole[k]))]) for k in order]
+    found = [turn_near(picture, behind, search.body, search.centre, turn) for turn in near]
+    apart: list[Turn] = []
+    for one in sorted((one for one in found if np.isfinite(one.turn)), key=lambda one: -one.gain):
+        if all(abs(_wrapped(one.turn - other.turn)) * search.arm > _APART_PX for other in apart):
+            apart.append(one)
+    return apart
+
+
+def _wrapped(turn: float) -> float:
+    return float((turn + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def follow(frames: Iterable[Picture | None], times: Floats, search: Search) -> Track:
+    """Follow a body.
+
+    Parameters
+    ----------
+    frames : iterable of ndarray or None
+        n frames as `Sample.seen` returns them; ``None`` without a picture.
+    times : ndarray
+        (n,) s.
+    search : Search
+        For the body.
+    """
+    return chosen([[] if picture is None else candidates(search, picture) for picture in frames], times, search)
+
+
+def chosen(found: Sequence[Sequence[Turn]], times: Floats, search: Search) -> Track:
+    """Return the most probable way through the turns that were found in n frames."""
+    path, margin = steadiest_path(
+        [np.array([one.turn for one in of_frame]) for of_frame in found],
+        [np.array([one.gain for one in of_frame]) / search.temper for of_frame in found],
+        times,
+        1.0 / search.arm,
+    )
+    picked = [None if k < 0 else of_frame[k] for k, of_frame in zip(path, found, strict=True)]
+    nan = float("nan")
+    turn = np.array([nan if one is None else one.turn for one in picked])
+    sigma = np.array([nan if one is None else one.sigma for one in picked])
+    ratio = np.array([nan if one is None else one.ratio for one in picked])
+    gain = np.array([0.0 if one is None else one.gain for one in picked])
+    seen = np.isfinite(turn)
+    turn[seen] = np.unwrap(turn[seen])
+    return Track(turn, with_ratio(sigma, ratio), gain, margin < np.log(19.0))
