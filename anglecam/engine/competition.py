@@ -15,11 +15,13 @@ import numpy as np
 from anglecam.data.typing import Floats
 from anglecam.engine.refine import Fit, refine
 from anglecam.engine.sample import Sample, noise_of
-from anglecam.engine.score import Proposal, Score, score
+from anglecam.engine.score import NOTHING, Proposal, Score, score
 from anglecam.engine.target import turned
 
 _FINALISTS = 4
 """Proposals that are fitted to the whole sample."""
+SURE = 6.0
+"""Standard errors by which a body that turns has to predict better than its rivals."""
 _APART_PX = 3.0
 """Of the sample: places of one body by two explanations that are the same."""
 
@@ -36,13 +38,13 @@ class Explanation:
     """Of the same body that moves along a straight line and does not turn."""
 
     @property
-    def turns(self) -> float:
-        """Probability that it predicts a further frame better than its rivals."""
-        return min(self.score.ahead_of(self.nothing), self.score.ahead_of(self.slides))
+    def lead(self) -> float:
+        """By how much it predicts a frame better than its rivals, in standard errors."""
+        return min(self.score.lead(self.nothing), self.score.lead(self.slides))
 
 
 def compete(sample: Sample, proposals: Sequence[Proposal]) -> list[Explanation]:
-    """Return the explanations of a sample, the one that predicts best first.
+    """Return the explanations of a sample, the surest first.
 
     Parameters
     ----------
@@ -52,23 +54,24 @@ def compete(sample: Sample, proposals: Sequence[Proposal]) -> list[Explanation]:
         Many, of which most are wrong.
     """
     small = halved(sample)
+    still = score(small, NOTHING, [None] * len(small.pictures))
     rough: list[tuple[float, Proposal]] = []
     for proposal in proposals:
         fit = refine(small, _every_other(proposal), 1)
         if fit is not None:
-            total = score(small, proposal.name, fit.proposal.poses(small)).total
-            rough.append((total, replace(proposal, centre_px=fit.proposal.centre_px, turn=_all_turns(proposal, fit))))
+            lead = score(small, proposal.name, fit.proposal.poses(small)).lead(still)
+            rough.append((lead, replace(proposal, centre_px=fit.proposal.centre_px, turn=_all_turns(proposal, fit))))
     finalists: list[Proposal] = []
     for _, proposal in sorted(rough, key=lambda one: -one[0]):
         if len(finalists) < _FINALISTS and not any(_alike(sample, proposal, other) for other in finalists):
             finalists.append(proposal)
     fits = [fit for proposal in finalists if (fit := refine(sample, proposal)) is not None]
-    nothing = score(sample, "nothing moves", [None] * len(sample.pictures))
+    nothing = score(sample, NOTHING, [None] * len(sample.pictures))
     found = [
         Explanation(fit, score(sample, fit.proposal.name, fit.proposal.poses(sample)), nothing, _sliding(sample, fit))
         for fit in fits
     ]
-    return sorted(found, key=lambda one: -one.score.total)
+    return sorted(found, key=lambda one: (one.lead < SURE, -one.score.total if one.lead >= SURE else -one.lead))
 
 
 def halved(sample: Sample) -> Sample:

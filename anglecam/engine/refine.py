@@ -28,6 +28,13 @@ _LEAST_PIXELS = 6
 _SECTORS = 6
 PARTS = 2 * _SECTORS
 """Of a body: neighbouring pixels are off together, and how much parts contradict each other shows by how much."""
+_SEARCH_PX = 2.0
+"""Step of the search for a turn, px of the body's outer pixels."""
+_MOST_TURNS = 720
+_IN_PICTURE = 0.25
+"""Share of a body that lies in the picture in a pose where it is sought."""
+_BEYOND_PX = 20.0
+"""By which it is sought beyond the poses in which it was seen, even outside of the picture."""
 _OUTER = 0.95
 """Share of a body's pixels that are nearer to the centre than its outer ones."""
 _FINE_PX = 0.5
@@ -84,6 +91,9 @@ class Fit:
     """(2, 2) of the centre, in the film, px²."""
     ratio: float
     """Usual variance by which the body's parts contradict each other, over that of independent pixels."""
+    information: Floats
+    """(3, 3) usual inverse covariance of a free pose in the coordinates of the body, if pixels were independent: turn,
+    rad, and shift of the middle, px of the sample."""
 
     @property
     def seen(self) -> Flags:
@@ -144,6 +154,7 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
         ]
         q, information = np.array([one[0] for one in free]), np.array([one[1] for one in free])
         centre, covariance, turn[seen] = common_centre(q, information, centre, body.middle)
+        usual = _usual_information(turn[seen], information)
         near = _about(sample, behind, body, centre, turn)
         turn, gain = np.array([one.turn for one in near]), np.array([one.gain for one in near])
         ratios = np.array([one.ratio for one in near])
@@ -152,8 +163,28 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
             return fit
         turn = turn - np.nanmedian(turn)
         proposal = replace(proposal, centre_px=sample.in_film(centre), turn=turn)
-        fit = Fit(proposal, target, gain, sigma, covariance / sample.scale**2, float(np.nanmedian(ratios)))
+        fit = Fit(proposal, target, gain, sigma, covariance / sample.scale**2, float(np.nanmedian(ratios)), usual)
     return fit
+
+
+def _usual_information(turn: Floats, information: Floats) -> Floats:
+    """Return the median of (n, 3, 3) information matrices of poses, in the coordinates of the body."""
+    back = np.tile(np.eye(3), (len(turn), 1, 1))
+    back[:, 1:, 1:] = _rotations(turn)[0]
+    return np.asarray(np.median(back.swapaxes(1, 2) @ information @ back, axis=0))
+
+
+def centre_sensitivity(sample: Sample, fit: Fit, body: Body, turn: Floats) -> Floats:
+    """Return (n, 2) change of turns (n,) with an error of the centre, rad/px of the film."""
+    rotation, slope = _rotations(turn)
+    arm = body.middle - sample.place(fit.proposal.centre_px)
+    turned_by = np.tile(np.eye(3), (len(turn), 1, 1))
+    turned_by[:, 1:, 1:] = rotation
+    information = turned_by @ fit.information @ turned_by.swapaxes(1, 2)
+    tangent = np.concatenate([np.ones((len(turn), 1)), slope @ arm], axis=1)
+    along = np.einsum("ni,nij->nj", tangent, information)
+    moved = np.einsum("ni,nij->nj", along[:, 1:], np.eye(2) - rotation)
+    return np.asarray(-moved / np.einsum("ni,ni->n", along, tangent)[:, None] * sample.scale)
 
 
 def gains_about(picture: Picture, behind: Picture, body: Body, centre: Floats, turns: Floats) -> Floats:
@@ -167,17 +198,43 @@ def poses_about(centre: Floats, turns: Floats) -> Floats:
     return np.concatenate([rotation, (centre - rotation @ centre)[:, :, None]], axis=2)
 
 
-def _searched(sample: Sample, behind: list[Picture], body: Body, centre: Floats, turn: Floats) -> Floats:
-    """Return the turns with those that are unknown sought in the whole range of the known ones."""
-    known = np.isfinite(turn)
+def turns_to_try(body: Body, centre: Floats, size: tuple[int, int], known: Floats) -> Floats:
+    """Return the turns at which a body may be in a picture.
+
+    Parameters
+    ----------
+    body : Body
+        The body.
+    centre : ndarray
+        (2,) px.
+    size : tuple of int
+        Height and width of the picture, px.
+    known : ndarray
+        Turns at which it was seen, rad.
+
+    Returns
+    -------
+    ndarray
+        (m,) rad, evenly spaced: where a part of the body is in the picture, and near the known ones.
+    """
     arm = body.arm(centre)
-    low, high = np.min(turn[known]) - 0.2, np.max(turn[known]) + 0.2
-    if high - low > 2.0 * np.pi:
-        low, high = -np.pi, np.pi
-    tried = np.linspace(low, high, int(np.clip((high - low) * arm / 2.0, 8, 720)))
-    few = body.thinned(4)
+    count = max(36, int(2.0 * np.pi * arm / _SEARCH_PX))
+    turns = np.pi * (np.arange(count) * 2.0 / count - 1.0)
+    few = body.thinned(max(1, len(body.places) // 50))
+    poses = poses_about(centre, turns)
+    x, y = np.moveaxis(few.places @ poses[:, :, :2].swapaxes(1, 2) + poses[:, None, :, 2], -1, 0)
+    inside = ((x >= 0) & (y >= 0) & (x < size[1] - 1) & (y < size[0] - 1)).mean(axis=1) >= _IN_PICTURE
+    reach, middle = np.ptp(known) / 2.0 + _BEYOND_PX / arm, np.min(known) + np.ptp(known) / 2.0
+    turns = turns[inside | (np.abs(np.angle(np.exp(1j * (turns - middle)))) < reach)]
+    return turns[:: max(1, -(-len(turns) // _MOST_TURNS))]
+
+
+def _searched(sample: Sample, behind: list[Picture], body: Body, centre: Floats, turn: Floats) -> Floats:
+    """Return the turns with those that are unknown sought wherever the body may be."""
+    tried = turns_to_try(body, centre, sample.median.shape, turn[np.isfinite(turn)])
+    few = body.thinned(max(1, len(body.places) // 250))
     found = turn.copy()
-    for k in np.flatnonzero(~known):
+    for k in np.flatnonzero(~np.isfinite(turn)):
         gains = gains_about(sample.pictures[k], behind[k], few, centre, tried).sum(axis=1)
         best = int(np.argmax(gains))
         if gains[best] > np.log(len(tried)) + _ODDS:

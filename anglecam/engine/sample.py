@@ -24,6 +24,12 @@ _CHANGE = 6.0
 depends on it; every pixel that is kept is compared. Of 10⁵ pixels in 48 frames none differs as much by chance."""
 _LEFT_OUT = 0.01
 """Share of the change that may lie beyond each side of the part that is kept."""
+_NEIGHBOURS, _MUCH = 0.03, 0.2
+"""Changes within this share of the picture's side are one part of it if they reach this share of the greatest."""
+_PARTS = 2
+"""Parts that are looked at closer, at most."""
+_CLOSER = 0.7
+"""Largest share of the side of all that changes for which a part is worth a closer look."""
 _MARGIN = 0.15
 """Of the longer side of what changes: the part of the surroundings that is kept."""
 _LEAST_NOISE = 0.5
@@ -89,37 +95,54 @@ class Stills:
     """(K,) their numbers in the film."""
 
 
-def sample_stills(stills: Stills, box_px: Floats | None = None) -> Sample | None:
+def sample_stills(stills: Stills) -> list[Sample]:
     """Cut frames to where something changes, and reduce them.
 
     Parameters
     ----------
     stills : Stills
         Of the film.
-    box_px : (4,) ndarray, optional
-        Left, top, right, bottom of the part to look at, px; by default where most of the change is.
 
     Returns
     -------
-    Sample or None
-        Without frames that show another picture altogether, such as black ones; ``None`` where nothing changes.
+    list of Sample
+        Of all that changes, and closer ones of parts in which much changes, if they are small; empty where nothing
+        changes.
     """
     height, width = stills.images[0].shape[:2]
     small = min(1.0, LONGEST_PX / max(width, height))
     whole = np.stack([_seen(*one, small) for one in zip(stills.images, stills.moves, strict=True)])
-    shown = np.flatnonzero(_alike(whole))
-    if box_px is None:
-        box = _changed_box(steady_light(whole[shown]))
-        box_px = None if box is None else box / small
-    if box_px is None or len(shown) < _LEAST_FRAMES:
-        return None
+    boxes = _changed_boxes(steady_light(whole[_alike(whole)]))
+    found = (sample_part(stills, box / small) for box in boxes)
+    return [one for one in found if one is not None]
+
+
+def sample_part(stills: Stills, box_px: Floats) -> Sample | None:
+    """Cut frames to a part of the picture, and reduce them.
+
+    Parameters
+    ----------
+    stills : Stills
+        Of the film.
+    box_px : (4,) ndarray
+        Left, top, right, bottom, px.
+
+    Returns
+    -------
+    Sample or None
+        Without frames that show another picture altogether, such as black ones; ``None`` if they are too few.
+    """
+    height, width = stills.images[0].shape[:2]
     left, top, right, bottom = np.clip(np.round(box_px), 0, [width, height] * 2).astype(int).tolist()
     if min(right - left, bottom - top) < _LEAST_SIDE_PX:
         return None
     scale = min(1.0, LONGEST_PX / max(right - left, bottom - top))
     part = np.s_[top:bottom, left:right]
-    pictures = np.stack([_seen(stills.images[k], stills.moves[k], scale, part) for k in shown])
-    return sample_of(pictures, stills.frames[shown], scale, np.array([left, top]))
+    pictures = np.stack([_seen(*one, scale, part) for one in zip(stills.images, stills.moves, strict=True)])
+    shown = _alike(pictures)
+    if shown.sum() < _LEAST_FRAMES:
+        return None
+    return sample_of(pictures[shown], stills.frames[shown], scale, np.array([left, top]))
 
 
 def _alike(pictures: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -177,14 +200,28 @@ def _seen(
     return cv2.resize(grey[part], size, interpolation=cv2.INTER_AREA, **factor).astype(np.float32)
 
 
-def _changed_box(pictures: NDArray[np.float32]) -> Floats | None:
-    """Return left, top, right, bottom of where most of the change is, with a margin, px."""
+def _changed_boxes(pictures: NDArray[np.float32]) -> list[Floats]:
+    """Return left, top, right, bottom, px, of where most of the change is, and of smaller parts with much change."""
     noise = noise_of(pictures)
     off = np.abs(pictures - np.median(pictures, axis=0))
     smooth = np.stack([cv2.GaussianBlur(one, (0, 0), 1.0) for one in off])
     change = np.where(smooth > _CHANGE * noise, smooth**2, 0.0).mean(axis=0)
     if not change.any():
-        return None
+        return []
+    whole = _box_of(change)
+    spread = cv2.GaussianBlur(change, (0, 0), _NEIGHBOURS * max(change.shape))
+    _, labels = cv2.connectedComponents((spread > _MUCH * spread.max()).astype(np.uint8))
+    parts = [np.where(labels == k, change, 0.0) for k in range(1, labels.max() + 1)]
+    boxes = [_box_of(part) for part in sorted(parts, key=lambda part: -float(part.sum())) if part.any()]
+    side = _side(whole)
+    return [whole, *[box for box in boxes if _side(box) < _CLOSER * side][:_PARTS]]
+
+
+def _side(box: Floats) -> float:
+    return float(max(box[2] - box[0], box[3] - box[1]))
+
+
+def _box_of(change: NDArray[np.float64]) -> Floats:
     sides = []
     for axis in (0, 1):
         share = np.cumsum(change.sum(axis=axis)) / change.sum()

@@ -52,9 +52,13 @@ class Score:
 
     def ahead_of(self, other: Score) -> float:
         """Return the probability that this explanation predicts a further frame better than another one."""
+        return float(special.ndtr(self.lead(other)))
+
+    def lead(self, other: Score) -> float:
+        """Return by how much this explanation predicts a frame better than another one, in standard errors."""
         apart = self.per_frame - other.per_frame
         error = float(apart.std(ddof=1)) / np.sqrt(len(apart))
-        return float(special.ndtr(apart.mean() / error)) if error > 0.0 else 0.5
+        return float(apart.mean()) / error if error > 0.0 else 0.0
 
 
 def score(sample: Sample, name: str, poses: Sequence[Floats | None]) -> Score:

@@ -15,13 +15,12 @@ import numpy as np
 from anglecam.data.typing import Flags, Floats
 from anglecam.engine.likelihood import log_density
 from anglecam.engine.path import steadiest_path
-from anglecam.engine.refine import Body, Fit, Turn, body_of, gains_about, poses_about, turn_near, with_ratio
+from anglecam.engine.refine import Body, Fit, Turn, body_of, gains_about, turn_near, turns_to_try, with_ratio
 from anglecam.engine.sample import Sample
 from anglecam.engine.target import Picture
 
 _STEP_PX = 2.0
 """Of the search for a turn."""
-_MOST_TURNS = 720
 _FEW_PIXELS = 250
 """By which the whole circle is searched."""
 _PEAKS, _CANDIDATES = 24, 12
@@ -30,10 +29,6 @@ _HOPELESS = 60.0
 """Nats by which a pose may be less probable than the best one: the steadiest motion does not make up for more."""
 _APART_PX = 6.0
 """Least distance of poses that count as two."""
-_IN_PICTURE = 0.25
-"""Share of a body that lies in the picture in a pose where it is sought."""
-_BEYOND_PX = 20.0
-"""By which the body is sought beyond its poses in the sample, even outside of its picture."""
 
 
 @dataclass(frozen=True)
@@ -74,19 +69,8 @@ def search_for(sample: Sample, fit: Fit) -> Search:
     assert body is not None
     centre = sample.place(fit.proposal.centre_px)
     arm = body.arm(centre)
-    count = int(2.0 * np.pi * arm / _STEP_PX)
-    turns = np.pi * (np.arange(count) * 2.0 / count - 1.0)
     few = body.thinned(max(1, len(body.places) // _FEW_PIXELS))
-    poses = poses_about(centre, turns)
-    height, width = sample.median.shape
-    inside = np.empty(len(turns))
-    for k, pose in enumerate(poses):
-        x, y = pose[:, :2] @ few.places.T + pose[:, 2:]
-        inside[k] = ((x >= 0) & (y >= 0) & (x < width - 1) & (y < height - 1)).mean()
-    swept = np.ptp(fit.proposal.turn[fit.seen]) / 2.0 + _BEYOND_PX / arm
-    middle = np.nanmin(fit.proposal.turn) + np.ptp(fit.proposal.turn[fit.seen]) / 2.0
-    turns = turns[(inside >= _IN_PICTURE) | (np.abs(np.angle(np.exp(1j * (turns - middle)))) < swept)]
-    turns = turns[:: max(1, -(-len(turns) // _MOST_TURNS))]
+    turns = turns_to_try(body, centre, sample.median.shape, fit.proposal.turn[fit.seen])
     search = Search(sample, fit, body, few, centre, arm, turns, max(1.0, fit.ratio))
     return replace(search, temper=max(search.temper, _temper(search)))
 

@@ -18,10 +18,10 @@ from anglecam.data.typing import Flags, Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.registration_pass import Registered
+from anglecam.measurement.rigid_motion import RigidMotion
 from anglecam.measurement.sigma import PlaceErrors, Sigma, angle_sigma, place_errors
 from anglecam.vision.image.transforms import rotate_each
 from anglecam.vision.pivot.estimate import PivotEstimate
-from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 
 _THICK = 0.25
 """Standard deviation of the height of a mark's visible part, as a share of the root of its area."""

@@ -16,13 +16,13 @@ from anglecam.data.typing import Floats
 from anglecam.errors import InputError
 from anglecam.io.rig import RigMark
 from anglecam.measurement.body_ahead import TurnsAhead
+from anglecam.measurement.rigid_motion import RigidMotion
 from anglecam.video.film import Film, Frame
 from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.pivot.circle import Circle
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.pivot.marker import RoundMarker
-from anglecam.vision.rigid_body.centre_of_rotation import RigidMotion
 from anglecam.vision.stabilise.background_motion import CameraMove
 
 _SAMPLE_BYTES = 100_000_000

@@ -71,7 +71,7 @@ def seek_mark(film: Film, rig: Rig) -> FoundMark:
     """
     lens = lens_from_rig(rig, film.size, film.path)
     sample, samples = _sampled(film, rig, None, lens)
-    return _sought(film, rig, sample, samples, lens)
+    return _sought(film, rig, sample, samples, lens, any_colour=True)
 
 
 def detect_mark(
@@ -177,9 +177,11 @@ def _sampled(film: Film, rig: Rig, steady: BackgroundMotion | None, lens: Lens) 
     return sample, _samples(film, frames, pointed, steady, lens)
 
 
-def _sought(film: Film, rig: Rig, sample: Sample, samples: Samples, lens: Lens) -> FoundMark:
+def _sought(
+    film: Film, rig: Rig, sample: Sample, samples: Samples, lens: Lens, *, any_colour: bool = False
+) -> FoundMark:
     near = None if rig.pivot.expected is None else lens.rectify(rig.pivot.expected)
-    found = find_mark(samples, rig.mark_rgb, near) if samples.images else None
+    found = find_mark(samples, rig.mark_rgb, near, any_colour=any_colour) if samples.images else None
     if found is None:
         raise MarkNotFoundError(_no_mark(film.path, sample, rig))
     return found

@@ -24,8 +24,6 @@ from anglecam.measurement.one_rigid_mark import FLOOR_PX, MAX_OFF_CIRCLE, PIVOT_
 from anglecam.measurement.pivot import HINT_PX
 from anglecam.vision.pivot.circle import Circle
 
-_MAX_OFF_CENTRE = 0.1
-"""The same for a body whose rotation is seen on itself: the pivot's place then hardly enters the angle."""
 _MAX_SCALE_SIGMA = 0.2
 """Relative standard uncertainty of the path's radius from which on the path does not show its centre, as for a pivot
 (`anglecam.vision.pivot.estimate`), and of a body's rotation from which on it is not seen."""
@@ -100,11 +98,11 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
     at_rest = not detections.moves or travelled < _TRAVEL_PX
     if at_rest and not declared:
         return f"nothing is seen to turn; to measure a mechanism at rest, declare {_DECLARE}"
+    if detections.body is not None:
+        return _why_not_seen_to_turn(angles)
     otherwise = None if at_rest else why_off_circle(detections, angles)
     if otherwise is None and not seen_to_turn:
         otherwise = why_not_one_mark(detections, ok, angles)
-    if otherwise is None and detections.body is not None:
-        otherwise = _why_not_seen_to_turn(angles)
     if otherwise is not None:
         return otherwise
     if not declared and not seen_to_turn and not shows_its_centre(detections.circle):
@@ -139,11 +137,8 @@ def why_off_circle(detections: Detections, angles: Angles) -> str | None:
         With the variation of the distance, and the travel.
     """
     travelled = travel(angles.mark_px)
-    off, share = _off_circle(detections, angles), MAX_OFF_CIRCLE
-    if detections.body is not None:
-        off, share = detections.body.pivot_scatter_px, _MAX_OFF_CENTRE
-        travelled = float(np.hypot(travelled, detections.body.extent_px * np.nanstd(detections.body.turn)))
-    if off <= max(share * travelled, FLOOR_PX):
+    off = _off_circle(detections, angles)
+    if off <= max(MAX_OFF_CIRCLE * travelled, FLOOR_PX):
         return None
     return (
         f"what moves does not turn about a fixed pivot: its distance from the centre varies by {off:.2g} px RMS"

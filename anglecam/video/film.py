@@ -197,15 +197,23 @@ class Film:
             As `frames`.
         """
         if most not in self._samples:
-            decoded = [(number, row) for number, row in self.rows.kept.rows if row[1] is not None]
-            stride = 1
-            while len(first_of_each(stride, decoded)) > most:
-                stride *= 2
-            pictures = [self.picture(number, row) for number, row in first_of_each(stride, decoded)]
+            pictures, decoded = self._evenly_spaced(most)
             frames = tuple(Frame(p.index, p.time, p.colours) for p in pictures)
-            intact = self.rows.count - self.rows.undecodable if self.rows.is_read else len(decoded)
+            intact = self.rows.count - self.rows.undecodable if self.rows.is_read else decoded
             self._samples[most] = Sample(frames, self.rows.count, intact)
         return self._samples[most]
+
+    def stills(self, most: int) -> list[Picture]:
+        """Return the pictures of the frames that `sample` returns, to be converted when they are needed."""
+        return self._evenly_spaced(most)[0]
+
+    def _evenly_spaced(self, most: int) -> tuple[list[Picture], int]:
+        """Return at most ``most`` pictures, and of how many they are chosen."""
+        decoded = [(number, row) for number, row in self.rows.kept.rows if row[1] is not None]
+        stride = 1
+        while len(first_of_each(stride, decoded)) > most:
+            stride *= 2
+        return [self.picture(number, row) for number, row in first_of_each(stride, decoded)], len(decoded)
 
     def thinned(self) -> Film | None:
         """Return the film that consists of the frames kept in memory; ``None`` where these are all of its frames."""

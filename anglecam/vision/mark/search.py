@@ -51,7 +51,9 @@ _RED_PRIOR = 10.0
 more from the wall."""
 
 
-def find_mark(samples: Samples, rgb: tuple[int, int, int] | None, near_px: Floats | None) -> FoundMark | None:
+def find_mark(
+    samples: Samples, rgb: tuple[int, int, int] | None, near_px: Floats | None, *, any_colour: bool
+) -> FoundMark | None:
     """Find the mark and learn its colour from frames spread over a clip.
 
     Parameters
@@ -63,6 +65,8 @@ def find_mark(samples: Samples, rgb: tuple[int, int, int] | None, near_px: Float
         to skin, that moves, or a thing of any other colour that moves.
     near_px : ndarray, optional
         (2,) hint at the pivot in the plane of motion, px. Where nothing rotates around it, other centres are tried.
+    any_colour : bool
+        Whether an undeclared mark may have any colour that moves, or is red.
 
     Returns
     -------
@@ -75,7 +79,7 @@ def find_mark(samples: Samples, rgb: tuple[int, int, int] | None, near_px: Float
     elif samples.pointed_px is not None:
         cues = pointed_cues(samples.images[0], samples.pointed_px)
     else:
-        cues = [RED, *([] if at_rest else moving_cues(samples.stabilised))]
+        cues = [RED, *(moving_cues(samples.stabilised) if any_colour and not at_rest else [])]
     labs = map_in_threads(_lab_in_planes, samples.images)
     marks = map_in_threads(lambda cue: _mark_of_cue(cue, samples, labs, near_px, at_rest), cues)
     found = [mark for mark in marks if mark is not None]

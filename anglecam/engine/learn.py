@@ -1,0 +1,145 @@
+"""From the frames of a film to the body that turns in them: proposals, competition, and a closer look at the winner."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from anglecam.data.typing import Floats
+from anglecam.engine.competition import SURE, Explanation, compete
+from anglecam.engine.proposals import blobs, features, polar
+from anglecam.engine.sample import Sample, Stills, sample_part, sample_stills
+from anglecam.engine.score import Proposal
+from anglecam.engine.target import turned
+
+Finder = Callable[[Sample], list[Proposal]]
+FINDERS: tuple[Finder, ...] = (blobs.proposals, features.proposals, polar.proposals)
+_CLOSER = 1.3
+"""Least enlargement for which the pictures are sampled again."""
+_MARGIN = 0.1
+"""Of the surroundings of what a body sweeps, as a share of its extent."""
+
+
+@dataclass(frozen=True)
+class Hints:
+    """What somebody declares about the body; px of the film."""
+
+    pivot_px: Floats | None = None
+    """(2,) about where it turns."""
+    pivot_sigma_px: float = 30.0
+    """Standard uncertainty of each coordinate."""
+    mark_px: Floats | None = None
+    """(4,) box, left, top, right, bottom, that covers a part of it."""
+    mark_frame: int = 0
+    """In which frame of the film."""
+
+
+NO_HINTS = Hints()
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """What moves in a film."""
+
+    sample: Sample
+    explanations: tuple[Explanation, ...]
+    """Of the sample; the first is the most probable one that obeys the hints."""
+
+    @property
+    def turns(self) -> bool:
+        """Whether the first explanation is a body that turns."""
+        return bool(self.explanations) and self.explanations[0].lead >= SURE
+
+
+def learn(stills: Stills, hints: Hints = NO_HINTS, proposed: Sequence[Proposal] = ()) -> Learnt | None:
+    """Find the body that turns in a film.
+
+    Parameters
+    ----------
+    stills : Stills
+        Frames of the film.
+    hints : Hints
+        What is declared.
+    proposed : sequence of Proposal
+        Further proposals, with a turn for each frame of the stills.
+
+    Returns
+    -------
+    Learnt or None
+        ``None`` where nothing moves.
+    """
+    looked = [_explained(sample, stills, hints, proposed) for sample in sample_stills(stills)]
+    if not looked:
+        return None
+    return min(looked, key=lambda one: _rank(one.explanations[0], one.sample, hints) if one.explanations else (True, 0.0))
+
+
+def _explained(sample: Sample, stills: Stills, hints: Hints, proposed: Sequence[Proposal]) -> Learnt:
+    proposals = [one for find in FINDERS for one in find(sample)]
+    proposals += [_of_frames(one, stills, sample) for one in proposed]
+    found = sorted(compete(sample, proposals), key=lambda one: not obeys(one, sample, hints))
+    if not found:
+        return Learnt(sample, ())
+    closer = sample_part(stills, _swept(sample, found[0]))
+    if closer is not None and closer.scale > _CLOSER * sample.scale:
+        again = compete(closer, [_of_frames(found[0].fit.proposal, _as_stills(sample), closer)])
+        if again and again[0].lead >= min(SURE, found[0].lead):
+            return Learnt(closer, (again[0], *found[1:]))
+    return Learnt(sample, tuple(found))
+
+
+def _rank(one: Explanation, sample: Sample, hints: Hints) -> tuple[bool, float]:
+    """Return by what explanations are ordered: those that obey the hints first, then the surest."""
+    return not obeys(one, sample, hints), -one.lead
+
+
+def obeys(one: Explanation, sample: Sample, hints: Hints) -> bool:
+    """Return whether a body turns about the hinted pivot and is where it was pointed at."""
+    if hints.pivot_px is not None:
+        off = one.fit.proposal.centre_px - hints.pivot_px
+        spread = one.fit.covariance_px2 + hints.pivot_sigma_px**2 * np.eye(2)
+        if off @ np.linalg.solve(spread, off) > _FAR:
+            return False
+    if hints.mark_px is None:
+        return True
+    k = int(np.argmin(np.abs(sample.frames - hints.mark_frame)))
+    turn = one.fit.proposal.turn[k]
+    if sample.frames[k] != hints.mark_frame or not np.isfinite(turn):
+        return True  # nothing contradicts it
+    rows, columns = np.nonzero(one.fit.target.visibility)
+    places = np.column_stack([columns, rows]) - float(one.fit.target.pad)
+    pose = turned(sample.place(one.fit.proposal.centre_px), float(turn))
+    there = sample.in_film(places @ pose[:, :2].T + pose[:, 2])
+    slack = _BESIDE_PX / sample.scale
+    low, high = hints.mark_px[:2] - slack, hints.mark_px[2:] + slack
+    return bool(((there >= low) & (there <= high)).all(axis=1).any())
+
+
+_FAR = 9.0
+"""Squared standard uncertainties by which a hint may be off the centre: true hints are so in 1 % of all films."""
+_BESIDE_PX = 3.0
+"""Of the sample: by which a place that is pointed at may lie beside the body."""
+
+
+def _swept(sample: Sample, one: Explanation) -> Floats:
+    """Return left, top, right, bottom of what a body covers in the frames, with a margin, px of the film."""
+    rows, columns = np.nonzero(one.fit.target.visibility)
+    places = np.column_stack([columns, rows]) - float(one.fit.target.pad)
+    centre = sample.place(one.fit.proposal.centre_px)
+    poses = [turned(centre, float(turn)) for turn in one.fit.proposal.turn[one.fit.seen]]
+    low = np.min([(places @ pose[:, :2].T + pose[:, 2]).min(axis=0) for pose in poses], axis=0)
+    high = np.max([(places @ pose[:, :2].T + pose[:, 2]).max(axis=0) for pose in poses], axis=0)
+    margin = max(4.0, _MARGIN * float((high - low).max()))
+    return np.concatenate([sample.in_film(low - margin), sample.in_film(high + margin)])
+
+
+def _of_frames(one: Proposal, stills: Stills, sample: Sample) -> Proposal:
+    """Return a proposal with its turns in the frames of a sample."""
+    turn = dict(zip(stills.frames.tolist(), one.turn, strict=True))
+    return Proposal(one.name, one.centre_px, np.array([turn.get(k, np.nan) for k in sample.frames.tolist()]))
+
+
+def _as_stills(sample: Sample) -> Stills:
+    return Stills((), (), sample.frames)

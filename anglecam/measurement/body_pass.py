@@ -1,0 +1,201 @@
+"""The coarse pass over a clip without a mark: find out what turns, and follow it through all frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anglecam.camera.lens import lens_from_rig
+from anglecam.data.series import OK
+from anglecam.data.typing import Floats, Image
+from anglecam.engine.learn import Hints, Learnt, learn
+from anglecam.engine.reasons import why_nothing_turns
+from anglecam.engine.refine import Turn, centre_sensitivity
+from anglecam.engine.sample import FRAMES, Stills
+from anglecam.engine.tracking import Search, Track, candidates, chosen, search_for
+from anglecam.errors import InputError
+from anglecam.io.rig import Rig
+from anglecam.measurement.camera_pass import HeldCamera
+from anglecam.measurement.detections import Detections, frame_of_mark
+from anglecam.measurement.pivot import find_pivot
+from anglecam.measurement.rigid_motion import RigidMotion
+from anglecam.progress import Progress, Stage, unseen, watched
+from anglecam.video.film import Film
+from anglecam.video.picture import Picture
+from anglecam.vision.image.noise import pixel_noise
+from anglecam.vision.pivot.circle import Circle
+from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
+from anglecam.vision.status import AMBIGUOUS, OCCLUDED, UNDECODABLE
+
+_HINT_PX = 30.0
+"""Standard uncertainty of a hint at the pivot, which is by eye."""
+
+
+def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> Detections:
+    """Find what turns in a clip, and its turn in every frame.
+
+    Parameters
+    ----------
+    camera : HeldCamera
+        The clip, and how its camera moves.
+    rig : Rig
+        Declares mark, pivot and camera.
+    progress : Progress
+        Called with each stage, and after each frame.
+
+    Returns
+    -------
+    Detections
+        Of a body.
+
+    Raises
+    ------
+    InputError
+        Where nothing is seen to turn: one line with what was seen, and what can be declared.
+    """
+    film = camera.film
+    progress(Stage("looking for what turns"))
+    pictures = film.stills(FRAMES)
+    learnt = learn(_stills(pictures, camera), _hints(film, rig))
+    if learnt is None or not learnt.turns:
+        raise InputError(f"{film.path}: {why_nothing_turns(learnt)}")
+    search = search_for(learnt.sample, learnt.explanations[0].fit)
+    seen = _follow(camera, search, progress)
+    return _detections(film, rig, pictures, seen, _motion(search, seen, film), progress)
+
+
+def _hints(film: Film, rig: Rig) -> Hints:
+    mark, pivot = rig.pointed_mark, rig.pivot
+    if mark is not None:
+        frame_of_mark(film, mark)  # it has to exist
+    return Hints(
+        pivot_px=None if pivot.expected is None else np.array(pivot.expected),
+        pivot_sigma_px=_HINT_PX if pivot.at is None else max(_HINT_PX, pivot.sigma_px or 0.0),
+        mark_px=None if mark is None else np.array(mark.as_box),
+        mark_frame=0 if mark is None else mark.frame - film.first_frame,
+    )
+
+
+def _image(picture: Picture, camera: HeldCamera) -> Image | None:
+    """Return a picture as the body is sought in it: its colours are needed where the scenery is followed."""
+    return picture.brightness if camera.steady is None else picture.colours
+
+
+def _stills(pictures: list[Picture], camera: HeldCamera) -> Stills:
+    """Return pictures, without those in which the camera's motion is unknown."""
+    images, maps, numbers = list[Image](), list[Floats | None](), list[int]()
+    for picture in pictures:
+        image = _image(picture, camera)
+        move = None if image is None else _move(image, picture, camera.steady)
+        if image is not None and (move is None or move.known):
+            images.append(image)
+            maps.append(None if move is None else _affine(move))
+            numbers.append(picture.index)
+    return Stills(images, maps, np.array(numbers))
+
+
+def _move(image: Image, picture: Picture, steady: BackgroundMotion | None) -> CameraMove | None:
+    return None if steady is None else steady.at(image, picture.predicted)
+
+
+def _affine(move: CameraMove) -> Floats:
+    """Return the (2, 3) map from the picture of a camera at rest to a frame."""
+    origin, x, y = (move.to_frame(np.array(point, float)) for point in ((0, 0), (1, 0), (0, 1)))
+    return np.column_stack([x - origin, y - origin, origin])
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What one reading of all frames found."""
+
+    time: Floats
+    track: Track
+    decoded: list[bool]
+    repeated: list[bool]
+    moves: list[CameraMove]
+    """Of the camera; empty where it stands still."""
+
+
+def _follow(camera: HeldCamera, search: Search, progress: Progress) -> _Seen:
+    film = camera.film
+    time, decoded, repeated = list[float](), list[bool](), list[bool]()
+    moves, found = list[CameraMove](), list[list[Turn]]()
+    before: Image | None = None
+    shown = film.pictures(lambda picture: _image(picture, camera))
+    for picture, image in watched(shown, progress, "following what turns", film.count):
+        time.append(picture.time)
+        decoded.append(image is not None)
+        repeated.append(image is not None and before is not None and np.array_equal(image, before))
+        before = image
+        move = UNKNOWN_MOVE if image is None and camera.steady else None
+        if image is not None:
+            move = _move(image, picture, camera.steady)
+        if move is not None:
+            moves.append(move)
+        unknown = image is None or (move is not None and not move.known)
+        affine = None if move is None or unknown else _affine(move)
+        found.append([] if unknown or image is None else candidates(search, search.sample.seen(image, affine)))
+    times = np.array(time)
+    return _Seen(times, chosen(found, times, search), decoded, repeated, moves)
+
+
+def _motion(search: Search, seen: _Seen, film: Film) -> RigidMotion:
+    track, fit, sample = seen.track, search.fit, search.sample
+    known = np.isfinite(track.turn)
+    sensitivity = np.full((len(track.turn), 2), np.nan)
+    sensitivity[known] = centre_sensitivity(sample, fit, search.body, track.turn[known])
+    middle = float(np.median(track.turn[known])) if known.any() else 0.0
+    arm = search.body.middle - search.centre
+    cos, sin = np.cos(middle), np.sin(middle)
+    centre = search.centre + np.array([cos * arm[0] + sin * arm[1], -sin * arm[0] + cos * arm[1]])
+    status = [
+        UNDECODABLE if not shown else AMBIGUOUS if vague else OK if ok else OCCLUDED
+        for shown, vague, ok in zip(seen.decoded, track.ambiguous, known, strict=True)
+    ]
+    return RigidMotion(
+        turn=track.turn - middle,
+        sigma=track.sigma,
+        pivot_sensitivity=sensitivity,
+        pivot_px=fit.proposal.centre_px,
+        pivot_covariance_px2=fit.covariance_px2,
+        centre_px=sample.in_film(centre),
+        extent_px=search.body.reach / sample.scale,
+        status=tuple(status),
+    )
+
+
+def _detections(
+    film: Film, rig: Rig, pictures: list[Picture], seen: _Seen, body: RigidMotion, progress: Progress
+) -> Detections:
+    sample = film.sample(FRAMES)
+    images = [frame.image for frame in sample.frames if frame.image is not None]
+    lens = lens_from_rig(rig, film.size, film.path)
+    lever = float(np.hypot(*(body.centre_px - body.pivot_px)))
+    covariance = np.pad(body.pivot_covariance_px2, (0, 1))
+    covariance[2, 2] = np.trace(body.pivot_covariance_px2)
+    turned = Circle(body.pivot_px, lever, 0.0, covariance, np.ones(len(seen.time), bool))
+    marker, pivot, disagreement = find_pivot(images, rig, turned, lens)
+    if OK not in body.status or pivot is None:
+        raise InputError(f"{film.path}: none of {len(seen.time)} frames shows what turns in the sampled ones")
+    return Detections(
+        time=seen.time,
+        status=body.status,
+        regions=(None,) * len(seen.time),
+        smeared=np.zeros(len(seen.time), bool),
+        pivot=pivot,
+        marker=marker,
+        circle=None,
+        moves=True,
+        lens=lens,
+        camera_moves=tuple(seen.moves) or None,
+        body=body,
+        by="body",
+        clear=True,
+        noise=pixel_noise(images),
+        repeated=np.array(seen.repeated),
+        colour_rgb=None,
+        size=film.size,
+        truncated=film.why_truncated(sample),
+        notes=("the body that turns is measured, without a mark", *([disagreement] if disagreement else [])),
+    )
