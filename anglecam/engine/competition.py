@@ -22,6 +22,8 @@ _FINALISTS = 4
 """Proposals that are fitted to the whole sample."""
 SURE = 6.0
 """Standard errors by which a body that turns has to predict better than its rivals."""
+OFF_CENTRE = 0.03
+"""Share of its travel by which a body may be off a turn about one centre; its angle is then off by as much."""
 _APART_PX = 3.0
 """Of the sample: places of one body by two explanations that are the same."""
 
@@ -41,6 +43,11 @@ class Explanation:
     def lead(self) -> float:
         """By how much it predicts a frame better than its rivals, in standard errors."""
         return min(self.score.lead(self.nothing), self.score.lead(self.slides))
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is a body that turns about one centre."""
+        return self.lead >= SURE and self.fit.off_centre <= OFF_CENTRE
 
 
 def compete(sample: Sample, proposals: Sequence[Proposal]) -> list[Explanation]:
@@ -71,7 +78,7 @@ def compete(sample: Sample, proposals: Sequence[Proposal]) -> list[Explanation]:
         Explanation(fit, score(sample, fit.proposal.name, fit.proposal.poses(sample)), nothing, _sliding(sample, fit))
         for fit in fits
     ]
-    return sorted(found, key=lambda one: (one.lead < SURE, -one.score.total if one.lead >= SURE else -one.lead))
+    return sorted(found, key=lambda one: (not one.turns, -one.score.total if one.turns else -one.lead))
 
 
 def halved(sample: Sample) -> Sample:

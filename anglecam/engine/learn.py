@@ -6,13 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from anglecam.data.typing import Floats
-from anglecam.engine.competition import SURE, Explanation, compete
+from anglecam.engine.competition import Explanation, compete
 from anglecam.engine.proposals import blobs, features, polar
 from anglecam.engine.sample import Sample, Stills, sample_part, sample_stills
 from anglecam.engine.score import Proposal
 from anglecam.engine.target import turned
+from anglecam.threads import one_opencv_thread
 
 Finder = Callable[[Sample], list[Proposal]]
 FINDERS: tuple[Finder, ...] = (blobs.proposals, features.proposals, polar.proposals)
@@ -49,8 +51,8 @@ class Learnt:
 
     @property
     def turns(self) -> bool:
-        """Whether the first explanation is a body that turns."""
-        return bool(self.explanations) and self.explanations[0].lead >= SURE
+        """Whether the first explanation is a body that turns about one centre."""
+        return bool(self.explanations) and self.explanations[0].turns
 
 
 def learn(stills: Stills, hints: Hints = NO_HINTS, proposed: Sequence[Proposal] = ()) -> Learnt | None:
@@ -70,10 +72,13 @@ def learn(stills: Stills, hints: Hints = NO_HINTS, proposed: Sequence[Proposal] 
     Learnt or None
         ``None`` where nothing moves.
     """
-    looked = [_explained(sample, stills, hints, proposed) for sample in sample_stills(stills)]
-    if not looked:
-        return None
-    return min(looked, key=lambda one: _rank(one.explanations[0], one.sample, hints) if one.explanations else (True, 0.0))
+    looked: list[Learnt] = []
+    with one_opencv_thread(), threadpool_limits(1, "blas"):  # matrices this small take longer with more
+        for sample in sample_stills(stills):
+            looked.append(_explained(sample, stills, hints, proposed))
+            if looked[-1].turns and obeys(looked[-1].explanations[0], looked[-1].sample, hints):
+                break
+    return min(looked, key=lambda one: _rank(one, hints), default=None)
 
 
 def _explained(sample: Sample, stills: Stills, hints: Hints, proposed: Sequence[Proposal]) -> Learnt:
@@ -85,14 +90,17 @@ def _explained(sample: Sample, stills: Stills, hints: Hints, proposed: Sequence[
     closer = sample_part(stills, _swept(sample, found[0]))
     if closer is not None and closer.scale > _CLOSER * sample.scale:
         again = compete(closer, [_of_frames(found[0].fit.proposal, _as_stills(sample), closer)])
-        if again and again[0].lead >= min(SURE, found[0].lead):
+        if again and (again[0].turns or not found[0].turns):
             return Learnt(closer, (again[0], *found[1:]))
     return Learnt(sample, tuple(found))
 
 
-def _rank(one: Explanation, sample: Sample, hints: Hints) -> tuple[bool, float]:
-    """Return by what explanations are ordered: those that obey the hints first, then the surest."""
-    return not obeys(one, sample, hints), -one.lead
+def _rank(one: Learnt, hints: Hints) -> tuple[bool, bool, float]:
+    """Return by what looks at parts of the picture are ordered: a body that obeys the hints, that turns, is sure."""
+    if not one.explanations:
+        return True, True, 0.0
+    first = one.explanations[0]
+    return not obeys(first, one.sample, hints), not first.turns, -first.lead
 
 
 def obeys(one: Explanation, sample: Sample, hints: Hints) -> bool:

@@ -26,15 +26,15 @@ def log_density(picture, mean, variance):  # type: ignore[no-untyped-def]
         (h, w) float32; grey levels, and grey levels².
     """
     result = np.empty_like(picture)
-    floor = _OUTLIERS / 256.0
+    floor, unknown = np.float32(_OUTLIERS / 256.0), np.float32(log(1.0 / 256.0))
+    scale, half = np.float32((1.0 - _OUTLIERS) / sqrt(2.0 * pi)), np.float32(-0.5)
     for i in range(picture.shape[0]):
         for j in range(picture.shape[1]):
             off, spread = picture[i, j] - mean[i, j], variance[i, j]
-            if not (off * off >= 0.0 and spread > 0.0):  # unknown
-                result[i, j] = log(1.0 / 256.0)
+            if not (off * off >= 0.0 and spread > 0.0):
+                result[i, j] = unknown
                 continue
-            normal = exp(-0.5 * off * off / spread) / sqrt(2.0 * pi * spread)
-            result[i, j] = log((1.0 - _OUTLIERS) * normal + floor)
+            result[i, j] = log(scale / sqrt(spread) * exp(half * off * off / spread) + floor)
     return result
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from anglecam.engine.competition import SURE
 from anglecam.engine.learn import Learnt
 
 _REST = "to measure a mechanism at rest, declare pivot: {at: [x, y], sigma_px: s} in rig.yaml"
@@ -26,6 +27,10 @@ def why_nothing_turns(learnt: Learnt | None) -> str:
     seen = f"something moves around {x:.0f},{y:.0f}"
     if learnt.explanations:
         best = learnt.explanations[0]
-        seen += f", but nothing shows that it turns about a fixed point ({best.lead:.1f} standard errors)"
+        if best.lead < SURE:
+            seen += f", but nothing shows that it turns: {best.lead:.1f} standard errors, of {SURE:g} that it takes"
+        else:
+            off = 100.0 * best.fit.off_centre
+            seen += f", but not about a fixed point: its middle is off by {off:.1f} % of its travel"
     frame = int(sample.frames[0])
     return f"{seen}; point at it: mark: {{at: [{x:.0f}, {y:.0f}], frame: {frame}}} in rig.yaml"

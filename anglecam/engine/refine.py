@@ -89,6 +89,8 @@ class Fit:
     """(K,) standard uncertainty of each turn about a known centre, rad."""
     covariance_px2: Floats
     """(2, 2) of the centre, in the film, px²."""
+    off_centre: float
+    """Usual distance of the body's middle from where a turn about one centre carries it, as a share of its travel."""
     ratio: float
     """Usual variance by which the body's parts contradict each other, over that of independent pixels."""
     information: Floats
@@ -153,7 +155,8 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
             for k in np.flatnonzero(seen)
         ]
         q, information = np.array([one[0] for one in free]), np.array([one[1] for one in free])
-        centre, covariance, turn[seen] = common_centre(q, information, centre, body.middle)
+        centre, covariance, turn[seen], off_px = common_centre(q, information, centre, body.middle)
+        travel = float(np.hypot(np.std(q[:, 1:], axis=0).sum(), body.reach * np.std(q[:, 0])))
         usual = _usual_information(turn[seen], information)
         near = _about(sample, behind, body, centre, turn)
         turn, gain = np.array([one.turn for one in near]), np.array([one.gain for one in near])
@@ -163,7 +166,7 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
             return fit
         turn = turn - np.nanmedian(turn)
         proposal = replace(proposal, centre_px=sample.in_film(centre), turn=turn)
-        fit = Fit(proposal, target, gain, sigma, covariance / sample.scale**2, float(np.nanmedian(ratios)), usual)
+        fit = Fit(proposal, target, gain, sigma, covariance / sample.scale**2, off_px / travel, float(np.nanmedian(ratios)), usual)
     return fit
 
 
@@ -305,7 +308,9 @@ def _as_parameters(pose: Floats, body: Body) -> Floats:
     return np.array([turn, *(pose[:, :2] @ body.middle + pose[:, 2] - body.middle)])
 
 
-def common_centre(q: Floats, information: Floats, start: Floats, middle: Floats) -> tuple[Floats, Floats, Floats]:
+def common_centre(
+    q: Floats, information: Floats, start: Floats, middle: Floats
+) -> tuple[Floats, Floats, Floats, float]:
     """Fit one centre of rotation to free poses.
 
     A body that turns by θ about a centre C, from a pose that is s₀ off, displaces its middle m by
@@ -328,6 +333,8 @@ def common_centre(q: Floats, information: Floats, start: Floats, middle: Floats)
         (2, 2) px²; scaled by how far the poses are from turns about it.
     turn : ndarray
         (n,) turns about it that are nearest to the poses.
+    off_px : float
+        Usual distance of the middle from its place by such a turn, px.
     """
     pivot, shift = np.asarray(start, float), np.zeros(2)  # the pivot in the coordinates of the body
     arm_px = max(1.0, float(np.hypot(*(middle - pivot))))
@@ -360,7 +367,11 @@ def common_centre(q: Floats, information: Floats, start: Floats, middle: Floats)
     to_centre = np.hstack([np.eye(2), np.eye(2)])
     covariance = scale * to_centre @ np.linalg.pinv(normal) @ to_centre.T
     turn = _nearest(q, information, turn, pivot, shift, middle)
-    return pivot + shift, covariance, turn
+    arm = middle - pivot
+    off = q[:, 1:] - (shift + _rotations(turn)[0] @ arm - arm)
+    # the median squared distance in the plane is 2 ln 2 times the variance of either coordinate
+    off_px = float(np.sqrt(np.median((off**2).sum(axis=1)) / np.log(2.0)))
+    return pivot + shift, covariance, turn, off_px
 
 
 def _nearest(q: Floats, information: Floats, turn: Floats, pivot: Floats, shift: Floats, middle: Floats) -> Floats:

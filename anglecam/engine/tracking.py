@@ -7,7 +7,7 @@ all frames: the path of least cost (Viterbi, IEEE Transactions on Information Th
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,8 +15,9 @@ import numpy as np
 from anglecam.data.typing import Flags, Floats
 from anglecam.engine.likelihood import log_density
 from anglecam.engine.path import steadiest_path
-from anglecam.engine.refine import Body, Fit, Turn, body_of, gains_about, turn_near, turns_to_try, with_ratio
+from anglecam.engine.refine import Body, Fit, Turn, body_of, gains_about, refine, turn_near, turns_to_try, with_ratio
 from anglecam.engine.sample import Sample
+from anglecam.engine.score import score
 from anglecam.engine.target import Picture
 
 _STEP_PX = 2.0
@@ -29,6 +30,14 @@ _HOPELESS = 60.0
 """Nats by which a pose may be less probable than the best one: the steadiest motion does not make up for more."""
 _APART_PX = 6.0
 """Least distance of poses that count as two."""
+
+
+_LIKE, _BESIDE_PX = 0.7, 25.0
+"""Share of the better pose's gain from which on a pose so near to it may be a look-alike, as of a gear's next tooth."""
+_FEWEST = 8
+"""Frames of the sample from which a body is learnt again."""
+_WORSE = 2.0
+"""Standard errors by which the steadiest motion has to predict worse, to be given up: one in forty is by chance."""
 
 
 @dataclass(frozen=True)
@@ -112,28 +121,52 @@ def candidates(search: Search, picture: Picture) -> list[Turn]:
     found = [turn_near(picture, behind, search.body, search.centre, turn) for turn in near]
     apart: list[Turn] = []
     for one in sorted((one for one in found if np.isfinite(one.turn)), key=lambda one: -one.gain):
-        if all(abs(_wrapped(one.turn - other.turn)) * search.arm > _APART_PX for other in apart):
+        if all(_another(search, one, other) for other in apart):
             apart.append(one)
     return apart
+
+
+def _another(search: Search, one: Turn, better: Turn) -> bool:
+    """Return whether a pose is another one than a better one: not a lower peak beside it."""
+    away = abs(_wrapped(one.turn - better.turn)) * search.arm
+    return away > (_APART_PX if one.gain > _LIKE * better.gain else _BESIDE_PX)
 
 
 def _wrapped(turn: float) -> float:
     return float((turn + np.pi) % (2.0 * np.pi) - np.pi)
 
 
-def follow(frames: Iterable[Picture | None], times: Floats, search: Search) -> Track:
-    """Follow a body.
+def steadier(search: Search, found: Sequence[Sequence[Turn]], times: Floats) -> Search | None:
+    """Return a search for the body that is learnt from the steadiest motion alone, if it explains the sample as well.
+
+    Frames far apart may show a body of like parts now in one pose and now in a look-alike one, and what is learnt from
+    them then looks like both. The motion through all frames tells them apart.
 
     Parameters
     ----------
-    frames : iterable of ndarray or None
-        n frames as `Sample.seen` returns them; ``None`` without a picture.
+    search : Search
+        For the body as it was learnt.
+    found : sequence of sequence of Turn
+        Where it may be in each of n frames.
     times : ndarray
         (n,) s.
-    search : Search
-        For the body.
+
+    Returns
+    -------
+    Search or None
+        ``None`` where the steadiest motion is that of the body as it was learnt, or explains the sample worse.
     """
-    return chosen([[] if picture is None else candidates(search, picture) for picture in frames], times, search)
+    sample, known = search.sample, search.fit.proposal
+    turn = chosen(found, times, replace(search, temper=np.inf)).turn[sample.frames]
+    off = np.exp(1j * (turn - known.turn))
+    both = np.isfinite(off)
+    if both.sum() < _FEWEST or np.abs(off[both] - np.median(off[both])).max() * search.arm < _APART_PX:
+        return None
+    fit = refine(sample, replace(known, name="steady motion", turn=turn))
+    if fit is None:
+        return None
+    before, after = (score(sample, one.name, one.poses(sample)) for one in (known, fit.proposal))
+    return None if before.lead(after) > _WORSE else search_for(sample, fit)
 
 
 def chosen(found: Sequence[Sequence[Turn]], times: Floats, search: Search) -> Track:

@@ -9,11 +9,11 @@ import numpy as np
 from anglecam.camera.lens import lens_from_rig
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
-from anglecam.engine.learn import Hints, Learnt, learn
+from anglecam.engine.learn import Hints, learn
 from anglecam.engine.reasons import why_nothing_turns
 from anglecam.engine.refine import Turn, centre_sensitivity
 from anglecam.engine.sample import FRAMES, Stills
-from anglecam.engine.tracking import Search, Track, candidates, chosen, search_for
+from anglecam.engine.tracking import Search, candidates, chosen, search_for, steadier
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.camera_pass import HeldCamera
@@ -56,13 +56,15 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     """
     film = camera.film
     progress(Stage("looking for what turns"))
-    pictures = film.stills(FRAMES)
-    learnt = learn(_stills(pictures, camera), _hints(film, rig))
+    learnt = learn(_stills(film.stills(FRAMES), camera), _hints(film, rig))
     if learnt is None or not learnt.turns:
         raise InputError(f"{film.path}: {why_nothing_turns(learnt)}")
     search = search_for(learnt.sample, learnt.explanations[0].fit)
     seen = _follow(camera, search, progress)
-    return _detections(film, rig, pictures, seen, _motion(search, seen, film), progress)
+    again = steadier(search, seen.found, seen.time)
+    if again is not None:
+        search, seen = again, _follow(camera, again, progress)
+    return _detections(film, rig, seen, _motion(search, seen))
 
 
 def _hints(film: Film, rig: Rig) -> Hints:
@@ -110,7 +112,8 @@ class _Seen:
     """What one reading of all frames found."""
 
     time: Floats
-    track: Track
+    found: list[list[Turn]]
+    """Where the body may be in each."""
     decoded: list[bool]
     repeated: list[bool]
     moves: list[CameraMove]
@@ -136,12 +139,11 @@ def _follow(camera: HeldCamera, search: Search, progress: Progress) -> _Seen:
         unknown = image is None or (move is not None and not move.known)
         affine = None if move is None or unknown else _affine(move)
         found.append([] if unknown or image is None else candidates(search, search.sample.seen(image, affine)))
-    times = np.array(time)
-    return _Seen(times, chosen(found, times, search), decoded, repeated, moves)
+    return _Seen(np.array(time), found, decoded, repeated, moves)
 
 
-def _motion(search: Search, seen: _Seen, film: Film) -> RigidMotion:
-    track, fit, sample = seen.track, search.fit, search.sample
+def _motion(search: Search, seen: _Seen) -> RigidMotion:
+    track, fit, sample = chosen(seen.found, seen.time, search), search.fit, search.sample
     known = np.isfinite(track.turn)
     sensitivity = np.full((len(track.turn), 2), np.nan)
     sensitivity[known] = centre_sensitivity(sample, fit, search.body, track.turn[known])
@@ -165,9 +167,7 @@ def _motion(search: Search, seen: _Seen, film: Film) -> RigidMotion:
     )
 
 
-def _detections(
-    film: Film, rig: Rig, pictures: list[Picture], seen: _Seen, body: RigidMotion, progress: Progress
-) -> Detections:
+def _detections(film: Film, rig: Rig, seen: _Seen, body: RigidMotion) -> Detections:
     sample = film.sample(FRAMES)
     images = [frame.image for frame in sample.frames if frame.image is not None]
     lens = lens_from_rig(rig, film.size, film.path)
