@@ -30,6 +30,8 @@ from anglecam.vision.stabilise.zoom import camera_zoom
 _LEAST_KNOWN = 0.5
 """Least share of the sampled frames in which the motion of a camera that moves is known. In fewer, what was taken for
 scenery is not what the camera stands before."""
+_BLANK = 3.0
+"""Standard deviation, grey levels, of a picture that shows nothing, such as the black beginning of a film."""
 _LEAST_FOLLOWED = 0.8
 """Least share of all frames in which the plane is followed."""
 
@@ -121,7 +123,8 @@ def hold_camera(film: Film, progress: Progress = unseen) -> HeldCamera:
         Where the file cannot be read.
     """
     progress(Stage("looking whether the camera moves"))
-    images = [f.image for f in film.sample(frames_to_keep(film)).frames if f.image is not None]
+    shown = [f.image for f in film.sample(frames_to_keep(film)).frames if f.image is not None]
+    images = [image for image in shown if image.std() > _BLANK] or shown
     steady = learn_background(images)
     known = images if steady is None else [image for image in images if steady.at(image).known]
     zoom, why = camera_zoom(known), None
@@ -131,7 +134,7 @@ def hold_camera(film: Film, progress: Progress = unseen) -> HeldCamera:
         why = f"the camera moves, and how can be seen in {len(known)} of {len(images)} sampled frames only"
     elif steady is not None or len(images) < 2 or stands_still(images):
         return HeldCamera(film, steady)
-    frames = watched(film.frames(), progress, "following the camera", film.count)
+    frames = watched(film.frames(brightness=True), progress, "following the camera", film.count)
     moves = tuple(follow_plane(frame.image for frame in frames))
     followed = sum(move is not None for move in moves) >= _LEAST_FOLLOWED * len(moves)
     if why is None and not (followed and moves_in_the_hand(moves, film.size)):

@@ -44,7 +44,7 @@ _MAX_ROLL = np.radians(4.0)
 
 
 def follow_plane(images: Iterable[Image | None]) -> list[Floats | None]:
-    """Return the homographies (3, 3) from the first picture into each one.
+    """Return the homographies (3, 3) into each picture from the first one that shows something.
 
     Parameters
     ----------
@@ -67,9 +67,13 @@ def follow_plane(images: Iterable[Image | None]) -> list[Floats | None]:
             continue
         picture = subtract_local_mean(reduced(brightness(image), _LONGEST_PX))
         if first is None:
-            first, to_small = picture, reduction(image.shape[:2], _LONGEST_PX)
-            windows = find_windows(first, pixel_noise([first]))[0]
-        move = _homography(first, picture, windows, latest) if len(windows) >= _MIN_WINDOWS else None
+            to_small = reduction(image.shape[:2], _LONGEST_PX)
+            windows = find_windows(picture, pixel_noise([picture]))[0]
+            if len(windows) < _MIN_WINDOWS:
+                moves.append(None)
+                continue
+            first = picture
+        move = _homography(first, picture, windows, latest)
         latest = latest if move is None else move
         moves.append(None if move is None else np.linalg.inv(to_small) @ move @ to_small)
     return moves
