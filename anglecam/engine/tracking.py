@@ -11,8 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import stats
 
-from anglecam.data.typing import Flags, Floats
+from anglecam.data.typing import Flags, Floats, Image
 from anglecam.engine.likelihood import log_density
 from anglecam.engine.path import steadiest_path
 from anglecam.engine.refine import Body, Fit, Turn, body_of, gains_about, refine, turn_near, turns_to_try, with_ratio
@@ -36,6 +37,8 @@ _LIKE, _BESIDE_PX = 0.7, 25.0
 """Share of the better pose's gain from which on a pose so near to it may be a look-alike, as of a gear's next tooth."""
 _FEWEST = 8
 """Frames of the sample from which a body is learnt again."""
+_JUMP = 20.0
+"""Usual changes of a step from frame to frame from which on a change may be a jump to a look-alike pose."""
 _WORSE = 2.0
 """Standard errors by which the steadiest motion has to predict worse, to be given up: one in forty is by chance."""
 
@@ -97,7 +100,8 @@ def _temper(search: Search) -> float:
         right = search.fit.proposal.turn[k]
         wrong = [one.gain for one in found if abs(_wrapped(one.turn - right)) * search.arm > _APART_PX]
         ahead.append(search.fit.gain[k] - max(wrong, default=0.0))
-    mean, variance = float(np.mean(ahead)), float(np.var(ahead))
+    mean = float(np.median(ahead))
+    variance = float(stats.median_abs_deviation(ahead, scale="normal")) ** 2
     return variance / (2.0 * mean) if mean > 0.0 else variance
 
 
@@ -136,11 +140,14 @@ def _wrapped(turn: float) -> float:
     return float((turn + np.pi) % (2.0 * np.pi) - np.pi)
 
 
-def steadier(search: Search, found: Sequence[Sequence[Turn]], times: Floats) -> Search | None:
-    """Return a search for the body that is learnt from the steadiest motion alone, if it explains the sample as well.
+def steadier(
+    search: Search, found: Sequence[Sequence[Turn]], times: Floats, pictures: Sequence[Image | None]
+) -> Search | None:
+    """Return a search for the body that is learnt from a steadier motion, if it explains the sample as well.
 
     Frames far apart may show a body of like parts now in one pose and now in a look-alike one, and what is learnt from
-    them then looks like both. The motion through all frames tells them apart.
+    them then looks like both. The motion through all frames tells them apart: the steadiest one alone, or the one by
+    the body as it looks in a stretch of frames through which it turns without a jump.
 
     Parameters
     ----------
@@ -150,23 +157,60 @@ def steadier(search: Search, found: Sequence[Sequence[Turn]], times: Floats) -> 
         Where it may be in each of n frames.
     times : ndarray
         (n,) s.
+    pictures : sequence of ndarray or None
+        n pictures as `Sample.seen` returns them, in bytes; empty where they are not at hand.
 
     Returns
     -------
     Search or None
-        ``None`` where the steadiest motion is that of the body as it was learnt, or explains the sample worse.
+        ``None`` where the motion is steady as it is, or no other one explains the sample.
     """
+    best, steady = None, chosen(found, times, replace(search, temper=np.inf)).turn
+    for turn in (steady, _by_stretch(search, chosen(found, times, search).turn, times, pictures)):
+        if turn is not None:
+            best = _as_well(best or search, turn) or best
+    return best
+
+
+def _as_well(search: Search, turn: Floats) -> Search | None:
+    """Return a search for the body of a motion (n,), rad, if it is another one and explains the sample as well."""
     sample, known = search.sample, search.fit.proposal
-    turn = chosen(found, times, replace(search, temper=np.inf)).turn[sample.frames]
-    off = np.exp(1j * (turn - known.turn))
+    at_sample = turn[sample.frames]
+    off = np.exp(1j * (at_sample - known.turn))
     both = np.isfinite(off)
     if both.sum() < _FEWEST or np.abs(off[both] - np.median(off[both])).max() * search.arm < _APART_PX:
         return None
-    fit = refine(sample, replace(known, name="steady motion", turn=turn))
+    fit = refine(sample, replace(known, name="steady motion", turn=at_sample))
     if fit is None:
         return None
     before, after = (score(sample, one.name, one.poses(sample)) for one in (known, fit.proposal))
     return None if before.lead(after) > _WORSE else search_for(sample, fit)
+
+
+def _by_stretch(search: Search, turn: Floats, times: Floats, pictures: Sequence[Image | None]) -> Floats | None:
+    """Return the motion (n,) of the body as it looks in frames through which it turns without a jump.
+
+    ``None`` where it never jumps, or the pictures are not at hand.
+    """
+    seen = np.flatnonzero(np.isfinite(turn))
+    if not pictures or len(seen) < _FEWEST:
+        return None
+    step = np.angle(np.exp(1j * np.diff(turn[seen])))
+    change = np.abs(np.diff(step, prepend=step[:1]))
+    jumps = np.flatnonzero(change > max(_JUMP * float(np.median(change)), _APART_PX / search.arm))
+    runs = [run for run in np.split(seen, jumps + 1) if len(run) >= _FEWEST]
+    if len(jumps) == 0 or not runs:
+        return None
+    longest = max(runs, key=lambda run: float(np.ptp(np.unwrap(turn[run]))))
+    some = longest[np.unique(np.linspace(0, len(longest) - 1, len(search.sample.frames)).round().astype(int))]
+    shown = [picture for k in some if (picture := pictures[k]) is not None]
+    part = replace(search.sample, pictures=np.stack(shown).astype(np.float32), frames=some)
+    fit = refine(part, replace(search.fit.proposal, turn=turn[some]))
+    if fit is None:
+        return None
+    near = search_for(part, fit)
+    again = [[] if p is None else candidates(near, p.astype(np.float32)) for p in pictures]
+    return chosen(again, times, near).turn
 
 
 def chosen(found: Sequence[Sequence[Turn]], times: Floats, search: Search) -> Track:

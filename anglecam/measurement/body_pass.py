@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +28,8 @@ from anglecam.vision.pivot.circle import Circle
 from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
 from anglecam.vision.status import AMBIGUOUS, OCCLUDED, UNDECODABLE
 
+_KEPT_BYTES = 200_000_000
+"""Memory for the reduced pictures of a film, which may have to be looked through again."""
 _HINT_PX = 30.0
 """Standard uncertainty of a hint at the pivot, which is by eye."""
 
@@ -61,9 +63,9 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
         raise InputError(f"{film.path}: {why_nothing_turns(learnt)}")
     search = search_for(learnt.sample, learnt.explanations[0].fit)
     seen = _follow(camera, search, progress)
-    again = steadier(search, seen.found, seen.time)
+    again = steadier(search, seen.found, seen.time, seen.pictures)
     if again is not None:
-        search, seen = again, _follow(camera, again, progress)
+        search, seen = again, _again(seen, again) or _follow(camera, again, progress)
     return _detections(film, rig, seen, _motion(search, seen))
 
 
@@ -118,12 +120,15 @@ class _Seen:
     repeated: list[bool]
     moves: list[CameraMove]
     """Of the camera; empty where it stands still."""
+    pictures: list[Image | None]
+    """As the body was sought in them; empty where they take too much memory."""
 
 
 def _follow(camera: HeldCamera, search: Search, progress: Progress) -> _Seen:
     film = camera.film
     time, decoded, repeated = list[float](), list[bool](), list[bool]()
-    moves, found = list[CameraMove](), list[list[Turn]]()
+    moves, found, kept = list[CameraMove](), list[list[Turn]](), list[Image | None]()
+    keep = film.count * search.sample.median.size < _KEPT_BYTES
     before: Image | None = None
     shown = film.pictures(lambda picture: _image(picture, camera))
     for picture, image in watched(shown, progress, "following what turns", film.count):
@@ -138,8 +143,19 @@ def _follow(camera: HeldCamera, search: Search, progress: Progress) -> _Seen:
             moves.append(move)
         unknown = image is None or (move is not None and not move.known)
         affine = None if move is None or unknown else _affine(move)
-        found.append([] if unknown or image is None else candidates(search, search.sample.seen(image, affine)))
-    return _Seen(np.array(time), found, decoded, repeated, moves)
+        small = None if unknown or image is None else search.sample.seen(image, affine)
+        found.append([] if small is None else candidates(search, small))
+        if keep:
+            kept.append(None if small is None else np.clip(np.round(small), 0, 255).astype(np.uint8))
+    return _Seen(np.array(time), found, decoded, repeated, moves, kept)
+
+
+def _again(seen: _Seen, search: Search) -> _Seen | None:
+    """Return what another search finds in the same pictures; ``None`` where they were not kept."""
+    if not seen.pictures:
+        return None
+    found = [[] if p is None else candidates(search, p.astype(np.float32)) for p in seen.pictures]
+    return replace(seen, found=found)
 
 
 def _motion(search: Search, seen: _Seen) -> RigidMotion:

@@ -56,6 +56,8 @@ class FilmAtRest(Film):
     """(3, 3) homography from the first frame into each; ``None`` where it is unknown."""
     first: Image | None = None
     """The first frame, shown where a transformed frame ends."""
+    first_grey: Image | None = None
+    """The same, (height, width, 1)."""
 
     def thinned(self) -> None:
         """Return ``None``: such a film is not measured from evenly spaced frames."""
@@ -79,8 +81,10 @@ class FilmAtRest(Film):
         move = self.moves[index]
         time, stored = row
         assert self.first is not None
+        assert self.first_grey is not None
+        seen = None if move is None else stored
         return _PictureAtRest(
-            index, time, None if move is None else stored, self.display, self.bottom_first, move, self.first
+            index, time, seen, self.display, self.bottom_first, move, self.first, self.first_grey
         )
 
 
@@ -90,6 +94,7 @@ class _PictureAtRest(Picture):
 
     move: Floats | None
     first: Image
+    first_grey: Image
 
     def _is_as_stored(self, stored: av.VideoFrame) -> bool:
         return False
@@ -98,8 +103,7 @@ class _PictureAtRest(Picture):
         image = super()._shown(convert)
         if image is None or self.move is None:
             return None
-        behind = self.first if image.shape == self.first.shape else self.first.mean(axis=2, keepdims=True)
-        return seen_from_first(image, self.move, behind.astype(np.uint8))
+        return seen_from_first(image, self.move, self.first if image.shape == self.first.shape else self.first_grey)
 
 
 def hold_camera(film: Film, progress: Progress = unseen) -> HeldCamera:
@@ -143,7 +147,8 @@ def hold_camera(film: Film, progress: Progress = unseen) -> HeldCamera:
         how = "from one place with fixed focus and zoom, or so that a desk or a wall with edges fills the picture"
         return HeldCamera(film, steady, f"{film.path}: {why}; film {how}")
     own = {field.name: getattr(film, field.name) for field in fields(film) if field.init}
-    return HeldCamera(FilmAtRest(**own, moves=moves, first=images[0]))
+    grey = images[0].mean(axis=2, keepdims=True).astype(np.uint8)
+    return HeldCamera(FilmAtRest(**own, moves=moves, first=images[0], first_grey=grey))
 
 
 def as_seen_at_rest(rig: Rig, film: Film) -> Rig:
