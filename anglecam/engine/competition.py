@@ -34,15 +34,14 @@ class Explanation:
 
     fit: Fit
     score: Score
-    nothing: Score
-    """Of the same frames without it."""
-    slides: Score
-    """Of the same body that moves along a straight line and does not turn."""
+    rival: Score
+    """Of the same frames by the best of what it may be mistaken for: nothing moves, or a body moves along a straight
+    line and does not turn."""
 
     @property
     def lead(self) -> float:
-        """By how much it predicts a frame better than its rivals, in standard errors."""
-        return min(self.score.lead(self.nothing), self.score.lead(self.slides))
+        """By how much it predicts a frame better than its rival, in standard errors."""
+        return self.score.lead(self.rival)
 
     @property
     def turns(self) -> bool:
@@ -73,11 +72,9 @@ def compete(sample: Sample, proposals: Sequence[Proposal]) -> list[Explanation]:
         if len(finalists) < _FINALISTS and not any(_alike(sample, proposal, other) for other in finalists):
             finalists.append(proposal)
     fits = [fit for proposal in finalists if (fit := refine(sample, proposal)) is not None]
-    nothing = score(sample, NOTHING, [None] * len(sample.pictures))
-    found = [
-        Explanation(fit, score(sample, fit.proposal.name, fit.proposal.poses(sample)), nothing, _sliding(sample, fit))
-        for fit in fits
-    ]
+    rivals = [score(sample, NOTHING, [None] * len(sample.pictures)), *(_sliding(sample, fit) for fit in fits)]
+    best = max(rivals, key=lambda one: one.total)
+    found = [Explanation(fit, score(sample, fit.proposal.name, fit.proposal.poses(sample)), best) for fit in fits]
     return sorted(found, key=lambda one: (not one.turns, -one.score.total if one.turns else -one.lead))
 
 
@@ -86,7 +83,9 @@ def halved(sample: Sample) -> Sample:
     pictures = np.stack([cv2.pyrDown(picture) for picture in sample.pictures[::2]])
     # a pixel of the reduced picture lies on every other pixel of the first one
     corner = sample.corner_px + 0.5 / sample.scale - 0.5 * 2.0 / sample.scale
-    return Sample(pictures, sample.frames[::2], sample.scale / 2.0, corner, noise_of(pictures), np.median(pictures, axis=0))
+    return Sample(
+        pictures, sample.frames[::2], sample.scale / 2.0, corner, noise_of(pictures), np.median(pictures, axis=0)
+    )
 
 
 def _every_other(proposal: Proposal) -> Proposal:
@@ -129,6 +128,4 @@ def _sliding(sample: Sample, fit: Fit) -> Score:
     mean = shifts[known].mean(axis=0)
     axis = np.linalg.svd(shifts[known] - mean)[2][0]
     straight = mean + ((shifts - mean) @ axis)[:, None] * axis
-    return score(
-        sample, "slides", [turned(middle, 0.0, one) if np.isfinite(one).all() else None for one in straight]
-    )
+    return score(sample, "slides", [turned(middle, 0.0, one) if np.isfinite(one).all() else None for one in straight])

@@ -1,12 +1,14 @@
 """The most probable way through the turns that a body may have in each frame, if it goes on as it went before.
 
 The change of its speed from frame to frame has a distribution with long tails (Cauchy): mostly small, and sometimes
-sudden. The cost of a way is found by dynamic programming over the turns of two neighbouring frames.
+sudden. A step is rather short than long. The cost of a way is found by dynamic programming over the turns of two
+neighbouring frames.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,10 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Floats
 
 _TURN = 2.0 * np.pi
+_FAST = np.pi / 3.0
+"""Standard deviation of a step between frames, rad: of steps that look alike, as of a wheel's spokes, the shorter."""
+_SAME = 6.0
+"""Multiple of the resolution by which two steps are other ones."""
 _ROUNDS = 3
 """Of the way and of the usual change along it."""
 
@@ -37,7 +43,8 @@ def steadiest_path(
     path : ndarray
         (n,) index of the turn; -1 in a frame without any.
     margin : ndarray
-        (n,) nats by which the best way through another turn of that frame is less probable; infinite without another.
+        (n,) nats by which the best way with another step to that frame, or from it, is less probable; infinite without
+        another. A way that leads through the look-alikes of all its turns has the same steps.
     """
     path, margin = np.full(len(turns), -1), np.full(len(turns), np.inf)
     used = [k for k, of_frame in enumerate(turns) if len(of_frame)]
@@ -46,18 +53,19 @@ def steadiest_path(
             path[k] = int(np.argmax(gains[k]))
         return path, margin
     angle, gain, time = [turns[k] for k in used], [gains[k] for k in used], times[used]
-    steps = [_wrapped(b[None, :] - a[:, None]) for a, b in zip(angle, angle[1:], strict=False)]
-    n = len(used)
+    steps = [_wrapped(b[None, :] - a[:, None]) for a, b in pairwise(angle)]
     scale = resolution
     for _ in range(_ROUNDS):
-        order, apart = _least_cost(steps, gain, time, scale)
+        order, apart = _least_cost(steps, gain, time, scale, resolution)
         scale = max(resolution, _usual_change(np.array([a[k] for a, k in zip(angle, order, strict=True)]), time))
     path[used], margin[used] = order, apart
     return path, margin
 
 
-def _least_cost(steps: list[Floats], gain: list[Floats], time: Floats, scale: float) -> tuple[list[int], list[float]]:
-    """Return the turns of the way of least cost, and for each by how much the best way through another costs more."""
+def _least_cost(
+    steps: list[Floats], gain: list[Floats], time: Floats, scale: float, resolution: float
+) -> tuple[list[int], Floats]:
+    """Return the turns of the way of least cost, and for each by how much the best way with another step costs more."""
     n = len(gain)
     # the cost of ways that end with a pair of turns in frames k and k + 1, and that begin with it
     until = [-gain[0][:, None] - gain[1][None, :]]
@@ -76,13 +84,13 @@ def _least_cost(steps: list[Floats], gain: list[Floats], time: Floats, scale: fl
     for k in range(n - 3, -1, -1):
         order.append(int(arrived[k][order[-1], order[-2]]))
     order.reverse()
-    apart = []
-    for j in range(n):
-        pair = min(j, n - 2)
-        whole = until[pair] + since[pair]
-        through = whole.min(axis=1 if pair == j else 0)
-        others = np.delete(through, order[j])
-        apart.append(float(others.min() - through[order[j]]) if len(others) else np.inf)
+    apart = np.full(n, np.inf)
+    for k, step in enumerate(steps):
+        other = np.abs(_wrapped(step - step[order[k], order[k + 1]])) > _SAME * resolution
+        if other.any():
+            cost = until[k] + since[k]
+            more = float(cost[other].min() - cost[order[k], order[k + 1]])
+            apart[k : k + 2] = np.minimum(apart[k : k + 2], more)
     return order, apart
 
 
@@ -91,11 +99,11 @@ def _wrapped(turn: Floats) -> Floats:
 
 
 def _change_cost(before: Floats, after: Floats, time: Floats, scale: float) -> Floats:
-    """Return (a, b, c) cost of the change between the steps (a, b) and (b, c); a step may lead around either way."""
+    """Return (a, b, c) cost of the step (b, c) after the step (a, b); a step may lead around either way."""
     first, second = time[1] - time[0], time[2] - time[1]
     expected = before[:, :, None] * (second / first)
     change = _wrapped(after[None] - expected) / (scale * max(1.0, second / first))
-    return np.asarray(np.log1p(change**2))
+    return np.asarray(np.log1p(change**2) + 0.5 * (after[None] / _FAST) ** 2)
 
 
 def _usual_change(angle: Floats, time: Floats) -> float:

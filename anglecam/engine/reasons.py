@@ -4,9 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from anglecam.data.typing import Flags, Floats
 from anglecam.engine.competition import SURE
-from anglecam.engine.learn import Learnt
+from anglecam.engine.learn import Hints, Learnt, obeys
 
+_UNSURE = 3
+"""Frames in which a look-alike pose is nearly as probable, from which on one of them is wrong in a film of seven."""
+_JUMP_DEG, _FASTER, _USUAL = 60.0, 3.0, 0.95
+"""Least step between two frames that may be a jump, and how many times as large it is as nearly all others. Of 52 drawn
+films that are measured rightly none has such a step."""
 _REST = "to measure a mechanism at rest, declare pivot: {at: [x, y], sigma_px: s} in rig.yaml"
 
 
@@ -34,3 +40,49 @@ def why_nothing_turns(learnt: Learnt | None) -> str:
             seen += f", but not about a fixed point: its middle is off by {off:.1f} % of its travel"
     frame = int(sample.frames[0])
     return f"{seen}; point at it: mark: {{at: [{x:.0f}, {y:.0f}], frame: {frame}}} in rig.yaml"
+
+
+def why_ambiguous(ambiguous: Flags) -> str | None:
+    """Return a sentence where look-alike poses were perhaps not told apart in (n,) frames."""
+    frames = np.flatnonzero(ambiguous)
+    if len(frames) < _UNSURE:
+        return None
+    return (
+        f"in {len(frames)} frames, the first of them {frames[0]}, what turns looks the same in another pose that is"
+        " nearly as probable, and what follows may be off by the turn between the two; mark one of the like parts"
+    )
+
+
+def why_jump(turn: Floats) -> str | None:
+    """Return a sentence where what is followed jumps once, as where another like thing is seen instead.
+
+    Parameters
+    ----------
+    turn : ndarray
+        (n,) rad; NaN where nothing is seen.
+    """
+    seen = np.flatnonzero(np.isfinite(turn))
+    step = np.degrees(np.abs(np.angle(np.exp(1j * np.diff(turn[seen])))))
+    if len(step) < _UNSURE:
+        return None
+    k = int(np.argmax(step))
+    if step[k] < max(_JUMP_DEG, _FASTER * float(np.quantile(step, _USUAL))):
+        return None
+    return (
+        f"from frame {seen[k]} to {seen[k + 1]} it turns by {step[k]:.0f}°, faster than it is ever seen to turn; another"
+        " like part may be seen from there on; mark one of them"
+    )
+
+
+def why_not_as_hinted(learnt: Learnt, hints: Hints) -> str | None:
+    """Return a sentence where what turns is not what the hints say."""
+    first = learnt.explanations[0]
+    if obeys(first, learnt.sample, hints):
+        return None
+    x, y = first.fit.proposal.centre_px
+    meant = []
+    if hints.pivot_px is not None:
+        meant.append("pivot {:.0f},{:.0f}".format(*hints.pivot_px))
+    if hints.mark_px is not None:
+        meant.append("mark around {:.0f},{:.0f} in frame {}".format(*hints.mark_px[:2], hints.mark_frame))
+    return f"what is seen to turn, about {x:.0f},{y:.0f}, is not what is declared ({' and '.join(meant)})"

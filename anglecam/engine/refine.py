@@ -73,8 +73,13 @@ class Body:
 
     def thinned(self, every: int) -> Body:
         """Return every so many-th pixel."""
-        places, values, part = (np.ascontiguousarray(a[::every]) for a in (self.places, self.values, self.part))
-        return replace(self, places=places, values=values, part=part, stands_for=self.stands_for * every)
+        return replace(
+            self,
+            places=self.places[::every].copy(),
+            values=self.values[::every].copy(),
+            part=self.part[::every].copy(),
+            stands_for=self.stands_for * every,
+        )
 
 
 @dataclass(frozen=True)
@@ -90,7 +95,9 @@ class Fit:
     covariance_px2: Floats
     """(2, 2) of the centre, in the film, px²."""
     off_centre: float
-    """Usual distance of the body's middle from where a turn about one centre carries it, as a share of its travel."""
+    """Usual distance of the body's poses from turns about one centre, as a share of its travel."""
+    off_px: float
+    """The same distance, px of the film: the centre wanders by so much, or the body bends."""
     ratio: float
     """Usual variance by which the body's parts contradict each other, over that of independent pixels."""
     information: Floats
@@ -166,7 +173,17 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
             return fit
         turn = turn - np.nanmedian(turn)
         proposal = replace(proposal, centre_px=sample.in_film(centre), turn=turn)
-        fit = Fit(proposal, target, gain, sigma, covariance / sample.scale**2, off_px / travel, float(np.nanmedian(ratios)), usual)
+        fit = Fit(
+            proposal=proposal,
+            target=target,
+            gain=gain,
+            sigma=sigma,
+            covariance_px2=covariance / sample.scale**2,
+            off_centre=off_px / travel,
+            off_px=off_px / sample.scale,
+            ratio=float(np.nanmedian(ratios)),
+            information=usual,
+        )
     return fit
 
 
@@ -177,8 +194,14 @@ def _usual_information(turn: Floats, information: Floats) -> Floats:
     return np.asarray(np.median(back.swapaxes(1, 2) @ information @ back, axis=0))
 
 
-def centre_sensitivity(sample: Sample, fit: Fit, body: Body, turn: Floats) -> Floats:
-    """Return (n, 2) change of turns (n,) with an error of the centre, rad/px of the film."""
+def sensitivities(sample: Sample, fit: Fit, body: Body, turn: Floats) -> tuple[Floats, Floats]:
+    """Return how much turns (n,) change with an error of the centre, and with a shift of the body.
+
+    Returns
+    -------
+    centre, shift : ndarray
+        (n, 2) rad/px of the film.
+    """
     rotation, slope = _rotations(turn)
     arm = body.middle - sample.place(fit.proposal.centre_px)
     turned_by = np.tile(np.eye(3), (len(turn), 1, 1))
@@ -187,7 +210,8 @@ def centre_sensitivity(sample: Sample, fit: Fit, body: Body, turn: Floats) -> Fl
     tangent = np.concatenate([np.ones((len(turn), 1)), slope @ arm], axis=1)
     along = np.einsum("ni,nij->nj", tangent, information)
     moved = np.einsum("ni,nij->nj", along[:, 1:], np.eye(2) - rotation)
-    return np.asarray(-moved / np.einsum("ni,ni->n", along, tangent)[:, None] * sample.scale)
+    scale = sample.scale / np.einsum("ni,ni->n", along, tangent)[:, None]
+    return -moved * scale, along[:, 1:] * scale
 
 
 def gains_about(picture: Picture, behind: Picture, body: Body, centre: Floats, turns: Floats) -> Floats:
@@ -334,7 +358,7 @@ def common_centre(
     turn : ndarray
         (n,) turns about it that are nearest to the poses.
     off_px : float
-        Usual distance of the middle from its place by such a turn, px.
+        Usual distance of the poses from such turns, as far as they show it, px.
     """
     pivot, shift = np.asarray(start, float), np.zeros(2)  # the pivot in the coordinates of the body
     arm_px = max(1.0, float(np.hypot(*(middle - pivot))))
@@ -368,9 +392,11 @@ def common_centre(
     covariance = scale * to_centre @ np.linalg.pinv(normal) @ to_centre.T
     turn = _nearest(q, information, turn, pivot, shift, middle)
     arm = middle - pivot
-    off = q[:, 1:] - (shift + _rotations(turn)[0] @ arm - arm)
+    off = q - np.column_stack([turn, shift + _rotations(turn)[0] @ arm - arm])
+    # what a pose does not show, as a ball its own turn, does not count
+    seen = np.einsum("ni,nij,nj->n", off, information, off) / np.trace(information[:, 1:, 1:], axis1=1, axis2=2)
     # the median squared distance in the plane is 2 ln 2 times the variance of either coordinate
-    off_px = float(np.sqrt(np.median((off**2).sum(axis=1)) / np.log(2.0)))
+    off_px = float(np.sqrt(2.0 * np.median(seen) / np.log(2.0)))
     return pivot + shift, covariance, turn, off_px
 
 
@@ -417,7 +443,7 @@ def turn_near(picture: Picture, behind: Picture, body: Body, centre: Floats, gue
     """Return the turn of most likelihood within some pixels of a guess."""
     arm = body.arm(centre)
     step = _FINE_PX / arm
-    tried = guess + step * np.arange(-6, 7)
+    tried: Floats = guess + step * np.arange(-6.0, 7.0)
     of_parts = gains_about(picture, behind, body, centre, tried)
     gains = of_parts.sum(axis=1)
     at = int(np.clip(np.argmax(gains), 1, len(tried) - 2))
@@ -426,9 +452,8 @@ def turn_near(picture: Picture, behind: Picture, body: Body, centre: Floats, gue
         return NOT_SEEN
     along = float(np.clip(0.5 * (gains[at - 1] - gains[at + 1]) / curvature, -1.0, 1.0))
     # the slopes of the parts add up to zero at the maximum; how far they scatter shows by how much it is off
-    slopes = 0.5 * (of_parts[at + 1] - of_parts[at - 1]) + along * (
-        of_parts[at + 1] + of_parts[at - 1] - 2.0 * of_parts[at]
-    )
+    bends = of_parts[at + 1] + of_parts[at - 1] - 2.0 * of_parts[at]
+    slopes = 0.5 * (of_parts[at + 1] - of_parts[at - 1]) + along * bends
     ratio = float((slopes**2).sum()) / -curvature * PARTS / (PARTS - 1)
     return Turn(tried[at] + step * along, step / np.sqrt(-curvature), ratio, float(gains.max()))
 

@@ -196,8 +196,9 @@ def _seen(
     if move is not None:
         still = cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR
         grey = cv2.warpAffine(grey, move, grey.shape[::-1], flags=still, borderMode=cv2.BORDER_REPLICATE)
-    factor = {"fx": scale, "fy": scale} if size is None else {}
-    return cv2.resize(grey[part], size, interpolation=cv2.INTER_AREA, **factor).astype(np.float32)
+    height, width = grey[part].shape
+    shown = size or (max(1, round(width * scale)), max(1, round(height * scale)))
+    return cv2.resize(grey[part], shown, interpolation=cv2.INTER_AREA).astype(np.float32)
 
 
 def _changed_boxes(pictures: NDArray[np.float32]) -> list[Floats]:

@@ -100,7 +100,7 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
     held = np.stack(
         [cv2.warpAffine(used[j], m, size, flags=back, borderValue=np.nan) for j, m in zip(known, maps, strict=True)]
     )
-    appearance, variance = _typical(held)
+    appearance, variance = _typical(held.astype(np.float32))
     often = np.isfinite(held).sum(axis=0).astype(np.float32)
     # a mean and a variance from n values predict another one with the variance (n + 1)/(n − 1); from 3 they do not
     appearance = np.where(often > 3, appearance, np.nan)

@@ -18,17 +18,18 @@ from anglecam.engine.likelihood import log_density
 from anglecam.engine.path import steadiest_path
 from anglecam.engine.refine import Body, Fit, Turn, body_of, gains_about, refine, turn_near, turns_to_try, with_ratio
 from anglecam.engine.sample import Sample
-from anglecam.engine.score import score
+from anglecam.engine.score import NOTHING, score
 from anglecam.engine.target import Picture
 
 _STEP_PX = 2.0
 """Of the search for a turn."""
 _FEW_PIXELS = 250
 """By which the whole circle is searched."""
-_PEAKS, _CANDIDATES = 24, 12
+_PEAKS, _CANDIDATES = 48, 24
 """Poses of a frame of which the likelihood is computed, and of those the ones that are refined, at most."""
-_HOPELESS = 60.0
-"""Nats by which a pose may be less probable than the best one: the steadiest motion does not make up for more."""
+_HOPELESS = 0.1
+"""Share of the best pose's gain below which another one is not considered. A look-alike has more, unless another body
+is before it."""
 _APART_PX = 6.0
 """Least distance of poses that count as two."""
 
@@ -39,8 +40,9 @@ _FEWEST = 8
 """Frames of the sample from which a body is learnt again."""
 _JUMP = 20.0
 """Usual changes of a step from frame to frame from which on a change may be a jump to a look-alike pose."""
-_WORSE = 2.0
-"""Standard errors by which the steadiest motion has to predict worse, to be given up: one in forty is by chance."""
+_AS_WELL = 0.9
+"""Share of the gain of the body as it was learnt that a steadier motion has to have. Of two look-alikes in each frame
+the better one was learnt, by chance, which gains some per cent."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ def candidates(search: Search, picture: Picture) -> list[Turn]:
     around = np.array(peaks)[:, None] + np.array([-1.0, 0.0, 1.0]) * 0.5 * _STEP_PX / search.arm
     whole = gains_about(picture, behind, search.body, search.centre, around.ravel()).sum(axis=1).reshape(-1, 3)
     best = float(whole.max())
-    floor = max(best - _HOPELESS * search.temper, float(np.log(len(search.turns))) * search.fit.ratio)
+    floor = max(_HOPELESS * best, float(np.log(len(search.turns))) * search.fit.ratio)
     order = [k for k in np.argsort(-whole.max(axis=1)) if whole[k].max() > floor][:_CANDIDATES]
     near = [float(around[k, int(np.argmax(whole[k]))]) for k in order]
     found = [turn_near(picture, behind, search.body, search.centre, turn) for turn in near]
@@ -165,11 +167,11 @@ def steadier(
     Search or None
         ``None`` where the motion is steady as it is, or no other one explains the sample.
     """
-    best, steady = None, chosen(found, times, replace(search, temper=np.inf)).turn
-    for turn in (steady, _by_stretch(search, chosen(found, times, search).turn, times, pictures)):
-        if turn is not None:
-            best = _as_well(best or search, turn) or best
-    return best
+    steadiest = _as_well(search, chosen(found, times, replace(search, temper=np.inf)).turn)
+    if steadiest is not None:
+        return steadiest
+    turn = _by_stretch(search, chosen(found, times, search).turn, times, pictures)
+    return None if turn is None else _as_well(search, turn)
 
 
 def _as_well(search: Search, turn: Floats) -> Search | None:
@@ -183,8 +185,16 @@ def _as_well(search: Search, turn: Floats) -> Search | None:
     fit = refine(sample, replace(known, name="steady motion", turn=at_sample))
     if fit is None:
         return None
-    before, after = (score(sample, one.name, one.poses(sample)) for one in (known, fit.proposal))
-    return None if before.lead(after) > _WORSE else search_for(sample, fit)
+    nothing, before, after = (
+        score(sample, name, poses)
+        for name, poses in (
+            (NOTHING, [None] * len(sample.pictures)),
+            (known.name, known.poses(sample)),
+            (fit.proposal.name, fit.proposal.poses(sample)),
+        )
+    )
+    gained, gains = before.total - nothing.total, after.total - nothing.total
+    return search_for(sample, fit) if gains > _AS_WELL * gained else None
 
 
 def _by_stretch(search: Search, turn: Floats, times: Floats, pictures: Sequence[Image | None]) -> Floats | None:

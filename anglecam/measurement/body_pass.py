@@ -10,10 +10,10 @@ from anglecam.camera.lens import lens_from_rig
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.engine.learn import Hints, learn
-from anglecam.engine.reasons import why_nothing_turns
-from anglecam.engine.refine import Turn, centre_sensitivity
+from anglecam.engine.reasons import why_ambiguous, why_jump, why_not_as_hinted, why_nothing_turns
+from anglecam.engine.refine import Turn, sensitivities
 from anglecam.engine.sample import FRAMES, Stills
-from anglecam.engine.tracking import Search, candidates, chosen, search_for, steadier
+from anglecam.engine.tracking import Search, Track, candidates, chosen, search_for, steadier
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.camera_pass import HeldCamera
@@ -30,6 +30,8 @@ from anglecam.vision.status import AMBIGUOUS, OCCLUDED, UNDECODABLE
 
 _KEPT_BYTES = 200_000_000
 """Memory for the reduced pictures of a film, which may have to be looked through again."""
+_SHIFTED_PX = 0.05
+"""By which light, a codec and interpolation shift an edge, px: 0.02 to 0.08 in MJPG films."""
 _HINT_PX = 30.0
 """Standard uncertainty of a hint at the pivot, which is by eye."""
 
@@ -58,7 +60,8 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     """
     film = camera.film
     progress(Stage("looking for what turns"))
-    learnt = learn(_stills(film.stills(FRAMES), camera), _hints(film, rig))
+    hints = _hints(film, rig)
+    learnt = learn(_stills(film.stills(FRAMES), camera), hints)
     if learnt is None or not learnt.turns:
         raise InputError(f"{film.path}: {why_nothing_turns(learnt)}")
     search = search_for(learnt.sample, learnt.explanations[0].fit)
@@ -66,7 +69,9 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     again = steadier(search, seen.found, seen.time, seen.pictures)
     if again is not None:
         search, seen = again, _again(seen, again) or _follow(camera, again, progress)
-    return _detections(film, rig, seen, _motion(search, seen))
+    track = chosen(seen.found, seen.time, search)
+    doubt = why_not_as_hinted(learnt, hints) or why_ambiguous(track.ambiguous) or why_jump(track.turn)
+    return replace(_detections(film, rig, seen, _motion(search, track, seen.decoded)), doubt=doubt)
 
 
 def _hints(film: Film, rig: Rig) -> Hints:
@@ -158,22 +163,24 @@ def _again(seen: _Seen, search: Search) -> _Seen | None:
     return replace(seen, found=found)
 
 
-def _motion(search: Search, seen: _Seen) -> RigidMotion:
-    track, fit, sample = chosen(seen.found, seen.time, search), search.fit, search.sample
+def _motion(search: Search, track: Track, decoded: list[bool]) -> RigidMotion:
+    fit, sample = search.fit, search.sample
     known = np.isfinite(track.turn)
-    sensitivity = np.full((len(track.turn), 2), np.nan)
-    sensitivity[known] = centre_sensitivity(sample, fit, search.body, track.turn[known])
+    sensitivity, sigma = np.full((len(track.turn), 2), np.nan), track.sigma.copy()
+    sensitivity[known], shift = sensitivities(sample, fit, search.body, track.turn[known])
+    off_px = np.hypot(fit.off_px, _SHIFTED_PX / sample.scale)
+    sigma[known] = np.hypot(sigma[known], np.hypot(*shift.T) / np.sqrt(2.0) * off_px)
     middle = float(np.median(track.turn[known])) if known.any() else 0.0
     arm = search.body.middle - search.centre
     cos, sin = np.cos(middle), np.sin(middle)
     centre = search.centre + np.array([cos * arm[0] + sin * arm[1], -sin * arm[0] + cos * arm[1]])
     status = [
         UNDECODABLE if not shown else AMBIGUOUS if vague else OK if ok else OCCLUDED
-        for shown, vague, ok in zip(seen.decoded, track.ambiguous, known, strict=True)
+        for shown, vague, ok in zip(decoded, track.ambiguous, known, strict=True)
     ]
     return RigidMotion(
         turn=track.turn - middle,
-        sigma=track.sigma,
+        sigma=sigma,
         pivot_sensitivity=sensitivity,
         pivot_px=fit.proposal.centre_px,
         pivot_covariance_px2=fit.covariance_px2,
@@ -190,7 +197,9 @@ def _detections(film: Film, rig: Rig, seen: _Seen, body: RigidMotion) -> Detecti
     lever = float(np.hypot(*(body.centre_px - body.pivot_px)))
     covariance = np.pad(body.pivot_covariance_px2, (0, 1))
     covariance[2, 2] = np.trace(body.pivot_covariance_px2)
-    turned = Circle(body.pivot_px, lever, 0.0, covariance, np.ones(len(seen.time), bool))
+    # the turn of a body that is larger than its lever is seen on itself
+    radius = max(lever, body.extent_px)
+    turned = Circle(body.pivot_px, radius, 0.0, covariance, np.ones(len(seen.time), bool))
     marker, pivot, disagreement = find_pivot(images, rig, turned, lens)
     if OK not in body.status or pivot is None:
         raise InputError(f"{film.path}: none of {len(seen.time)} frames shows what turns in the sampled ones")

@@ -83,9 +83,7 @@ class FilmAtRest(Film):
         assert self.first is not None
         assert self.first_grey is not None
         seen = None if move is None else stored
-        return _PictureAtRest(
-            index, time, seen, self.display, self.bottom_first, move, self.first, self.first_grey
-        )
+        return _PictureAtRest(index, time, seen, self.display, self.bottom_first, move, self.first, self.first_grey)
 
 
 @dataclass(frozen=True, eq=False)

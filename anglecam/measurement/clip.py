@@ -145,8 +145,8 @@ def measure_clip(
     dark = changes and lamp is None and rig.sync.lamp is not None
     clock = DARK if dark else note_on(offset)
     few = why_few(series.status, rig.least_measured)
-    other = None
-    if followed.angles.registered is None:
+    other = followed.detections.doubt
+    if other is None and followed.angles.registered is None:
         other = (
             why_still(followed.detections, followed.ok, rig)
             or why_elsewhere(followed.detections, rig)

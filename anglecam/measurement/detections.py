@@ -57,7 +57,7 @@ class Detections:
     body: RigidMotion | None
     """Motion of the rigid body where there is no mark; ``regions`` are empty then."""
     by: str
-    """What is followed: ``mark``, ``body's keyframes``, ``outline`` or ``layer``."""
+    """What is followed: ``mark`` or ``body``."""
     clear: bool
     """Whether nothing else in the clip may be the mark."""
     noise: float
@@ -74,6 +74,8 @@ class Detections:
     """Messages to the user, a line each."""
     turns: TurnsAhead | None = None
     """Rotation of the body, where it was learnt before all frames were read."""
+    doubt: str | None = None
+    """Why what was followed may be another thing in a part of the frames, or another one than the rig means."""
     found: FoundMark | None = None
     """The mark by a sample of frames; ``None`` where a body is followed without one."""
 

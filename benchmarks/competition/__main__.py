@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.competition.films import Contest, contest
 from anglecam.engine.score import Proposal, Score, best_rival, score
+from benchmarks.competition.films import Contest, contest
 from benchmarks.drawn.kinds import KINDS
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -17,24 +17,21 @@ import numpy as np
 
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats
+from anglecam.engine.sample import FRAMES, Sample, Stills, sample_of, sample_stills
+from anglecam.engine.score import Proposal
 from anglecam.errors import AnglecamError
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import coarse_angles, turns
 from anglecam.measurement.camera_pass import HeldCamera, hold_camera
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.mark_pass import detect_mark
-from anglecam.measurement.rigid_body_pass import detect_outline, detect_rigid_body
 from anglecam.progress import unseen
 from anglecam.video.open_film import open_film
-from anglecam.engine.sample import FRAMES, Sample, Stills, sample_of, sample_stills
-from anglecam.engine.score import Proposal
 from anglecam.vision.stabilise.background_motion import CameraMove
 from benchmarks.drawn.film import Drawn, draw
 
 TRACKERS: dict[str, Callable[[HeldCamera, Rig], Detections | str]] = {
     "mark": lambda camera, rig: detect_mark(camera.film, rig, camera),
-    "body": lambda camera, rig: detect_rigid_body(camera.film, rig),
-    "outline": lambda camera, rig: detect_outline(camera.film, rig),
 }
 LONGEST_S = 60.0
 """CPU time after which a tracker is given up."""

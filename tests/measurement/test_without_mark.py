@@ -32,12 +32,12 @@ def _plate(scene, angle):
     [
         # a plate is also measured in `tests/vision/registration/test_pivot_wander.py`
         pytest.param(_plate, "whole body", 0.02, marks=pytest.mark.sweep),
-        (things.stick((110, 112, 110), 14.0, PIVOT, 140.0), "outline", 0.1),
+        (things.stick((110, 112, 110), 14.0, PIVOT, 140.0), "body", 0.1),
     ],
     ids=["plate", "stick"],
 )
 def test_a_body_without_a_mark_is_measured(tmp_path, monkeypatch, draw, by, rms_deg):
-    monkeypatch.setattr(mark_pass, "find_mark", lambda *_: None)
+    monkeypatch.setattr(mark_pass, "find_mark", lambda *_, **__: None)
     film = open_film(things.film(tmp_path / "clip.mkv", draw, SWING))
     measured = measure_clip(film, Rig())
     assert measured.by == by

@@ -152,7 +152,7 @@ def _patches(signed: NDArray[np.float32], level: float) -> Patches:
     return Patches(key[order, 0], up(place[order]), spin, likeness, spread2)
 
 
-@njit(cache=True)
+@njit("float64[::1](int64[:], float64[:, ::1], float64[::1], int64)", cache=True, nogil=True)
 def _often(frame, place, size, count):  # type: ignore[no-untyped-def]
     """Return in how many frames a patch of like size is in the place of each."""
     often = np.zeros(len(frame))
@@ -190,7 +190,24 @@ def _tracks(
     return tracks
 
 
-@njit(cache=True)
+@njit(inline="always")
+def _unlike(likeness, i, k):  # type: ignore[no-untyped-def]
+    return max(
+        abs(likeness[i, 0] - likeness[k, 0]), abs(likeness[i, 1] - likeness[k, 1]), abs(likeness[i, 2] - likeness[k, 2])
+    )
+
+
+@njit(inline="always")
+def _alike(likeness, i, k):  # type: ignore[no-untyped-def]
+    return _unlike(likeness, i, k) < _ALIKE
+
+
+@njit(
+    "Tuple((float64[::1], complex128[::1], complex128[::1], int64[:, ::1]))(int64[::1], complex128[::1], "
+    "complex128[::1], float64[:, ::1], int64, float64, boolean)",
+    cache=True,
+    nogil=True,
+)
 def _voted(frame, place, spin, likeness, count, longest, rigid):  # type: ignore[no-untyped-def]
     """Draw circles or centres, and let all frames vote for each."""
     n = len(frame)
@@ -247,15 +264,3 @@ def _voted(frame, place, spin, likeness, count, longest, rigid):  # type: ignore
                 best[t], members[d, t] = good, k
         votes[d], centres[d], arms[d] = best.sum(), centre, arm
     return votes, centres, arms, members
-
-
-@njit(cache=True)
-def _unlike(likeness, i, k):  # type: ignore[no-untyped-def]
-    return max(
-        abs(likeness[i, 0] - likeness[k, 0]), abs(likeness[i, 1] - likeness[k, 1]), abs(likeness[i, 2] - likeness[k, 2])
-    )
-
-
-@njit(cache=True)
-def _alike(likeness, i, k):  # type: ignore[no-untyped-def]
-    return _unlike(likeness, i, k) < _ALIKE

@@ -198,7 +198,7 @@ def _agreeing(start: Complexes, end: Complexes, tolerance: float, trials: int) -
     return np.asarray(_consensus(np.ascontiguousarray(start), np.ascontiguousarray(end), tolerance, trials))
 
 
-@njit(cache=True)
+@njit("boolean[::1](complex128[::1], complex128[::1], float64, int64)", cache=True, nogil=True)
 def _consensus(start, end, tolerance, trials):  # type: ignore[no-untyped-def]
     n = len(start)
     best = np.zeros(n, np.bool_)

@@ -19,7 +19,9 @@ from anglecam.data.typing import Floats
 Array = NDArray[np.float32]
 
 
-@numba.njit(cache=True, fastmath=True)
+@numba.njit(
+    "float32[:, :, ::1](float32[:, :, ::1], float32[::1], float32[::1], int64)", cache=True, nogil=True, fastmath=True
+)
 def to_polar(pictures: Array, centre: Array, radii: Array, angles: int) -> Array:
     """Return pictures (h, w, K) at angles and radii about a centre (2,), as (angles, R, K); 0 outside."""
     height, width, count = pictures.shape
@@ -44,7 +46,12 @@ def to_polar(pictures: Array, centre: Array, radii: Array, angles: int) -> Array
     return result
 
 
-@numba.njit(cache=True, fastmath=True)
+@numba.njit(
+    "UniTuple(float32[:, ::1], 3)(float32[:, :, ::1], float32[:, :, ::1], int64[::1], float32[::1], float32[:, ::1])",
+    cache=True,
+    nogil=True,
+    fastmath=True,
+)
 def fit(re: Array, im: Array, most: NDArray[np.int64], turn: Array, weight: Array) -> tuple[Array, Array, Array]:
     """Learn S and T from all frames, and compare each frame with what the others predict.
 
@@ -116,7 +123,7 @@ def fit(re: Array, im: Array, most: NDArray[np.int64], turn: Array, weight: Arra
     return left, match_re, match_im
 
 
-@numba.njit(cache=True)
+@numba.njit("int64[::1](float32[:, ::1], float64)", cache=True, nogil=True)
 def steady_path(match: Array, cost: float) -> NDArray[np.int64]:
     """Return the path over angles (K,) with the highest match (angles, K), less ``cost`` for each bin of turn."""
     count, frames = match.shape
@@ -142,7 +149,12 @@ def steady_path(match: Array, cost: float) -> NDArray[np.int64]:
     return path
 
 
-@numba.njit(cache=True, fastmath=True)
+@numba.njit(
+    "float64[::1](float32[::1], float32[::1], float32[::1], float64[:, ::1])",
+    cache=True,
+    nogil=True,
+    fastmath=True,
+)
 def roundness(x: Array, y: Array, value: Array, centres: Floats) -> Floats:
     """Return the share of the variance of values at pixels that rings about each of (n, 2) centres explain."""
     mean = value.mean()

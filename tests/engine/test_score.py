@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from anglecam.engine.sample import Sample, cut, sample_of, steady_light
+from anglecam.engine.sample import Sample, Stills, sample_of, sample_stills, steady_light
 from anglecam.engine.score import NOTHING, Proposal, best_rival, score
 from anglecam.engine.target import learn_target
 
@@ -94,10 +94,10 @@ def test_a_sample_is_cut_to_what_changes():
     pictures = [np.full((480, 640, 3), 90, np.uint8) for _ in range(12)]
     for k, picture in enumerate(pictures):
         cv2.circle(picture, (300 + 4 * k, 200), 12, (0, 0, 200), -1)
-    found = cut(pictures)
-    assert found is not None
-    shown, scale, corner = found
-    sample = sample_of(shown, np.arange(12), scale, corner)
-    assert sample.place(np.array([322.0, 200.0])) == pytest.approx(np.array(shown.shape[:0:-1]) / 2.0, abs=6.0 * scale)
-    assert corner[0] > 250
-    assert cut([pictures[0]] * 12) is None
+    frames = np.arange(12)
+    sample, *closer = sample_stills(Stills(pictures, [None] * 12, frames))
+    shown = np.array(sample.median.shape[::-1])
+    assert sample.place(np.array([322.0, 200.0])) == pytest.approx(shown / 2.0, abs=6.0 * sample.scale)
+    assert sample.corner_px[0] > 250
+    assert closer == []
+    assert sample_stills(Stills([pictures[0]] * 12, [None] * 12, frames)) == []

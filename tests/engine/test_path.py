@@ -1,0 +1,40 @@
+"""Of look-alike poses the steadiest way is chosen, and how sure that is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from anglecam.engine.path import steadiest_path
+
+TRUE = np.radians(7.0) * np.arange(40)
+
+
+def _poses(order):
+    return [(turn + 2.0 * np.pi / order * np.arange(order) + np.pi) % (2.0 * np.pi) - np.pi for turn in TRUE]
+
+
+def test_a_wheel_of_five_like_spokes_goes_on_as_before():
+    rng = np.random.default_rng(3)
+    gains = [rng.normal(0.0, 0.5, 5) for _ in range(40)]
+    gains[0][0] += 10.0  # only the first frame tells them apart
+    path, margin = steadiest_path(_poses(5), gains, np.arange(40) / 30.0, 0.01)
+    assert (path == 0).all()
+    assert margin.min() > 0.0
+
+
+def test_a_sudden_turn_is_followed_where_the_picture_shows_it():
+    turns, gains = _poses(2), [np.array([0.0, 0.0]) for _ in range(40)]
+    for k in range(20, 40):
+        gains[k] = np.array([0.0, 40.0])
+    path, _ = steadiest_path(turns, gains, np.arange(40) / 30.0, 0.01)
+    assert (path[:20] == path[0]).all()
+    assert (path[20:] == 1).all()
+
+
+def test_frames_without_a_pose_are_left_out():
+    turns, gains = _poses(3), [np.zeros(3) for _ in range(40)]
+    turns[7], gains[7] = np.zeros(0), np.zeros(0)
+    path, margin = steadiest_path(turns, gains, np.arange(40) / 30.0, 0.01)
+    assert path[7] == -1
+    assert np.isinf(margin[7])
+    assert len({*path.tolist()} - {-1}) == 1
