@@ -69,8 +69,8 @@ def why_jump(turn: Floats) -> str | None:
     if step[k] < max(_JUMP_DEG, _FASTER * float(np.quantile(step, _USUAL))):
         return None
     return (
-        f"from frame {seen[k]} to {seen[k + 1]} it turns by {step[k]:.0f}°, faster than it is ever seen to turn; another"
-        " like part may be seen from there on; mark one of them"
+        f"from frame {seen[k]} to {seen[k + 1]} it turns by {step[k]:.0f}°, faster than it is ever seen to turn;"
+        " another like part may be seen from there on; mark one of them"
     )
 
 

@@ -2,7 +2,7 @@
 
 The currency is the log predictive density of held-out frames. Frames, not pixels, are the independent units: errors of
 an appearance or of a codec are shared by the pixels of a frame. The difference of two explanations therefore has the
-standard error of a mean over frames, and how probably one predicts better than the other follows from their ratio.
+standard error of a mean over frames, and their ratio says how sure it is that one predicts better than the other.
 """
 
 from __future__ import annotations
@@ -11,14 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import special
 
 from anglecam.data.typing import Floats
 from anglecam.engine.likelihood import log_density
 from anglecam.engine.sample import Sample
 from anglecam.engine.target import learn_target, turned
 
-NOTHING, SHIFTED = "nothing moves", "moves without turning"
+NOTHING = "nothing moves"
 
 
 @dataclass(frozen=True)
@@ -50,10 +49,6 @@ class Score:
         """Sum over the frames, nats."""
         return float(self.per_frame.sum())
 
-    def ahead_of(self, other: Score) -> float:
-        """Return the probability that this explanation predicts a further frame better than another one."""
-        return float(special.ndtr(self.lead(other)))
-
     def lead(self, other: Score) -> float:
         """Return by how much this explanation predicts a frame better than another one, in standard errors."""
         apart = self.per_frame - other.per_frame
@@ -82,19 +77,3 @@ def score(sample: Sample, name: str, poses: Sequence[Floats | None]) -> Score:
             picture, variance = target.predict(known[k])
             per_frame[k] = float(log_density(sample.pictures[k], picture, variance).sum(dtype=float))
     return Score(name, per_frame)
-
-
-def best_rival(sample: Sample, proposal: Proposal) -> Score:
-    """Return the best of what a proposal may be mistaken for, on the same pixels.
-
-    Nothing moves; or the middle of the body moves as in the proposal, and the body does not turn.
-    """
-    poses = proposal.poses(sample)
-    nothing = score(sample, NOTHING, [None] * len(poses))
-    target = learn_target(sample, poses, np.arange(len(poses)))
-    rows, columns = np.nonzero(target.visibility)
-    if len(rows) == 0:
-        return nothing
-    middle = np.array([columns.mean(), rows.mean()]) - target.pad
-    shifted = [None if p is None else turned(middle, 0.0, p[:, :2] @ middle + p[:, 2] - middle) for p in poses]
-    return max(nothing, score(sample, SHIFTED, shifted), key=lambda one: one.total)

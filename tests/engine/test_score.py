@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from anglecam.engine.sample import Sample, Stills, sample_of, sample_stills, steady_light
-from anglecam.engine.score import NOTHING, Proposal, best_rival, score
+from anglecam.engine.score import NOTHING, Proposal, score
 from anglecam.engine.target import learn_target
 
 CENTRE = np.array([60.0, 20.0])
@@ -49,14 +49,14 @@ def test_the_true_turns_predict_better_than_others(swing):
         ("the other way", CENTRE, -TURN),
     ):
         other = Proposal(name, centre, turn)
-        assert best.ahead_of(score(swing, name, other.poses(swing))) > 0.999
-    assert best.ahead_of(best_rival(swing, true)) > 0.999
+        assert best.lead(score(swing, name, other.poses(swing))) > 3.0
+    assert best.lead(score(swing, NOTHING, [None] * len(TURN))) > 6.0
 
 
 def test_a_small_error_of_the_turn_costs_likelihood(swing):
     off = TURN + np.radians(2.0) * np.where(np.arange(len(TURN)) % 3, 1.0, -1.0)
     true, wrong = (score(swing, "", Proposal("", CENTRE, turn).poses(swing)) for turn in (TURN, off))
-    assert true.ahead_of(wrong) > 0.999
+    assert true.lead(wrong) > 3.0
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -66,7 +66,7 @@ def test_where_nothing_moves_a_turn_is_no_better(seed):
     turn = 0.3 * np.random.default_rng(seed).standard_normal(24)
     found = score(still, "turns", Proposal("turns", CENTRE, turn).poses(still))
     nothing = score(still, NOTHING, [None] * 24)
-    assert found.ahead_of(nothing) < 0.95
+    assert found.lead(nothing) < 2.0
 
 
 def test_the_body_is_seen_where_it_is_and_the_background_behind_it(swing):

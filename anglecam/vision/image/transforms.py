@@ -48,46 +48,6 @@ def rotate_each(arms: Floats, turns: Floats) -> Floats:
     return np.stack([c * arms[..., 0] + s * arms[..., 1], -s * arms[..., 0] + c * arms[..., 1]], axis=-1)
 
 
-def fit_rigid(start: Floats, end: Floats) -> Floats:
-    """Fit a rotation and a translation by least squares (Umeyama 1991, without scale).
-
-    Parameters
-    ----------
-    start, end : ndarray
-        (n, 2) the same points before and after the motion.
-
-    Returns
-    -------
-    ndarray
-        (3, 3).
-    """
-    a, b = start.mean(axis=0), end.mean(axis=0)
-    p, q = start - a, end - b
-    turn = np.arctan2((p[:, 1] * q[:, 0] - p[:, 0] * q[:, 1]).sum(), (p * q).sum())
-    R = rotation(turn).T
-    motion = np.eye(3)
-    motion[:2, :2], motion[:2, 2] = R, b - R @ a
-    return motion
-
-
-def apply_motion(motion: Floats, points: Floats) -> Floats:
-    """Apply a motion (3, 3) to points (n, 2)."""
-    return points @ motion[:2, :2].T + motion[:2, 2]
-
-
-def inverse_motion(motion: Floats) -> Floats:
-    """Return the inverse (3, 3) of a motion."""
-    return np.asarray(np.linalg.inv(motion), dtype=float)
-
-
 def turn_of(motion: Floats) -> float:
     """Return the rotation angle of a motion (3, 3), rad."""
     return float(np.arctan2(motion[0, 1], motion[0, 0]))
-
-
-def turned_about(pivot_px: Floats, turn: float) -> Floats:
-    """Return the motion (3, 3) that rotates about a point."""
-    motion = np.eye(3)
-    motion[:2, :2] = rotation(turn).T
-    motion[:2, 2] = pivot_px - motion[:2, :2] @ pivot_px
-    return motion
