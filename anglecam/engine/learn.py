@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,8 +54,13 @@ class Learnt:
         """Whether the first explanation is a body that turns about one centre."""
         return bool(self.explanations) and self.explanations[0].turns
 
+    @property
+    def lead(self) -> float:
+        """By how much the first explanation predicts better than its rivals, in standard errors."""
+        return self.explanations[0].lead if self.explanations else -np.inf
 
-def learn(stills: Stills, hints: Hints = NO_HINTS, proposed: Sequence[Proposal] = ()) -> Learnt | None:
+
+def learn(stills: Stills, hints: Hints = NO_HINTS) -> Learnt | None:
     """Find the body that turns in a film.
 
     Parameters
@@ -64,8 +69,6 @@ def learn(stills: Stills, hints: Hints = NO_HINTS, proposed: Sequence[Proposal] 
         Frames of the film.
     hints : Hints
         What is declared.
-    proposed : sequence of Proposal
-        Further proposals, with a turn for each frame of the stills.
 
     Returns
     -------
@@ -75,32 +78,33 @@ def learn(stills: Stills, hints: Hints = NO_HINTS, proposed: Sequence[Proposal] 
     looked: list[Learnt] = []
     with one_opencv_thread(), threadpool_limits(1, "blas"):  # matrices this small take longer with more
         for sample in sample_stills(stills):
-            looked.append(_explained(sample, stills, hints, proposed))
-            if looked[-1].turns and obeys(looked[-1].explanations[0], looked[-1].sample, hints):
+            looked.append(_explained(sample, stills, hints))
+            if _rank(looked[-1], hints) == 0:
                 break
-    return min(looked, key=lambda one: _rank(one, hints), default=None)
+    return min(looked, key=lambda one: (_rank(one, hints), -one.lead), default=None)
 
 
-def _explained(sample: Sample, stills: Stills, hints: Hints, proposed: Sequence[Proposal]) -> Learnt:
+def _explained(sample: Sample, stills: Stills, hints: Hints) -> Learnt:
     proposals = [one for find in FINDERS for one in find(sample)]
-    proposals += [_of_frames(one, stills, sample) for one in proposed]
-    found = sorted(compete(sample, proposals), key=lambda one: not obeys(one, sample, hints))
+    found = sorted(compete(sample, proposals), key=lambda one: _rank(Learnt(sample, (one,)), hints))
     if not found:
         return Learnt(sample, ())
     closer = sample_part(stills, _swept(sample, found[0]))
     if closer is not None and closer.scale > _CLOSER * sample.scale:
-        again = compete(closer, [_of_frames(found[0].fit.proposal, _as_stills(sample), closer)])
+        again = compete(closer, [_in_frames(found[0].fit.proposal, sample, closer)])
         if again and (again[0].turns or not found[0].turns):
             return Learnt(closer, (again[0], *found[1:]))
     return Learnt(sample, tuple(found))
 
 
-def _rank(one: Learnt, hints: Hints) -> tuple[bool, bool, float]:
-    """Return by what looks at parts of the picture are ordered: a body that obeys the hints, that turns, is sure."""
-    if not one.explanations:
-        return True, True, 0.0
-    first = one.explanations[0]
-    return not obeys(first, one.sample, hints), not first.turns, -first.lead
+def _rank(one: Learnt, hints: Hints) -> int:
+    """Return 0 for a body that turns and obeys the hints, 1 for one that turns otherwise, 2 for none.
+
+    A hint does not hide what turns: where nothing turns as it says, a message says what does.
+    """
+    if not one.turns:
+        return 2
+    return 0 if obeys(one.explanations[0], one.sample, hints) else 1
 
 
 def obeys(one: Explanation, sample: Sample, hints: Hints) -> bool:
@@ -120,6 +124,7 @@ def obeys(one: Explanation, sample: Sample, hints: Hints) -> bool:
     places = np.column_stack([columns, rows]) - float(one.fit.target.pad)
     pose = turned(sample.place(one.fit.proposal.centre_px), float(turn))
     there = sample.in_film(places @ pose[:, :2].T + pose[:, 2])
+    there = np.vstack([there, one.fit.proposal.centre_px])  # a hub is not seen to turn
     slack = _BESIDE_PX / sample.scale
     low, high = hints.mark_px[:2] - slack, hints.mark_px[2:] + slack
     return bool(((there >= low) & (there <= high)).all(axis=1).any())
@@ -143,11 +148,7 @@ def _swept(sample: Sample, one: Explanation) -> Floats:
     return np.concatenate([sample.in_film(low - margin), sample.in_film(high + margin)])
 
 
-def _of_frames(one: Proposal, stills: Stills, sample: Sample) -> Proposal:
-    """Return a proposal with its turns in the frames of a sample."""
-    turn = dict(zip(stills.frames.tolist(), one.turn, strict=True))
-    return Proposal(one.name, one.centre_px, np.array([turn.get(k, np.nan) for k in sample.frames.tolist()]))
-
-
-def _as_stills(sample: Sample) -> Stills:
-    return Stills((), (), sample.frames)
+def _in_frames(one: Proposal, sample: Sample, other: Sample) -> Proposal:
+    """Return a proposal for a sample as one for another sample of the film."""
+    turn = dict(zip(sample.frames.tolist(), one.turn, strict=True))
+    return Proposal(one.name, one.centre_px, np.array([turn.get(k, np.nan) for k in other.frames.tolist()]))

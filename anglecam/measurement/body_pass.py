@@ -61,7 +61,10 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     film = camera.film
     progress(Stage("looking for what turns"))
     hints = _hints(film, rig)
-    learnt = learn(_stills(film.stills(FRAMES), camera), hints)
+    pictures = film.stills(FRAMES)
+    if hints.mark_px is not None and all(picture.index != hints.mark_frame for picture in pictures):
+        pictures = sorted([*pictures, _picture(film, hints.mark_frame)], key=lambda picture: picture.index)
+    learnt = learn(_stills(pictures, camera), hints)
     if learnt is None or not learnt.turns:
         raise InputError(f"{film.path}: {why_nothing_turns(learnt)}")
     search = search_for(learnt.sample, learnt.explanations[0].fit)
@@ -84,6 +87,10 @@ def _hints(film: Film, rig: Rig) -> Hints:
         mark_px=None if mark is None else np.array(mark.as_box),
         mark_frame=0 if mark is None else mark.frame - film.first_frame,
     )
+
+
+def _picture(film: Film, index: int) -> Picture:
+    return next(picture for picture, _ in film.pictures(lambda _: None) if picture.index == index)
 
 
 def _image(picture: Picture, camera: HeldCamera) -> Image | None:

@@ -143,3 +143,28 @@ def test_a_horn_that_jumps_and_rests_is_measured(tmp_path, hint):
     assert measured.series.ok.mean() > 0.95
     assert np.sqrt((error**2).mean()) < 0.3
     assert np.hypot(*(measured.angles.pivot.centre_px - PIVOT)) < 1.5
+
+
+def _two(scene, angle):
+    things.bar(scene, (80.0, 30.0), things.hanging((80.0, 30.0), 100.0, angle), 14.0, (60, 60, 60))
+    things.bar(scene, (240.0, 30.0), things.hanging((240.0, 30.0), 100.0, -0.7 * angle), 14.0, (60, 60, 60))
+
+
+@pytest.mark.parametrize(
+    ("hint", "share"),
+    [
+        pytest.param({"pivot": {"near": [85, 26]}}, 1.0, id="pivot"),
+        pytest.param({"mark": {"at": [240, 100], "frame": 1}}, -0.7, id="mark"),
+    ],
+)
+def test_of_two_things_that_turn_the_hinted_one_is_measured(tmp_path, hint, share):
+    measured = _measured(tmp_path, _two, SWING, rig=Rig.model_validate(hint))
+    assert measured.doubt is None
+    assert np.sqrt((_error(measured, share * SWING) ** 2).mean()) < 0.3
+
+
+def test_a_hint_at_another_place_costs_a_doubt_and_no_measurement(tmp_path):
+    measured = _measured(tmp_path, _horn, JUMPS, rig=Rig.model_validate({"pivot": {"near": [20, 220]}}))
+    assert measured.doubt is not None
+    assert "is not what is declared (pivot 20,220)" in measured.doubt
+    assert np.sqrt((_error(measured, JUMPS) ** 2).mean()) < 0.3
