@@ -73,7 +73,10 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     if again is not None:
         search, seen = again, _again(seen, again) or _follow(camera, again, progress)
     track = chosen(seen.found, seen.time, search)
-    doubt = why_not_as_hinted(learnt, hints) or why_ambiguous(track.ambiguous) or why_jump(track.turn)
+    jump = why_jump(track.turn)
+    if jump is not None:
+        raise InputError(f"{film.path}: {jump}")
+    doubt = why_not_as_hinted(learnt, hints) or why_ambiguous(track.ambiguous)
     return replace(_detections(film, rig, seen, _motion(search, track, seen.decoded)), doubt=doubt)
 
 

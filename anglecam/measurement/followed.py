@@ -25,7 +25,7 @@ from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.carried_marks import carried_marks, smeared_marks, with_marks
 from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.fine_angles import fine_angles
-from anglecam.measurement.mark_pass import MarkNotFoundError, detect_mark
+from anglecam.measurement.mark_pass import MarkNotFoundError, PivotNotFoundError, detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
 from anglecam.measurement.trust import require_rotation
 from anglecam.progress import Progress, unseen
@@ -84,9 +84,11 @@ def follow_mark_or_body(
     try:
         mark = detect_mark(film, rig, camera, progress, known)
         return _measured(film, rig, command, mark, progress)
-    except InputError as problem:
-        not_there = rig.mark_rgb is not None and isinstance(problem, MarkNotFoundError)
-        if known is not None or not_there or film.undecodable == len(film.times):
+    except PivotNotFoundError:
+        if known is not None:
+            raise
+    except MarkNotFoundError:
+        if known is not None or rig.mark_rgb is not None or film.undecodable == len(film.times):
             raise
     if camera.unknown is not None:
         raise InputError(camera.unknown)

@@ -47,6 +47,10 @@ class MarkNotFoundError(InputError):
     """No thing of the clip can be followed as a mark, so that a body without one may be tried."""
 
 
+class PivotNotFoundError(InputError):
+    """The mark alone does not show about which point it turns; the body may show it."""
+
+
 def seek_mark(film: Film, rig: Rig) -> FoundMark:
     """Find the mark in evenly spaced frames of a film whose camera stands.
 
@@ -133,7 +137,7 @@ def detect_mark(
     if OK not in status:
         raise MarkNotFoundError(_nothing_measured(path, status, sample, rig))
     if pivot is None:
-        raise InputError(
+        raise PivotNotFoundError(
             f"{path}: no pivot found: the mark's path is too short to determine its centre, and there is no round"
             " marker near it; in rig.yaml, hint at it to some 10 px: pivot: {near: [x, y]}, or declare it, also outside"
             " the picture: pivot: {at: [x, y], sigma_px: s}"
