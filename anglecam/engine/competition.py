@@ -24,6 +24,8 @@ SURE = 6.0
 """Standard errors by which a body that turns has to predict better than its rivals."""
 OFF_CENTRE = 0.03
 """Share of its travel by which a body may be off a turn about one centre; its angle is then off by as much."""
+LEAST_TURN = np.radians(1.0)
+"""A body that is seen to turn by less may as well stretch or be seen through moving air."""
 _APART_PX = 3.0
 """Of the sample: places of one body by two explanations that are the same."""
 
@@ -46,7 +48,8 @@ class Explanation:
     @property
     def turns(self) -> bool:
         """Whether it is a body that turns about one centre."""
-        return self.lead >= SURE and self.fit.off_centre <= OFF_CENTRE
+        turned = float(np.ptp(self.fit.proposal.turn[self.fit.seen]))
+        return self.lead >= SURE and self.fit.off_centre <= OFF_CENTRE and turned >= LEAST_TURN
 
 
 def compete(sample: Sample, proposals: Sequence[Proposal]) -> list[Explanation]:

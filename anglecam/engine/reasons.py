@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anglecam.data.typing import Flags, Floats
-from anglecam.engine.competition import SURE
+from anglecam.engine.competition import OFF_CENTRE, SURE
 from anglecam.engine.learn import Hints, Learnt, obeys
 
 _UNSURE = 10
@@ -36,6 +36,8 @@ def why_nothing_turns(learnt: Learnt | None) -> str:
         best = learnt.explanations[0]
         if best.lead < SURE:
             seen += f", but nothing shows that it turns: {best.lead:.1f} standard errors, of {SURE:g} that it takes"
+        elif best.fit.off_centre <= OFF_CENTRE:
+            seen += ", but it turns by less than 1°, which a thing that stretches does as well"
         else:
             off = 100.0 * best.fit.off_centre
             seen += f", but not about a fixed point: its middle is off by {off:.1f} % of its travel"
