@@ -1,7 +1,6 @@
 """Explanations of what moves compete on held-out frames; the best are fitted, and what they may be mistaken for too.
 
-Every proposal is fitted to a small sample first. Those that predict best are fitted to the whole sample. What remains
-unexplained by the best one is what the next body is sought in.
+Every proposal is fitted to a small sample first. Those that predict best are fitted to the whole sample.
 """
 
 from __future__ import annotations

@@ -17,13 +17,15 @@ films that are measured rightly none has such a step."""
 _REST = "to measure a mechanism at rest, declare pivot: {at: [x, y], sigma_px: s} in rig.yaml"
 
 
-def why_nothing_turns(learnt: Learnt | None) -> str:
+def why_nothing_turns(learnt: Learnt | None, first_frame: int) -> str:
     """Return a sentence for a film in which no body is seen to turn.
 
     Parameters
     ----------
     learnt : Learnt, optional
         What moves; ``None`` where nothing does.
+    first_frame : int
+        Number in the film of the first frame that is measured.
     """
     if learnt is None:
         return f"nothing is seen to turn; {_REST}"
@@ -41,38 +43,42 @@ def why_nothing_turns(learnt: Learnt | None) -> str:
         else:
             off = 100.0 * best.fit.off_centre
             seen += f", but not about a fixed point: its middle is off by {off:.1f} % of its travel"
-    frame = int(sample.frames[0])
+    frame = first_frame + int(sample.frames[0])
     return f"{seen}; point at it: mark: {{at: [{x:.0f}, {y:.0f}], frame: {frame}}} in rig.yaml"
 
 
-def why_ambiguous(ambiguous: Flags) -> str | None:
+def why_ambiguous(ambiguous: Flags, first_frame: int) -> str | None:
     """Return a sentence where look-alike poses were perhaps not told apart in (n,) frames."""
     frames = np.flatnonzero(ambiguous)
     if len(frames) < _UNSURE:
         return None
+    first = first_frame + int(frames[0])
     return (
-        f"in {len(frames)} frames, the first of them {frames[0]}, what turns looks the same in another pose that is"
+        f"in {len(frames)} frames, the first of them {first}, what turns looks the same in another pose that is"
         " nearly as probable, and what follows may be off by the turn between the two; mark one of the like parts"
     )
 
 
-def why_jump(turn: Floats) -> str | None:
+def why_jump(turn: Floats, first_frame: int) -> str | None:
     """Return a sentence where what is followed jumps once, as where another like thing is seen instead.
 
     Parameters
     ----------
     turn : ndarray
         (n,) rad; NaN where nothing is seen.
+    first_frame : int
+        Number in the film of the first frame that is measured.
     """
     seen = np.flatnonzero(np.isfinite(turn))
     step = np.degrees(np.abs(np.angle(np.exp(1j * np.diff(turn[seen])))))
     if len(step) == 0:
         return None
     k = int(np.argmax(step))
+    before, after = first_frame + seen[k], first_frame + seen[k + 1]
     if step[k] < max(_JUMP_DEG, _FASTER * float(np.quantile(step, _USUAL))):
         return None
     return (
-        f"from frame {seen[k]} to {seen[k + 1]} what is followed turns by {step[k]:.0f}°, faster than it is ever seen"
+        f"from frame {before} to {after} what is followed turns by {step[k]:.0f}°, faster than it is ever seen"
         " to turn; another like part may be seen from there on; mark one of them"
     )
 

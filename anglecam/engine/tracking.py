@@ -32,8 +32,6 @@ _HOPELESS = 0.1
 is before it."""
 _APART_PX = 6.0
 """Least distance of poses that count as two."""
-
-
 _LIKE, _BESIDE_PX = 0.7, 25.0
 """Share of the better pose's gain from which on a pose so near to it may be a look-alike, as of a gear's next tooth."""
 _FEWEST = 8
@@ -53,8 +51,6 @@ class Track:
     """(n,) rad; NaN where it is not seen."""
     sigma: Floats
     """(n,) standard uncertainty about a known centre, rad."""
-    gain: Floats
-    """(n,) nats."""
     ambiguous: Flags
     """(n,) frames in which another pose is nearly as probable."""
 
@@ -178,9 +174,12 @@ def _as_well(search: Search, turn: Floats) -> Search | None:
     """Return a search for the body of a motion (n,), rad, if it is another one and explains the sample as well."""
     sample, known = search.sample, search.fit.proposal
     at_sample = turn[sample.frames]
-    off = np.exp(1j * (at_sample - known.turn))
-    both = np.isfinite(off)
-    if both.sum() < _FEWEST or np.abs(off[both] - np.median(off[both])).max() * search.arm < _APART_PX:
+    both = np.isfinite(at_sample) & np.isfinite(known.turn)
+    if both.sum() < _FEWEST:
+        return None
+    turned = np.exp(1j * (at_sample - known.turn)[both])
+    usual = np.median(turned.real) + 1j * np.median(turned.imag)
+    if np.abs(np.angle(turned / usual)).max() * search.arm < _APART_PX:
         return None
     fit = refine(sample, replace(known, name="steady motion", turn=at_sample))
     if fit is None:
@@ -236,7 +235,6 @@ def chosen(found: Sequence[Sequence[Turn]], times: Floats, search: Search) -> Tr
     turn = np.array([nan if one is None else one.turn for one in picked])
     sigma = np.array([nan if one is None else one.sigma for one in picked])
     ratio = np.array([nan if one is None else one.ratio for one in picked])
-    gain = np.array([0.0 if one is None else one.gain for one in picked])
     seen = np.isfinite(turn)
     turn[seen] = np.unwrap(turn[seen])
-    return Track(turn, with_ratio(sigma, ratio), gain, margin < np.log(19.0))
+    return Track(turn, with_ratio(sigma, ratio), margin < np.log(19.0))

@@ -66,17 +66,17 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
         pictures = sorted([*pictures, _picture(film, hints.mark_frame)], key=lambda picture: picture.index)
     learnt = learn(_stills(pictures, camera), hints)
     if learnt is None or not learnt.turns:
-        raise InputError(f"{film.path}: {why_nothing_turns(learnt)}")
+        raise InputError(f"{film.path}: {why_nothing_turns(learnt, film.first_frame)}")
     search = search_for(learnt.sample, learnt.explanations[0].fit)
     seen = _follow(camera, search, progress)
     again = steadier(search, seen.found, seen.time, seen.pictures)
     if again is not None:
         search, seen = again, _again(seen, again) or _follow(camera, again, progress)
     track = chosen(seen.found, seen.time, search)
-    jump = why_jump(track.turn)
+    jump = why_jump(track.turn, film.first_frame)
     if jump is not None:
         raise InputError(f"{film.path}: {jump}")
-    doubt = why_not_as_hinted(learnt, hints) or why_ambiguous(track.ambiguous)
+    doubt = why_not_as_hinted(learnt, hints) or why_ambiguous(track.ambiguous, film.first_frame)
     return replace(_detections(film, rig, seen, _motion(search, track, seen.decoded)), doubt=doubt)
 
 
