@@ -12,6 +12,7 @@ from anglecam.data.series import CONTRACT_RADII_PX, OK, AngleSeries
 from anglecam.data.typing import Flags, Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
+from anglecam.measurement.derivatives import with_derivatives
 from anglecam.measurement.sigma import scatter, worst_case
 
 
@@ -50,7 +51,7 @@ def series_of_angles(
     Returns
     -------
     AngleSeries
-        A row a frame.
+        A row a frame, with velocity and acceleration.
     """
     measured = np.array([s == OK for s in status])
 
@@ -60,7 +61,7 @@ def series_of_angles(
         return np.where(measured, placed, np.nan)
 
     lines, levers = in_all_frames(angles.line), in_all_frames(angles.lever_px)
-    return AngleSeries(
+    series = AngleSeries(
         name=name,
         time=time,
         angle=lines - angles.neutral,
@@ -74,6 +75,7 @@ def series_of_angles(
         evidence=evidence,
         bounds={r: worst_case(r, levers) for r in {*CONTRACT_RADII_PX, *rig.pixel_error_px}},
     )
+    return with_derivatives(series)
 
 
 def why_zero_is_elsewhere(rig: Rig, command: Command | None, time: Floats) -> str | None:
