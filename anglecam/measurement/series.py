@@ -12,8 +12,9 @@ from anglecam.data.series import CONTRACT_RADII_PX, OK, AngleSeries
 from anglecam.data.typing import Flags, Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
+from anglecam.measurement.bounds import worst_case
 from anglecam.measurement.derivatives import with_derivatives
-from anglecam.measurement.sigma import scatter, worst_case
+from anglecam.measurement.sigma import scatter_of
 
 
 def series_of_angles(
@@ -66,7 +67,7 @@ def series_of_angles(
         time=time,
         angle=lines - angles.neutral,
         sigma=in_all_frames(angles.sigma),
-        sigma_random=in_all_frames(angles.uncertainty.random(scatter(time[ok], angles.line))),
+        sigma_random=in_all_frames(angles.uncertainty.random(scatter_of(time[ok], angles.line))),
         status=tuple(status),
         line=lines,
         mark_px=np.where(measured[:, None], mark_px, np.nan),

@@ -118,7 +118,7 @@ def _draw_angle(axes: Axes, series: AngleSeries) -> None:
     degrees, half = np.degrees(series.angle), NORMAL_95 * np.degrees(shaded)
     if np.isfinite(half).any():
         share = series.common_share
-        common = f"; {100.0 * share:.2g} % of the angle in common" if np.isfinite(share) else ""
+        common = f"; scale uncertain by {100.0 * share:.2g} %" if np.isfinite(share) else ""
         label = f"95 % interval of the random part{common}" if parted else "95 % interval (1.96 σ)"
         axes.fill_between(series.time, degrees - half, degrees + half, color=SHADE, label=label)
     axes.plot(series.time, degrees, color=MEASURED, lw=1.0, marker=".", ms=2, label="angle")
