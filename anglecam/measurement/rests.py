@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from scipy.fft import dst
 from scipy.interpolate import make_lsq_spline
 from scipy.stats import norm
 
@@ -31,6 +32,8 @@ _GAP_FRAMES = 3.5
 """Frame intervals without a measurement beyond which the motion in between is unknown."""
 _EDGES = np.linspace(0.0, 0.5, 5)
 """Where a motion may end within the rest after it, as shares of the rest."""
+_WALKS = np.geomspace(0.02, 20.0, 16)
+"""Steps of the random walks that are tried, relative to the noise."""
 _DENSER = 1.5
 """Ratio of the numbers of intervals of the splines that are tried."""
 
@@ -99,40 +102,65 @@ def _rest(y: Floats, s: Floats, first: int, last: int) -> Rest:
 
 
 def _is_apart(t: Floats, y: Floats, noise: Floats, first: int, last: int) -> bool:
-    """Return whether neither what is before an interval nor what is after it goes on smoothly through it.
+    """Return whether neither what is before an interval nor what is after it goes on through it.
 
     Both are looked at for as long as the interval lasts. The motion may end within the interval's half next to it, as
     the last swing of a motion that dies out does.
     """
     count = last - first + 1
     begin, end = max(first - count, 0), min(last + 1 + count, len(y))
-    price = float(np.log(end - begin))
-    within = np.unique(np.round(_EDGES * count)).astype(np.intp)
+    # the edges of rests are sought in the whole series
+    price = float(np.log(len(y)))
+    edges = np.unique(np.round(_EDGES * count)).astype(np.intp)
 
     def described(a: int, b: int) -> float:
         return _least_description(t[a:b], y[a:b], noise[a:b], price)
 
-    def in_two(a: int, edge: int, b: int) -> float:
-        # the place of the edge is a parameter too
-        return described(a, edge) + described(edge, b) + price
-
-    if begin < first:
-        smoothly = described(begin, last + 1)
-        if all(in_two(begin, first + k, last + 1) >= smoothly for k in within):
+    start, stop, parts = first, last + 1, 1
+    # fewer frames show no motion
+    if first - begin >= _LEAST_REST_FRAMES:
+        start = min(first + edges, key=lambda edge: described(begin, edge) + described(edge, stop))
+        if described(begin, start) + described(start, stop) + price >= described(begin, stop):
             return False
-    smoothly = described(first, end)
-    return end == last + 1 or any(in_two(first, last + 1 - k, end) < smoothly for k in within)
+        parts += 1
+    else:
+        begin = first
+    if end - stop >= _LEAST_REST_FRAMES:
+        stop = min(stop - edges, key=lambda edge: described(start, edge) + described(edge, end))
+        if described(start, stop) + described(stop, end) + price >= described(start, end):
+            return False
+        parts += 1
+    else:
+        end = stop
+    in_parts = described(begin, start) + described(start, stop) + described(stop, end) + (parts - 1) * price
+    return parts == 1 or in_parts < described(begin, end)
 
 
 def _least_description(t: Floats, y: Floats, noise: Floats, price: float) -> float:
-    """Return the least χ² + K·price of polynomials up to the cubic, of cubic splines, and of the values themselves."""
-    least = len(y) * price
+    """Return the least χ² + K·price of smooth curves, of a random walk, and of the values themselves."""
+    if len(y) == 0:
+        return 0.0
+    least = min(len(y) * price, _random_walk(y, noise) + 2.0 * price)
     for parameters, fitted in _smooth_curves(t, y, noise):
         if parameters * price >= least:
             break
         residual = (y - fitted) / noise
         least = min(least, float(residual @ residual) + parameters * price)
     return least
+
+
+def _random_walk(y: Floats, noise: Floats) -> float:
+    """Return the least -2·ln of the likelihood of a random walk in white noise, relative to that of noise without walk.
+
+    The covariance of the differences is q²·I + r²·T, where T, with 2 in its diagonal and -1 beside it, has the sine
+    transform's vectors as its eigenvectors. For a walk without steps, q = 0, this is χ² about the mean.
+    """
+    if len(y) < 2:
+        return 0.0
+    part = dst(np.diff(y) / float(np.median(noise)), type=1, norm="ortho") ** 2
+    white = 2.0 - 2.0 * np.cos(np.pi * np.arange(1, len(y)) / len(y))
+    walking = _WALKS[:, None] ** 2 + white
+    return float((np.log(walking / white) + part / walking).sum(axis=1).min())
 
 
 def _smooth_curves(t: Floats, y: Floats, noise: Floats) -> Iterator[tuple[int, Floats]]:
