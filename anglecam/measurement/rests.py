@@ -30,11 +30,13 @@ _LEAST_REST_FRAMES = 5
 """Least number of frames from which the noise of a level can be told."""
 _GAP_FRAMES = 3.5
 """Frame intervals without a measurement beyond which the motion in between is unknown."""
+_BESIDE = 2
+"""How many times as long as an interval lasts the motion on either side of it is looked at."""
 _EDGES = np.linspace(0.0, 0.5, 5)
 """Where a motion may end within the rest after it, as shares of the rest."""
 _WALKS = np.geomspace(0.02, 20.0, 16)
 """Steps of the random walks that are tried, relative to the noise."""
-_DENSER = 1.5
+_DENSER = 1.2
 """Ratio of the numbers of intervals of the splines that are tried."""
 
 
@@ -104,11 +106,10 @@ def _rest(y: Floats, s: Floats, first: int, last: int) -> Rest:
 def _is_apart(t: Floats, y: Floats, noise: Floats, first: int, last: int) -> bool:
     """Return whether neither what is before an interval nor what is after it goes on through it.
 
-    Both are looked at for as long as the interval lasts. The motion may end within the interval's half next to it, as
-    the last swing of a motion that dies out does.
+    The motion may end within the interval's half next to it, as the last swing of a motion that dies out does.
     """
     count = last - first + 1
-    begin, end = max(first - count, 0), min(last + 1 + count, len(y))
+    begin, end = max(first - _BESIDE * count, 0), min(last + 1 + _BESIDE * count, len(y))
     # the edges of rests are sought in the whole series
     price = float(np.log(len(y)))
     edges = np.unique(np.round(_EDGES * count)).astype(np.intp)

@@ -64,8 +64,8 @@ class Response:
 def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[float] = ()) -> tuple[Response, ...]:
     """Find every motion from one rest to another, and its figures.
 
-    A rest is an interval in which the angle stays in a narrow band without curvature or drift, and which lasts at least
-    as long as the rises before and after it. A turning point of a swing and a short pause are not rests. A motion that
+    A rest is an interval in which the angle stays in a narrow band, which no motion beside it goes on through
+    (`anglecam.measurement.rests`), and which lasts at least as long as the rises before and after it. A motion that
     goes beyond its end by more than its height is an excursion: no stable system of second order answers a step so.
 
     Parameters
