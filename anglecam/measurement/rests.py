@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.fft import dst
 from scipy.interpolate import make_lsq_spline
 from scipy.stats import norm
@@ -66,7 +67,7 @@ def resolution(y: Floats, s: Floats) -> float:
     return max(sigmas * float(np.median(s)), _STILL_SHARE * float(np.ptp(y)))
 
 
-def gaps_after(t: Floats) -> Floats:
+def gaps_after(t: Floats) -> NDArray[np.intp]:
     """Return the rows after which the motion is unknown for a while, of (n,) times."""
     return np.flatnonzero(np.diff(t) > _GAP_FRAMES * float(np.median(np.diff(t))))
 
