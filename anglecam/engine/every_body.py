@@ -16,15 +16,16 @@ from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
+from scipy import special
 from threadpoolctl import threadpool_limits
 
 from anglecam.data.typing import Floats
 from anglecam.engine.competition import LEAST_TURN, SURE, Explanation, compete, sliding_poses
-from anglecam.engine.learn import FINDERS, swept
+from anglecam.engine.learn import FINDERS, Learnt, swept
 from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample, Stills, changed_boxes, sample_part
-from anglecam.engine.score import NOTHING, Proposal, score
-from anglecam.engine.target import learn_target
+from anglecam.engine.score import NOTHING, Proposal, Score, score
+from anglecam.engine.target import Picture, Target, learn_target
 from anglecam.threads import one_opencv_thread
 
 MOST = 6
@@ -53,6 +54,22 @@ class Moving:
     """``turns``, ``translates`` or ``otherwise``."""
     joint_to: int | None = None
     """Index of the body that carries its centre, 0 for the first; ``None`` for a centre at rest."""
+    before: tuple[Target, ...] = field(default=(), repr=False)
+    """The bodies that are taken out of ``sample``."""
+
+    @property
+    def posterior(self) -> float:
+        """Probability that it predicts better than its rivals: that of its mean lead, normal with the standard error."""
+        return probability(self.lead)
+
+
+def probability(lead: float) -> float:
+    """Return the probability that an explanation predicts better than its best rival.
+
+    The mean over the frames of the difference of log densities is normal, with the standard error of a mean. Its lead
+    is that mean over the standard error, and the probability that the mean is positive is Φ(lead).
+    """
+    return float(special.ndtr(lead))
 
 
 def further_bodies(stills: Stills, first: Proposal, most: int = MOST) -> list[Moving]:
@@ -88,7 +105,57 @@ def further_bodies(stills: Stills, first: Proposal, most: int = MOST) -> list[Mo
     return found
 
 
-def taken_out(sample: Sample, known: Sequence[Proposal]) -> tuple[Sample, Sample]:
+def elsewhere(learnt: Learnt) -> list[Moving]:
+    """Return what else turns by the explanations that lost to the first: where the first does not cover it.
+
+    Parameters
+    ----------
+    learnt : Learnt
+        Its first explanation is a body that turns.
+
+    Returns
+    -------
+    list of Moving
+        Not fitted anew; `further_bodies` looks for others, too.
+    """
+    sample = learnt.wider or learnt.sample
+    known = [learnt.explanations[0].fit.proposal.in_frames(learnt.sample.frames, sample.frames)]
+    found: list[Moving] = []
+    with one_opencv_thread():
+        for one in learnt.explanations[1:]:
+            if one.turns:
+                rest = taken_out(sample, known)
+                lead = _lead(rest.masked, one.fit.proposal, known)
+                if lead >= SURE:
+                    known.append(one.fit.proposal)
+                    found.append(Moving(one.fit.proposal, rest.masked, one.fit, lead, "turns", before=rest.targets))
+    return found
+
+
+def _lead(masked: Sample, proposal: Proposal, known: Sequence[Proposal]) -> float:
+    """Return by how much a proposal predicts better than that nothing moves, or with the known bodies only."""
+    mine = score(masked, proposal.name, proposal.poses(masked))
+    return min(mine.lead(rival) for rival in _rivals(masked, known))
+
+
+def _rivals(masked: Sample, known: Sequence[Proposal]) -> list[Score]:
+    still = score(masked, NOTHING, [None] * len(masked.pictures))
+    return [still, *(score(masked, "moves with a known body", one.poses(masked)) for one in known)]
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A sample without the pixels that known bodies cover."""
+
+    masked: Sample
+    """With NaN in their place."""
+    erased: Sample
+    """With what is seen behind them in other frames."""
+    targets: tuple[Target, ...]
+    """The known bodies."""
+
+
+def taken_out(sample: Sample, known: Sequence[Proposal]) -> Rest:
     """Return a sample without the pixels that bodies cover.
 
     Parameters
@@ -100,35 +167,42 @@ def taken_out(sample: Sample, known: Sequence[Proposal]) -> tuple[Sample, Sample
 
     Returns
     -------
-    masked, erased : Sample
-        With NaN in place of these pixels, and with what is seen behind them in other frames.
+    Rest
+        Of the sample.
     """
-    masked, background = sample, sample.median
+    masked, background, targets = sample, sample.median, list[Target]()
     for one in known:
         poses = one.poses(sample)
         target = learn_target(masked, poses, np.arange(len(poses)))
-        covered = np.stack([np.ones(background.shape, bool) if p is None else target.covers(p) for p in poses])
-        around = np.ones((2 * _EDGE_PX + 1,) * 2, np.uint8)
-        near = np.stack([cv2.dilate(frame.astype(np.uint8), around) > 0 for frame in covered])
-        masked = replace(masked, pictures=np.where(near, np.float32(np.nan), masked.pictures))
+        pictures = [without(picture, [target], [pose]) for picture, pose in zip(masked.pictures, poses, strict=True)]
+        masked = replace(masked, pictures=np.stack(pictures))
         background = np.where(np.isfinite(target.background), target.background, background)
+        targets.append(target)
     erased = np.where(np.isfinite(masked.pictures), masked.pictures, background)
-    return masked, replace(sample, pictures=erased)
+    return Rest(masked, replace(sample, pictures=erased), tuple(targets))
+
+
+def without(picture: Picture, targets: Sequence[Target], poses: Sequence[Floats | None]) -> Picture:
+    """Return a picture with NaN where bodies in their poses (2, 3) cover it; all NaN where a pose is unknown."""
+    around = np.ones((2 * _EDGE_PX + 1,) * 2, np.uint8)
+    covered = np.zeros(picture.shape, np.uint8)
+    for target, pose in zip(targets, poses, strict=True):
+        covered |= np.uint8(1) if pose is None else target.covers(pose).astype(np.uint8)
+    return np.where(cv2.dilate(covered, around) > 0, np.float32(np.nan), picture)
 
 
 def _next(stills: Stills, whole: Sample, known: Sequence[Proposal]) -> Moving | None:
     """Return what moves besides known bodies, the surest; ``None`` for nothing."""
-    _, rest = taken_out(whole, known)
-    for box in changed_boxes(rest.pictures):
+    for box in changed_boxes(taken_out(whole, known).erased.pictures):
         part = sample_part(stills, box / whole.scale)
         if part is None:
             continue
         placed = [one.in_frames(whole.frames, part.frames) for one in known]
-        masked, erased = taken_out(part, placed)
-        proposals = [one for find in FINDERS for one in find(erased)]
-        carried = {k: _hinged(erased, one) for k, one in enumerate(placed) if np.nanmax(np.abs(one.turn)) > 0.0}
-        every = [*proposals, *(one for of_body in carried.values() for one in of_body)]
-        found = _surest(masked, compete(masked, every), placed)
+        rest = taken_out(part, placed)
+        proposals = [one for find in FINDERS for one in find(rest.erased)]
+        for carrier in placed:
+            proposals += _hinged(rest.erased, carrier)
+        found = _surest(rest, compete(rest.masked, proposals), placed)
         if found is not None:
             return _closer(stills, found, placed)
     return None
@@ -160,27 +234,26 @@ def _hinged(erased: Sample, carrier: Proposal) -> list[Proposal]:
     return found
 
 
-def _surest(masked: Sample, found: Sequence[Explanation], known: Sequence[Proposal]) -> Moving | None:
+def _surest(rest: Rest, found: Sequence[Explanation], known: Sequence[Proposal]) -> Moving | None:
     """Return the best explanation that predicts better than all its rivals; ``None`` where none does."""
-    rest = score(masked, NOTHING, [None] * len(masked.pictures))
-    moved_on = [score(masked, "moves with a known body", one.poses(masked)) for one in known]
+    masked, rivals = rest.masked, _rivals(rest.masked, known)
     for one in found:
-        lead = min([one.lead, *(one.score.lead(rival) for rival in moved_on)])
+        lead = min([one.lead, *(one.score.lead(rival) for rival in rivals)])
         if one.turns and lead >= SURE:
             proposal = one.fit.proposal
             joint = next((k for k, body in enumerate(known) if _carries(body, proposal)), None)
-            if joint is None or _turns_relative(known[joint], proposal):
-                return Moving(proposal, masked, one.fit, lead, "turns", joint)
+            if joint is None or turns_relative(known[joint], proposal):
+                return Moving(proposal, masked, one.fit, lead, "turns", joint, rest.targets)
     for one in sorted(found, key=lambda one: -one.score.total):
         poses = sliding_poses(masked, one.fit)
         slides = score(masked, "slides", poses)
-        rivals = [rest, *moved_on]
         lead = min(slides.lead(rival) for rival in rivals)
         if lead >= SURE and one.score.lead(slides) < SURE:
-            return Moving(_as_translation(masked, poses), masked, one.fit, lead, "translates")
+            motion = _as_translation(masked, poses)
+            return Moving(motion, masked, one.fit, lead, "translates", before=rest.targets)
         lead = min(one.score.lead(rival) for rival in rivals)
         if lead >= SURE:
-            return Moving(one.fit.proposal, masked, one.fit, lead, "otherwise")
+            return Moving(one.fit.proposal, masked, one.fit, lead, "otherwise", before=rest.targets)
     return None
 
 
@@ -188,10 +261,10 @@ def _carries(body: Proposal, other: Proposal) -> bool:
     return other.carrier is not None and np.array_equal(body.in_film(), other.carrier, equal_nan=True)
 
 
-def _turns_relative(body: Proposal, other: Proposal) -> bool:
-    """Return whether a body turns relative to one that carries it."""
+def turns_relative(body: Proposal, other: Proposal) -> bool:
+    """Return whether two bodies are seen to turn relative to each other."""
     relative = other.turn - body.turn
-    return float(np.nanmax(relative) - np.nanmin(relative)) >= LEAST_TURN
+    return bool(np.isfinite(relative).any()) and float(np.nanmax(relative) - np.nanmin(relative)) >= LEAST_TURN
 
 
 def _as_translation(sample: Sample, poses: Sequence[Floats | None]) -> Proposal:
@@ -209,6 +282,6 @@ def _closer(stills: Stills, found: Moving, known: Sequence[Proposal]) -> Moving:
     if found.moves != "turns" or part is None or part.scale <= _CLOSER * sample.scale:
         return found
     placed = [one.in_frames(sample.frames, part.frames) for one in known]
-    masked, _ = taken_out(part, placed)
-    again = compete(masked, [found.motion.in_frames(sample.frames, part.frames)])
-    return _surest(masked, again, placed) or found
+    rest = taken_out(part, placed)
+    again = compete(rest.masked, [found.motion.in_frames(sample.frames, part.frames)])
+    return _surest(rest, again, placed) or found

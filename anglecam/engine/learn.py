@@ -48,7 +48,9 @@ class Learnt:
 
     sample: Sample
     explanations: tuple[Explanation, ...]
-    """Of the sample; the first is the most probable one that obeys the hints."""
+    """The first, of the sample, is the most probable one that obeys the hints."""
+    wider: Sample | None = None
+    """That of the explanations after the first, where the first is seen closer."""
 
     @property
     def turns(self) -> bool:
@@ -94,7 +96,7 @@ def _explained(sample: Sample, stills: Stills, hints: Hints) -> Learnt:
     if closer is not None and closer.scale > _CLOSER * sample.scale:
         again = compete(closer, [found[0].fit.proposal.in_frames(sample.frames, closer.frames)])
         if again and (again[0].turns or not found[0].turns):
-            return Learnt(closer, (again[0], *found[1:]))
+            return Learnt(closer, (again[0], *found[1:]), sample)
     return Learnt(sample, tuple(found))
 
 

@@ -197,8 +197,12 @@ def _usual_information(turn: Floats, information: Floats) -> Floats:
     return np.asarray(np.median(back.swapaxes(1, 2) @ information @ back, axis=0))
 
 
-def sensitivities(sample: Sample, fit: Fit, body: Body, turn: Floats) -> tuple[Floats, Floats]:
+def sensitivities(
+    sample: Sample, fit: Fit, body: Body, turn: Floats, carrier_turn: Floats | float = 0.0
+) -> tuple[Floats, Floats]:
     """Return how much turns (n,) change with an error of the centre, and with a shift of the body.
+
+    ``carrier_turn`` are those of what carries the centre, rad.
 
     Returns
     -------
@@ -212,7 +216,8 @@ def sensitivities(sample: Sample, fit: Fit, body: Body, turn: Floats) -> tuple[F
     information = turned_by @ fit.information @ turned_by.swapaxes(1, 2)
     tangent = np.concatenate([np.ones((len(turn), 1)), slope @ arm], axis=1)
     along = np.einsum("ni,nij->nj", tangent, information)
-    moved = np.einsum("ni,nij->nj", along[:, 1:], np.eye(2) - rotation)
+    carried = _rotations(np.broadcast_to(carrier_turn, turn.shape))[0]
+    moved = np.einsum("ni,nij->nj", along[:, 1:], carried - rotation)
     scale = sample.scale / np.einsum("ni,ni->n", along, tangent)[:, None]
     return -moved * scale, along[:, 1:] * scale
 
