@@ -59,7 +59,7 @@ class Moving:
 
     @property
     def posterior(self) -> float:
-        """Probability that it predicts better than its rivals: that of its mean lead, normal with the standard error."""
+        """Probability that it predicts better than its rivals (`probability`)."""
         return probability(self.lead)
 
 

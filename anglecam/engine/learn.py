@@ -148,4 +148,3 @@ def swept(sample: Sample, fit: Fit) -> Floats:
     high = np.max([(places @ pose[:, :2].T + pose[:, 2]).max(axis=0) for pose in poses], axis=0)
     margin = max(4.0, _MARGIN * float((high - low).max()))
     return np.concatenate([sample.in_film(low - margin), sample.in_film(high + margin)])
-

@@ -98,8 +98,8 @@ def note_on_others(first: Body, others: Sequence[Moving], detections: Detections
         if other.moves == "turns" and turns_relative(same, other.motion):
             x, y = other.motion.centre_px
             return (
-                "two things turn: one about {:.0f},{:.0f}, which is measured, and one about {:.0f},{:.0f}; for the other"
-                " one declare body: {} in rig.yaml, or measure all with --bodies all"
+                "two things turn: one about {:.0f},{:.0f}, which is measured, and one about {:.0f},{:.0f}; body: {} in"
+                " rig.yaml measures the other one, and --bodies all both"
             ).format(*first.pivot_px, x, y, number)
     return None
 

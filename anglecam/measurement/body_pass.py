@@ -196,9 +196,7 @@ def _again(seen: Seen, search: Search) -> Seen | None:
     return replace(seen, found=found)
 
 
-def rigid_motion(
-    search: Search, track: Track, decoded: list[bool], carrier_turn: Floats | float = 0.0
-) -> RigidMotion:
+def rigid_motion(search: Search, track: Track, decoded: list[bool], carrier_turn: Floats | float = 0.0) -> RigidMotion:
     """Return the motion of a body that was followed in the n frames of a clip.
 
     Parameters

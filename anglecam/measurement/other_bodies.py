@@ -22,7 +22,7 @@ from anglecam.engine.score import Proposal, carried_by
 from anglecam.engine.target import Picture
 from anglecam.engine.tracking import Search, candidates, chosen, search_for
 from anglecam.io.rig import Rig, RigPivot
-from anglecam.measurement.angles import coarse_angles
+from anglecam.measurement.angles import Angles, coarse_angles
 from anglecam.measurement.body_pass import follow, rigid_motion, stills_of
 from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.detections import Detections
@@ -50,7 +50,8 @@ class _Known:
 
     motion: Proposal
     sigma: Floats
-    """(n,) standard uncertainty of its turn, rad."""
+    """(n,) standard uncertainty of its turn about its centre, rad: what the centre is off, the turns are off with it,
+    and a place of the body is where its pixels are seen."""
 
 
 def other_bodies(
@@ -110,9 +111,13 @@ def _of_first(followed: Followed, rig: Rig) -> _Known:
     angles, ok = followed.angles, followed.ok
     turn, sigma = np.full((2, len(ok)), np.nan)
     signed = angles.line if rig.facing == "right" else -angles.line
-    turn[ok], sigma[ok] = signed - np.median(signed), angles.sigma
+    turn[ok], sigma[ok] = signed - np.median(signed), _about_centre(angles)
     centre = followed.detections.lens.distort(angles.pivot.centre_px)
     return _Known(Proposal("measured", centre, turn), sigma)
+
+
+def _about_centre(angles: Angles) -> Floats:
+    return np.hypot(angles.uncertainty.noise, angles.uncertainty.pose)
 
 
 def _shifts(motion: Proposal) -> Floats:
@@ -166,7 +171,7 @@ def _measured(
     time = measurement_time(seen.time, rows, detections.size[1], rig.camera.row_time_s)
     angles = coarse_angles(detections, ok, time, rig, command)
     sigma = np.full(n, np.nan)
-    sigma[ok] = angles.sigma
+    sigma[ok] = _about_centre(angles)
     followed = Followed(detections, ok, time, angles, "it was found after another body was taken out")
     return followed, _Known(replace(motion, turn=track.turn), sigma)
 
