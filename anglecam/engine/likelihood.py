@@ -2,7 +2,8 @@
 
     L(pose) = Σᵢ log p(picture(xᵢ) | body's pixel i) − log p(picture(xᵢ) | background at xᵢ),     xᵢ = pose(yᵢ)
 
-Pixels that the body does not cover are the same in both explanations and cancel.
+Pixels that the body does not cover are the same in both explanations and cancel. Pixels that are unknown, NaN, say
+nothing for either.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def _between(picture, x, y):  # type: ignore[no-untyped-def]
     "float64[:, :, ::1])",
     cache=True,
     nogil=True,
-    fastmath=True,
+    fastmath={"nsz", "arcp", "contract", "afn", "reassoc"},  # all but that no value is NaN
 )
 def pose_gains(picture, behind, places, body, part, parts, poses):  # type: ignore[no-untyped-def]
     """Return the gain L of each pose, by parts of the body.
@@ -61,7 +62,7 @@ def pose_gains(picture, behind, places, body, part, parts, poses):  # type: igno
     Parameters
     ----------
     picture : ndarray
-        (h, w) float32.
+        (h, w) float32; NaN where it is unknown.
     behind : ndarray
         (h, w) float32, log density of its pixels as background.
     places : ndarray
@@ -97,5 +98,7 @@ def pose_gains(picture, behind, places, body, part, parts, poses):  # type: igno
             if x < 0.0 or y < 0.0 or x >= width - 1 or y >= height - 1:
                 continue
             off = _between(picture, x, y) - body[i, 0]
+            if not off * off >= 0.0:
+                continue
             gains[m, part[i]] += log(scale[i] * exp(half[i] * off * off) + floor) - _between(behind, x, y)
     return gains
