@@ -103,11 +103,11 @@ def test_results_that_are_stale_are_removed_on_request_only_and_listed(lab, tmp_
     assert call.returncode == 1
     cause = "not a readable video file (Invalid data found when processing input)"
     assert call.stdout.splitlines() == [
-        f"removed mon/a.angles.csv, mon/a.html, mon/a.png, mon/a.thumb.webp: {lab.clip}: {cause}; "
+        f"removed mon/a.angles.csv, mon/a.bodies.json, mon/a.html, mon/a.png, mon/a.thumb.webp: {lab.clip}: {cause}; "
         "the earlier results stay, "
         "but these have changed: clip",
-        f"removed tue/b.angles.csv, tue/b.html, tue/b.png, tue/b.thumb.webp: {lab.folder}/tue/b.avi: "
-        "no such clip any more; its results stay",
+        "removed tue/b.angles.csv, tue/b.bodies.json, tue/b.html, tue/b.png, tue/b.thumb.webp: "
+        f"{lab.folder}/tue/b.avi: no such clip any more; its results stay",
     ]
     assert set(good(out)) == {name for name in good(lab.out) if name.startswith("shelf/")}
     with (out / "index.csv").open() as stream:

@@ -157,7 +157,7 @@ def test_measure_refuses_a_clip_in_the_words_of_check(tmp_path, status):
 
 
 def test_no_advice_on_filming_is_given_for_a_file_that_cannot_be_read(films, monkeypatch):
-    def lost(film, rig, command, progress):
+    def lost(film, rig, command, progress, every_body):
         raise InputError("large.avi: Input/output error") from OSError(5, "Input/output error")
 
     monkeypatch.setattr("anglecam.workflow.clip.measure_clip", lost)
