@@ -21,7 +21,7 @@ from threadpoolctl import threadpool_limits
 
 from anglecam.data.typing import Floats
 from anglecam.engine.competition import LEAST_TURN, SURE, Explanation, compete, sliding_poses
-from anglecam.engine.learn import FINDERS, Learnt, swept
+from anglecam.engine.learn import CLOSER, FINDERS, Learnt, swept
 from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample, Stills, changed_boxes, sample_part
 from anglecam.engine.score import NOTHING, Proposal, Score, score
@@ -32,8 +32,6 @@ MOST = 6
 """Bodies of a film, at most."""
 _EDGE_PX = 2
 """Of the sample: so far from a body its edge may still show, by its blur and by what its pose is off."""
-_CLOSER = 1.3
-"""Least enlargement for which the pictures are sampled again."""
 _GREY = 128.0
 """Level of pictures less their background."""
 
@@ -279,7 +277,7 @@ def _closer(stills: Stills, found: Moving, known: Sequence[Proposal]) -> Moving:
     """Return a body that turns as it is found in pictures of where it moves, if these show more of it."""
     sample = found.sample
     part = sample_part(stills, swept(sample, found.fit))
-    if found.moves != "turns" or part is None or part.scale <= _CLOSER * sample.scale:
+    if found.moves != "turns" or part is None or part.scale <= CLOSER * sample.scale:
         return found
     placed = [one.in_frames(sample.frames, part.frames) for one in known]
     rest = taken_out(part, placed)

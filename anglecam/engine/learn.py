@@ -19,7 +19,7 @@ from anglecam.threads import one_opencv_thread
 
 Finder = Callable[[Sample], list[Proposal]]
 FINDERS: tuple[Finder, ...] = (blobs.proposals, features.proposals, polar.proposals)
-_CLOSER = 1.3
+CLOSER = 1.3
 """Least enlargement for which the pictures are sampled again."""
 _MARGIN = 0.1
 """Of the surroundings of what a body sweeps, as a share of its extent."""
@@ -93,7 +93,7 @@ def _explained(sample: Sample, stills: Stills, hints: Hints) -> Learnt:
     if not found:
         return Learnt(sample, ())
     closer = sample_part(stills, swept(sample, found[0].fit))
-    if closer is not None and closer.scale > _CLOSER * sample.scale:
+    if closer is not None and closer.scale > CLOSER * sample.scale:
         again = compete(closer, [found[0].fit.proposal.in_frames(sample.frames, closer.frames)])
         if again and (again[0].turns or not found[0].turns):
             return Learnt(closer, (again[0], *found[1:]), sample)

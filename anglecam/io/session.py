@@ -21,6 +21,8 @@ from anglecam.io.tracks.files import TRACKS_ENDINGS, find_tracks, name_by_tool
 
 CLIP_ENDINGS = (".avi", ".mp4", ".mkv", ".mov", ".m4v", ".webm")
 SERIES_ENDING = ".angles.csv"
+MOST_BODIES = 6
+"""Of a recording."""
 CORRECTED = "corrected"
 """Folder, within a session's results, of the series with the effects of the camera removed."""
 
@@ -191,7 +193,9 @@ def read_session(directory: Path, rig: Rig | None = None) -> Session:
         sources[clip.stem] = clip
     tracks, unused = _choose_tracks(directory, rig)
     sources |= tracks
-    sources |= {recording_name(p): p for p in directory.glob(f"*{SERIES_ENDING}") if p.is_file()}
+    series_files = {recording_name(p): p for p in directory.glob(f"*{SERIES_ENDING}") if p.is_file()}
+    of_bodies = {file for name in (*sources, *series_files) for file in other_body_files(name)}
+    sources |= {name: p for name, p in series_files.items() if p.name not in of_bodies}
     if not sources:
         series = f"*{SERIES_ENDING} (columns time_s,angle_deg: see docs/files.md)"
         fault = f"no clip ({', '.join(CLIP_ENDINGS)}) and no {series} in it"
@@ -211,10 +215,23 @@ def read_session(directory: Path, rig: Rig | None = None) -> Session:
     commands = sorted(directory.glob(f"*{COMMAND_ENDING}"))
     orphans = [p for p in commands if p.name.removesuffix(COMMAND_ENDING) not in sources]
     notes = [f"{p}: not used; there is no recording of that name" for p in orphans]
-    known = {*sources.values(), *commands, *find_tracks(directory), *directory.glob(f"*{LIVE_ENDING}")}
+    same = [p for p in series_files.values() if p.name in of_bodies]
+    notes += [f"{p}: not used; it is another body of the same recording" for p in sorted(same)]
+    known = {
+        *sources.values(),
+        *series_files.values(),
+        *commands,
+        *find_tracks(directory),
+        *directory.glob(f"*{LIVE_ENDING}"),
+    }
     others = [p for p in sorted(directory.glob("*.csv")) if p not in known and any(map(p.name.startswith, sources))]
     notes += [f"{p}: not used; a command is NAME{COMMAND_ENDING}, a series NAME{SERIES_ENDING}" for p in others]
     return Session(directory, rig, tuple(recordings), tuple(problems), (*unused, *notes))
+
+
+def other_body_files(name: str) -> list[str]:
+    """Return the names of the series of a recording's bodies besides the first: ``NAME.b2.angles.csv``, …."""
+    return [f"{name}.b{k}{SERIES_ENDING}" for k in range(2, MOST_BODIES + 1)]
 
 
 def require_recordings(session: Session, names: Sequence[str]) -> None:

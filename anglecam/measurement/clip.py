@@ -169,8 +169,9 @@ def measure_clip(
         bodies += tuple(found_body(number, one, None, None) for number, one in enumerate(seen, start=2))
     wanted = rig.body or 1
     if wanted > 1:
-        bodies = _with_first(film, bodies, wanted)
-        followed = others[wanted - 2].followed or followed
+        followed = _wanted(film, others, wanted)
+        name = recording_name(film.path)
+        bodies = renumbered([bodies[wanted - 1], *bodies[: wanted - 1], *bodies[wanted:]], name)
         rig = of_any_body(rig)
     if not every_body:
         bodies = (bodies[0], *(replace(body, series=None, relative=None) for body in bodies[1:]))
@@ -180,7 +181,9 @@ def measure_clip(
     dark = changes and lamp is None and rig.sync.lamp is not None
     clock = DARK if dark else note_on(offset)
     few = why_few(series.status, rig.least_measured)
+    of_others = (one.followed.detections.doubt for one in others if every_body and one.followed is not None)
     other = followed.detections.doubt or why_still(followed.detections, followed.ok, rig)
+    other = other or next(filter(None, of_others), None)
     if other is None and followed.angles.registered is None and wanted == 1:
         other = (
             why_elsewhere(followed.detections, rig)
@@ -247,18 +250,21 @@ def _bodies(
     return tuple(bodies)
 
 
-def _with_first(film: Film, bodies: Sequence[Body], wanted: int) -> tuple[Body, ...]:
-    """Return bodies in another order, numbered anew, so that the wanted one is the first.
+def _wanted(film: Film, others: Sequence[OtherBody], wanted: int) -> Followed:
+    """Return the angles of the body that is declared to be the first.
 
     Raises
     ------
     InputError
-        Where there is no such body, or it was not seen to turn.
+        Where there is no such body, or its angles could not be measured.
     """
-    if wanted > len(bodies) or bodies[wanted - 1].series is None:
-        fault = f"only {len(bodies)} are seen to move" if wanted > len(bodies) else "that body is not seen to turn"
-        raise InputError(f"{film.path}: body: {wanted} is declared in rig.yaml, but {fault}")
-    return renumbered([bodies[wanted - 1], *bodies[: wanted - 1], *bodies[wanted:]], recording_name(film.path))
+    declared = f"{film.path}: body: {wanted} is declared in rig.yaml, but"
+    if wanted > 1 + len(others):
+        raise InputError(f"{declared} only {1 + len(others)} are seen to move")
+    found = others[wanted - 2]
+    if found.followed is None:
+        raise InputError(f"{declared} {found.cause}")
+    return found.followed
 
 
 def _series(

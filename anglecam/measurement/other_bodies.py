@@ -16,6 +16,7 @@ from anglecam.data.command import Command
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats
 from anglecam.engine.every_body import MOST, Moving, further_bodies, without
+from anglecam.engine.reasons import why_ambiguous, why_jump
 from anglecam.engine.refine import Turn, sensitivities
 from anglecam.engine.sample import FRAMES
 from anglecam.engine.score import Proposal, carried_by
@@ -31,6 +32,8 @@ from anglecam.measurement.rigid_motion import RigidMotion
 from anglecam.progress import Progress, Stage, unseen
 from anglecam.vision.pivot.estimate import PivotEstimate
 
+_UNSEEN = "it is not seen in the frames between the sampled ones"
+
 
 @dataclass(frozen=True)
 class OtherBody:
@@ -39,7 +42,9 @@ class OtherBody:
     moving: Moving
     """By the sampled frames."""
     followed: Followed | None
-    """Its angles; ``None`` where it does not turn, or is not seen in the frames between the sampled ones."""
+    """Its angles; ``None`` where they are not measured."""
+    cause: str | None
+    """Why they are not; ``None`` where they are."""
     shifts_px: Floats
     """(n, 2) by which its pivot is carried in each frame."""
 
@@ -92,12 +97,16 @@ def other_bodies(
     motion = measured.motion.in_frames(np.arange(len(first.ok)), stills.frames)
     found: list[OtherBody] = []
     for moving in further_bodies(stills, motion, most):
-        followed, its_motion = None, None
+        measured_or_cause: tuple[Followed, _Known] | str = "it is not seen to turn"
         if moving.moves == "turns":
-            followed, its_motion = _measured(camera, rig, command, first.detections, moving, known, progress)
-        known.append(its_motion)
-        still = np.zeros((len(first.ok), 2))
-        found.append(OtherBody(moving, followed, still if its_motion is None else _shifts(its_motion.motion)))
+            measured_or_cause = _measured(camera, rig, command, first.detections, moving, known, progress)
+        if isinstance(measured_or_cause, str):
+            known.append(None)
+            found.append(OtherBody(moving, None, measured_or_cause, np.zeros((len(first.ok), 2))))
+        else:
+            followed, its_motion = measured_or_cause
+            known.append(its_motion)
+            found.append(OtherBody(moving, followed, None, _shifts(its_motion.motion)))
     return found
 
 
@@ -135,11 +144,11 @@ def _measured(
     moving: Moving,
     known: Sequence[_Known | None],
     progress: Progress,
-) -> tuple[Followed | None, _Known | None]:
-    """Follow a body through all frames; nothing where what carries it was not followed, or it is seen nowhere."""
+) -> tuple[Followed, _Known] | str:
+    """Follow a body through all frames, or return why that fails."""
     carrier = None if moving.joint_to is None else known[moving.joint_to]
     if moving.joint_to is not None and carrier is None:
-        return None, None
+        return "what carries its pivot is not measured"
     sample, n = moving.sample, len(first.time)
     search = search_for(sample, moving.fit)
     motion = replace(moving.motion, turn=np.zeros(n), carrier=None if carrier is None else carrier.motion.in_film())
@@ -157,16 +166,20 @@ def _measured(
     track = chosen(seen.found, seen.time, search)
     off = (track.turn[sample.frames] - moving.motion.turn)[np.isfinite(moving.motion.turn)]
     if not np.isfinite(off).any():
-        return None, None
+        return _UNSEEN
+    jump = why_jump(track.turn, camera.film.first_frame)
+    if jump is not None:
+        return jump
     # what it carries was found with the zero of its turns in the sample
     track = replace(track, turn=track.turn - np.nanmedian(off))
     body = rigid_motion(search, track, seen.decoded, 0.0 if carrier is None else carrier.motion.turn)
     if carrier is not None:
         body = replace(body, sigma=np.hypot(body.sigma, _by_carrier(search, track.turn, carrier)))
-    detections = _detections(first, body)
+    doubt = why_ambiguous(track.ambiguous, camera.film.first_frame)
+    detections = replace(_detections(first, body), doubt=doubt)
     ok = np.array([s == OK for s in body.status])
     if not ok.any():
-        return None, None
+        return _UNSEEN
     rows = detections.in_picture(np.where(ok[:, None], body.centre_px + shifts, np.nan))[:, 1]
     time = measurement_time(seen.time, rows, detections.size[1], rig.camera.row_time_s)
     angles = coarse_angles(detections, ok, time, rig, command)

@@ -14,6 +14,7 @@ import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from threading import Event
@@ -104,6 +105,8 @@ def read_in_parts(
     for part in range(len(parts)):
         waiting.put(part)
     done = progress or (lambda frames: None)
+    # this process computes properties of its own one and keeps them in it, perhaps while the other one is being sent
+    sent = deepcopy(sought)
 
     def take_parts(read: Callable[[int], Reading]) -> None:
         try:
@@ -117,7 +120,7 @@ def read_in_parts(
             raise
 
     def by_other(part: int) -> Reading:
-        return readers.pool.submit(read_part, parts, sought, part).result()
+        return readers.pool.submit(read_part, parts, sent, part).result()
 
     def by_this(part: int) -> Reading:
         reading = read_part(parts, sought, part)

@@ -19,7 +19,7 @@ from anglecam.io.files import write_json
 from anglecam.io.netcdf_parquet import Also, write_also
 from anglecam.io.rig import Rig
 from anglecam.io.series_csv import write_series
-from anglecam.io.session import SERIES_ENDING, clip_beside, command_file_beside, rig_file_beside
+from anglecam.io.session import SERIES_ENDING, clip_beside, command_file_beside, other_body_files, rig_file_beside
 from anglecam.io.tracks.files import TRACKS_ENDINGS
 from anglecam.measurement.clip import Measurement, measure_clip
 from anglecam.measurement.clock_sync import offset_of, on_clip_clock
@@ -152,6 +152,9 @@ def write_measurement(
     changes = [] if command is None else command.time[1:][np.diff(command.angle) != 0.0].tolist()
     noise = series.sigma if series.sigma_random is None else series.sigma_random
     answers = responses(series.time, series.angle, noise, changes)
+    # what an earlier call wrote and this one does not would contradict it
+    for stale in (f"{series.name}.responses.json", *other_body_files(series.name)):
+        (out / stale).unlink(missing_ok=True)
     if answers:
         write_json(out / f"{series.name}.responses.json", responses_as_dicts(answers))
     plot_series(series, out / f"{series.name}.png")

@@ -11,6 +11,7 @@ from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import Measurement, measure_clip
 from anglecam.video.open_film import open_film
+from anglecam.workflow.clip import write_measurement
 from support import things
 
 FIRST = 25.0 * np.sin(2 * np.pi * np.arange(60) / 40.0)
@@ -92,8 +93,14 @@ def test_a_cart_beside_a_stick_translates(tmp_path):
     assert measured.several is None
 
 
-def test_beside_one_stick_nothing_is_found(tmp_path):
-    assert len(_measured(tmp_path, _stick).bodies) == 1
+def test_beside_one_stick_nothing_is_found_and_what_an_earlier_call_found_goes(tmp_path):
+    measured = _measured(tmp_path, _stick)
+    assert len(measured.bodies) == 1
+    earlier = tmp_path / "clip.b2.angles.csv"
+    earlier.write_text("time_s,angle_deg\n0,1\n")
+    write_measurement(measured, None, tmp_path)
+    assert not earlier.exists()
+    assert (tmp_path / "clip.angles.csv").exists()
 
 
 def test_the_declared_body_is_the_first(tmp_path):

@@ -248,3 +248,13 @@ def test_tracks_replace_their_clip_if_the_rig_names_their_points(tmp_path):
     clips, (idle,) = find_measurable(tmp_path, Rig())
     assert [clip.name for clip in clips] == ["a.avi", "b.avi"]
     assert "not used; name its points with marks: {mouth: …, pivot: …} in rig.yaml" in idle
+
+
+def test_the_angles_of_another_body_are_no_recording_of_a_session(tmp_path):
+    for name in ("swing", "swing.b2", "other.b2"):
+        (tmp_path / f"{name}.angles.csv").write_text("time_s,angle_deg\n0,1\n0.1,2\n")
+    session = read_session(tmp_path)
+    assert [recording.name for recording in session.recordings] == ["other.b2", "swing"]
+    assert [note for note in session.notes if "another body" in note] == [
+        f"{tmp_path}/swing.b2.angles.csv: not used; it is another body of the same recording"
+    ]
