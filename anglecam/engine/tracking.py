@@ -14,9 +14,19 @@ import numpy as np
 from scipy import stats
 
 from anglecam.data.typing import Flags, Floats, Image
-from anglecam.engine.likelihood import log_density
 from anglecam.engine.path import steadiest_path
-from anglecam.engine.refine import Body, Fit, Turn, body_of, gains_about, refine, turn_near, turns_to_try, with_ratio
+from anglecam.engine.refine import (
+    Body,
+    Fit,
+    Turn,
+    body_of,
+    frame_of,
+    gains_about,
+    refine,
+    turn_near,
+    turns_to_try,
+    with_ratio,
+)
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import NOTHING, score
 from anglecam.engine.target import Picture
@@ -105,8 +115,8 @@ def _temper(search: Search) -> float:
 
 def candidates(search: Search, picture: Picture) -> list[Turn]:
     """Return the turns at which a body may be in a picture, those of most likelihood."""
-    behind = log_density(picture, search.fit.target.background, search.fit.target.background_variance)
-    gains = gains_about(picture, behind, search.few, search.centre, search.turns).sum(axis=1)
+    frame = frame_of(search.sample, search.fit.target, picture)
+    gains = gains_about(frame, search.few, search.centre, search.turns).sum(axis=1)
     peaks: list[float] = []
     for at in np.argsort(-gains):
         turn = float(search.turns[at])
@@ -115,12 +125,12 @@ def candidates(search: Search, picture: Picture) -> list[Turn]:
         if len(peaks) == _PEAKS:
             break
     around = np.array(peaks)[:, None] + np.array([-1.0, 0.0, 1.0]) * 0.5 * _STEP_PX / search.arm
-    whole = gains_about(picture, behind, search.body, search.centre, around.ravel()).sum(axis=1).reshape(-1, 3)
+    whole = gains_about(frame, search.body, search.centre, around.ravel()).sum(axis=1).reshape(-1, 3)
     best = float(whole.max())
     floor = max(_HOPELESS * best, float(np.log(len(search.turns))) * search.fit.ratio)
     order = [k for k in np.argsort(-whole.max(axis=1)) if whole[k].max() > floor][:_CANDIDATES]
     near = [float(around[k, int(np.argmax(whole[k]))]) for k in order]
-    found = [turn_near(picture, behind, search.body, search.centre, turn) for turn in near]
+    found = [turn_near(frame, search.body, search.centre, turn) for turn in near]
     apart: list[Turn] = []
     for one in sorted((one for one in found if np.isfinite(one.turn)), key=lambda one: -one.gain):
         if all(_another(search, one, other) for other in apart):
