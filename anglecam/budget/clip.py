@@ -12,7 +12,7 @@ from anglecam.budget.gum import Combined, Comparison, Propagated, combine, compa
 from anglecam.budget.terms import ErrorSources, TermOverTime, angle_draws, terms_over_time
 from anglecam.data.series import CONTRACT_RADII_PX
 from anglecam.data.typing import Floats
-from anglecam.measurement.sigma import worst_case, worst_case_both_ends
+from anglecam.measurement.bounds import worst_case, worst_case_both_ends
 
 PAPER = ((6.0, 0.28), (10.0, 0.68))
 """Pixel errors, px, and the angle errors that the paper states for them, degrees (text on Fig. 8)."""

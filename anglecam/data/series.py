@@ -6,13 +6,14 @@ Angles are radians, and a frame that could not be measured is NaN. `anglecam.io.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.camera_evidence import NO_EVIDENCE, CameraEvidence
+from anglecam.data.derivatives import Derivatives
 from anglecam.data.tables import html_curve, html_table, pandas_table, xarray_dataset
 from anglecam.data.typing import Floats
 
@@ -25,6 +26,13 @@ STATUSES = (OK, "no_mouth", "occluded", "ambiguous", "no_pivot", "duplicate", "u
 """``ok``, or the reason why a frame has no angle."""
 CONTRACT_RADII_PX = (6.0, 10.0)
 """Radii of the paper's worst-case mark errors, px; every series file has a column for each."""
+DERIVATIVE_COLUMNS = (
+    "velocity_deg_s",
+    "velocity_sigma_deg_s",
+    "acceleration_deg_s2",
+    "acceleration_sigma_deg_s2",
+)
+"""Columns of the fields of `Derivatives`, in order."""
 SERIES_COLUMNS = (
     "frame",
     "time_s",
@@ -40,6 +48,7 @@ SERIES_COLUMNS = (
     "status",
     "sigma_random_deg",
     "sigma_common_deg",
+    *DERIVATIVE_COLUMNS,
 )
 """Columns of a series as a table, in order."""
 
@@ -86,6 +95,8 @@ class AngleSeries:
     """Number in the film of the first row's frame; the others follow without a gap."""
     sigma_random: Floats | None = None
     """Part of ``sigma`` that differs from frame to frame, rad; the rest, in squares, is common to all frames."""
+    derivatives: Derivatives | None = None
+    """Velocity and acceleration; ``None`` in a series from a file without them, or without a stated sigma."""
     evidence: CameraEvidence = NO_EVIDENCE
     """Evidence of the film besides the angle; empty for a series without a film."""
 
@@ -103,13 +114,18 @@ class AngleSeries:
 
     @property
     def common_share(self) -> float:
-        """Ratio of ``sigma_common`` to the angle, both RMS of the measured frames; NaN where it is not known.
+        """Relative standard uncertainty of the scale of the motion, which all frames share; NaN where not known.
 
-        The common part grows with the angle from neutral, as an error of the scale does.
+        A common error e(θ) vanishes at neutral, but for the zero's. It grows with the chord 2·sin(θ/2), as that of a
+        displaced pivot does. The slope of ``sigma_common`` squared over the chord squared separates the two.
         """
         ok = self.ok
-        motion = float(np.sqrt(np.mean(self.angle[ok] ** 2))) if ok.any() else 0.0
-        return float(np.sqrt(np.mean(self.sigma_common[ok] ** 2))) / motion if motion > 0.0 else float("nan")
+        chord2, common2 = 4.0 * np.sin(0.5 * self.angle[ok]) ** 2, self.sigma_common[ok] ** 2
+        if not np.isfinite(common2).all() or not chord2.any():
+            return float("nan")
+        apart, from_zero = chord2 - chord2.mean(), float(common2 @ chord2 / (chord2 @ chord2))
+        slope = float(common2 @ apart / (apart @ apart)) if apart.any() else from_zero
+        return float(np.sqrt(min(max(slope, 0.0), from_zero)))
 
     def columns(self) -> dict[str, NDArray]:
         """Return the series as the columns of its file, in order: degrees, pixels, NaN for an empty cell.
@@ -132,7 +148,8 @@ class AngleSeries:
         cells = [frame, self.time, angle, sigma, *contract_bounds, np.degrees(line), *mark.T, *pivot.T]
         random = empty[:, 0] if self.sigma_random is None else self.sigma_random
         parts = [np.degrees(random), np.degrees(self.sigma_common)]
-        columns = dict(zip(SERIES_COLUMNS, [*cells, np.array(self.status, dtype=str), *parts], strict=True))
+        rates = [empty[:, 0]] * 4 if self.derivatives is None else [np.degrees(v) for v in astuple(self.derivatives)]
+        columns = dict(zip(SERIES_COLUMNS, [*cells, np.array(self.status, dtype=str), *parts, *rates], strict=True))
         return columns | {f"bound_{r:g}px_deg": bounds[r] for r in further}
 
     def to_pandas(self) -> pd.DataFrame:
@@ -179,7 +196,7 @@ class AngleSeries:
         points = [np.full((n, 2), np.nan) if p is None else p for p in (self.mark_px, self.pivot_px)]
         variables: dict[str, tuple[tuple[str, ...], Any]] = {
             "position": (("time", "space", "keypoints", "individuals"), np.stack(points, axis=-1)[..., None]),
-            **{k: (("time",), v) for k, v in columns.items() if k.endswith("_deg") or k == "status"},
+            **{k: (("time",), v) for k, v in columns.items() if "_deg" in k or k == "status"},
         }
         coordinates: dict[str, tuple[tuple[str, ...], Any]] = {
             "time": (("time",), self.time),

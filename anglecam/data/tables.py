@@ -56,15 +56,26 @@ def xarray_dataset(variables: Variables, coordinates: Variables, attributes: Map
         If xarray is not installed.
     """
     with_units = {
-        name: (dims, values, {"units": unit} if (unit := UNITS.get(name.rpartition("_")[2])) else {})
+        name: (dims, values, {"units": unit} if (unit := unit_of(name)) else {})
         for name, (dims, values) in variables.items()
     }
     dataset: xr.Dataset = _load("xarray").Dataset(with_units, dict(coordinates), dict(attributes))
     return dataset
 
 
-UNITS = {"s": "s", "deg": "degree", "px": "pixel"}
-"""Units by the last part of a column's name."""
+_UNITS = {"deg_s2": "degree/s^2", "deg_s": "degree/s", "deg": "degree", "px": "pixel", "s": "s"}
+"""Units by the end of a column's name; an end that another one ends in comes later."""
+
+
+def unit_of(column: str) -> str | None:
+    """Return the unit that the name of a column ends in, ``None`` where it ends in none.
+
+    Examples
+    --------
+    >>> unit_of("velocity_deg_s"), unit_of("time_s"), unit_of("status")
+    ('degree/s', 's', None)
+    """
+    return next((unit for end, unit in _UNITS.items() if column.endswith(f"_{end}")), None)
 
 
 def _load(library: str) -> Any:

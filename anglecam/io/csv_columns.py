@@ -19,7 +19,7 @@ from anglecam.io.files import open_text
 _MOST_BYTES = 256 * 2**20
 """Size above which a file is not read."""
 _MOST_ROWS = 1_000_000
-"""Rows above which a file is not read: nine hours at 30 Hz. A row of anglecam's files has 110 bytes."""
+"""Rows above which a file is not read: nine hours at 30 Hz. A row of anglecam's files has 160 bytes."""
 _LONGEST_STATUS = max(map(len, STATUSES)) + 1
 """Characters at which a status is cut; one more than the longest, so that a cut status equals none of them."""
 _LARGEST = 1e12

@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 import anglecam
 from anglecam.data.camera_evidence import CameraEvidence
+from anglecam.data.derivatives import Derivatives
 from anglecam.data.series import AngleSeries
-from anglecam.data.tables import UNITS
+from anglecam.data.tables import unit_of
 from anglecam.errors import InputError, printable
 from anglecam.io.files import write_whole
 
@@ -61,8 +62,8 @@ def write_netcdf(series: AngleSeries, path: Path) -> None:
 
     The dimensions are time, space, keypoints and individuals. ``position`` is in px; ``confidence`` is NaN, because
     anglecam states an uncertainty and no likelihood. ``angle_deg``, ``sigma_deg``, ``line_deg``, the bounds and
-    ``status`` are variables over time. The group ``anglecam`` holds the fields of `AngleSeries` and `CameraEvidence`
-    in rad, s and px, unrounded.
+    ``status`` are variables over time, and so are velocity and acceleration. The group ``anglecam`` holds the fields
+    of `AngleSeries` and `CameraEvidence` in rad, s and px, unrounded.
 
     Parameters
     ----------
@@ -97,9 +98,9 @@ def write_netcdf(series: AngleSeries, path: Path) -> None:
         unstated = np.full((n, 2, 1), np.nan)
         file.create_variable("confidence", ("time", "keypoints", "individuals"), "f8", data=unstated)
         for name, values in columns.items():
-            if name.endswith("_deg"):
+            if "_deg" in name:
                 variable = file.create_variable(name, ("time",), "f8", data=values)
-                variable.attrs["units"] = UNITS["deg"]
+                variable.attrs["units"] = unit_of(name)
         _texts(file, "status", "time", series.status)
         _write_exact(file.create_group(GROUP), series)
 
@@ -145,6 +146,7 @@ def read_netcdf(path: Path) -> AngleSeries:
         stated = {name: np.asarray(value) for name, value in group.attrs.items()}
         status = tuple(text.decode() if isinstance(text, bytes) else text for text in file.variables["status"][...])
     evidence = CameraEvidence(**{f.name: _from_attribute(stated.get(f.name)) for f in fields(CameraEvidence)})
+    rates = {field.name: exact[field.name] for field in fields(Derivatives) if field.name in exact}
     return AngleSeries(
         name=os.fsdecode(stated["name"].tobytes()),
         time=exact["time"],
@@ -156,6 +158,8 @@ def read_netcdf(path: Path) -> AngleSeries:
         pivot_px=exact.get("pivot_px"),
         bounds={float(r): exact["bounds"][i] for i, r in enumerate(exact["radius"])},
         first_frame=int(stated.get("first_frame", 0)),
+        sigma_random=exact.get("sigma_random"),
+        derivatives=Derivatives(**rates) if len(rates) == len(fields(Derivatives)) else None,
         evidence=evidence,
     )
 
@@ -166,9 +170,12 @@ def _write_exact(group: Any, series: AngleSeries) -> None:
     group.create_variable("radius", ("radius",), "f8", data=np.array(list(series.bounds)))
     bounds = np.array(list(series.bounds.values())).reshape(len(series.bounds), len(series.time))
     group.create_variable("bounds", ("radius", "time"), "f8", data=bounds)
-    for name in ("time", "angle", "sigma", "line"):
-        if getattr(series, name) is not None:
-            group.create_variable(name, ("time",), "f8", data=getattr(series, name))
+    over_time = {name: getattr(series, name) for name in ("time", "angle", "sigma", "line", "sigma_random")}
+    if series.derivatives is not None:
+        over_time |= vars(series.derivatives)
+    for name, values in over_time.items():
+        if values is not None:
+            group.create_variable(name, ("time",), "f8", data=values)
     for name in ("mark_px", "pivot_px"):
         if getattr(series, name) is not None:
             group.create_variable(name, ("time", "space"), "f8", data=getattr(series, name))
@@ -206,7 +213,7 @@ def write_parquet(series: AngleSeries, path: Path) -> None:
 
     schema, arrays = [], []
     for name, values in series.columns().items():
-        unit = UNITS.get(name.rpartition("_")[2])
+        unit = unit_of(name)
         array = pa.array(values, from_pandas=True)  # NaN becomes null
         schema.append(pa.field(name, array.type, metadata=None if unit is None else {"unit": unit}))
         arrays.append(array)

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.data.series import OK, STATUSES, AngleSeries
+from anglecam.data.derivatives import Derivatives
+from anglecam.data.series import DERIVATIVE_COLUMNS, OK, STATUSES, AngleSeries
 from anglecam.errors import InputError
 from anglecam.io.csv_columns import read_columns, require_increasing
 from anglecam.io.files import write_atomically
@@ -79,6 +80,7 @@ def read_series(path: Path) -> AngleSeries:
     }
     line = np.radians(table["line_deg"]) if "line_deg" in table else None
     name = path.name.removesuffix(".csv").removesuffix(".angles")
+    rates = [np.radians(table[name]) for name in DERIVATIVE_COLUMNS if name in table]
     first = _first_frame(table.get("frame"))
     return AngleSeries(
         name,
@@ -91,6 +93,7 @@ def read_series(path: Path) -> AngleSeries:
         points.get("pivot"),
         first_frame=first,
         sigma_random=random,
+        derivatives=Derivatives(*rates) if len(rates) == len(DERIVATIVE_COLUMNS) else None,
     )
 
 

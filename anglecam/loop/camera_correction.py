@@ -13,6 +13,7 @@ from anglecam.data.typing import Floats
 from anglecam.effects import Effect, Knots
 from anglecam.errors import InputError
 from anglecam.identification.fit import Fit
+from anglecam.measurement.derivatives import with_derivatives
 from anglecam.models.plant import Plant
 
 DRAWS = 100
@@ -70,7 +71,7 @@ def correct_camera_effects(series: AngleSeries, fit: Fit, view: View) -> AngleSe
         )
     sigma = right.sigma.copy()
     sigma[known] = np.hypot(sigma[known], spread)
-    return replace(right, sigma=sigma)
+    return with_derivatives(replace(right, sigma=sigma))
 
 
 def _inverted(series: AngleSeries, camera: Sequence[tuple[Effect, Floats]], view: View) -> AngleSeries:

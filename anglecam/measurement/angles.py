@@ -19,7 +19,7 @@ from anglecam.io.rig import Rig
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.registration_pass import Registered
 from anglecam.measurement.rigid_motion import RigidMotion
-from anglecam.measurement.sigma import PlaceErrors, Sigma, angle_sigma, place_errors
+from anglecam.measurement.sigma import PlaceErrors, Sigma, angle_sigma, place_errors, sigma_by_pivot
 from anglecam.vision.image.transforms import rotate_each
 from anglecam.vision.pivot.estimate import PivotEstimate
 
@@ -178,8 +178,7 @@ def angles_of_places(
     aside = thick_px * np.hypot(*lens.parallax) * (line - neutral) / lever
     known = angle_sigma(mark_px, pivot.centre_px, pivot.covariance_px2, errors, resting)
     unsteady = mean_off_middle(time, line, rig.camera.exposure_s)
-    common = np.sqrt(known.common**2 + view.sigma**2 + aside**2)
-    sigma = Sigma(known.noise, np.hypot(known.pose, unsteady), common)
+    sigma = known.with_sources(pose=(unsteady,), common=(view.sigma, aside))
     return Angles(line, sigma, mark_px, pivot, neutral, resting, errors, view, unsteady)
 
 
@@ -201,13 +200,9 @@ def _angles_of_body(
     errors = PlaceErrors(noise * lever, 0.0)
     view = _view_errors(detections.lens, mark, detections.pivot.centre_px, line, neutral, resting, rig)
     known = angle_sigma(mark, detections.pivot.centre_px, np.zeros((2, 2)), errors, resting)
-    moved = body.pivot_sensitivity[ok]
-    if resting is not None:
-        moved = moved - moved[resting].mean(axis=0)
-    by_pivot = np.einsum("ni,ij,nj->n", moved, body.pivot_covariance_px2, moved)
+    by_pivot = sigma_by_pivot(body.pivot_sensitivity[ok], body.pivot_covariance_px2, resting)
     unsteady = mean_off_middle(time[ok], line, rig.camera.exposure_s)
-    common = np.sqrt(known.common**2 + by_pivot + view.sigma**2)
-    sigma = Sigma(known.noise, np.hypot(known.pose, unsteady), common)
+    sigma = known.with_sources(pose=(unsteady,), common=(by_pivot, view.sigma))
     return Angles(line, sigma, mark, detections.pivot, neutral, resting, errors, view, unsteady)
 
 

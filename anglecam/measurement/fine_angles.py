@@ -17,7 +17,7 @@ from anglecam.data.typing import Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles, neutral_of
 from anglecam.measurement.registration_pass import Registered
-from anglecam.measurement.sigma import Sigma
+from anglecam.measurement.sigma import Sigma, in_squares, sigma_by_pivot, sigma_of_mean
 from anglecam.vision.pivot.estimate import PivotEstimate
 
 
@@ -69,14 +69,13 @@ def fine_angles(
     line = np.where(registered, base + signed, coarse.line)
     neutral, resting = neutral_of(rig, command, time, line, coarse.lever_px)
     used = registered if resting is None or not (resting & registered).any() else resting & registered
-    shared = _sigma_of_mean(turn[used], noise[used], float(np.median(pose[registered])), filmed_px[used])
-    against = sensitivity - sensitivity[used].mean(axis=0)
-    by_pivot = np.einsum("ni,ij,nj->n", against, found.pivot_covariance_px2, against)
+    shared = sigma_of_mean(turn[used], noise[used], float(np.median(pose[registered])), filmed_px[used])
+    by_pivot = sigma_by_pivot(sensitivity, found.pivot_covariance_px2, used)
     exposure = rig.camera.exposure_s
     unsteady = np.hypot(mean_off_middle(time, line, exposure), blur_error(time, line, coarse.lever_px, exposure))
     # an absolute direction depends on the mark's mean position on the body, and on the pivot
     direction = float(np.median(coarse.sigma[registered])) if resting is None else 0.0
-    common = np.sqrt(shared**2 + by_pivot + coarse.view.sigma**2 + direction**2)
+    common = in_squares(shared, by_pivot, coarse.view.sigma, direction)
     sigma = Sigma(
         np.where(registered, noise, coarse.uncertainty.noise),
         np.where(registered, np.hypot(pose, unsteady), coarse.uncertainty.pose),
@@ -94,19 +93,3 @@ def fine_angles(
         registered=found,
         shared=shared,
     )
-
-
-def _sigma_of_mean(turn: Floats, noise: Floats, pose: float, filmed_px: Floats) -> float:
-    """Return the standard uncertainty of the mean rotation of frames in few poses, rad.
-
-    The error that depends on the position on the pixel grid does not average out at rest. Where frames at rest scatter
-    more than the pixels' noise explains, that excess part differs from frame to frame and does average out: errors of a
-    codec that noise varies, or of a shaking camera.
-    """
-    n, places = len(turn), np.unique(np.round(filmed_px).astype(int), axis=0, return_inverse=True)[1].ravel()
-    count = np.bincount(places)
-    independent = 0.0
-    if n > len(count):
-        within = turn - (np.bincount(places, turn) / count)[places]
-        independent = float(np.clip((within**2).sum() / (n - len(count)) - (noise**2).mean(), 0.0, pose**2))
-    return float(np.sqrt(((noise**2).mean() + independent) / n + (pose**2 - independent) / len(count)))

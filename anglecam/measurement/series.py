@@ -12,7 +12,9 @@ from anglecam.data.series import CONTRACT_RADII_PX, OK, AngleSeries
 from anglecam.data.typing import Flags, Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
-from anglecam.measurement.sigma import scatter, worst_case
+from anglecam.measurement.bounds import worst_case
+from anglecam.measurement.derivatives import with_derivatives
+from anglecam.measurement.sigma import scatter_of
 
 
 def series_of_angles(
@@ -50,7 +52,7 @@ def series_of_angles(
     Returns
     -------
     AngleSeries
-        A row a frame.
+        A row a frame, with velocity and acceleration.
     """
     measured = np.array([s == OK for s in status])
 
@@ -60,12 +62,12 @@ def series_of_angles(
         return np.where(measured, placed, np.nan)
 
     lines, levers = in_all_frames(angles.line), in_all_frames(angles.lever_px)
-    return AngleSeries(
+    series = AngleSeries(
         name=name,
         time=time,
         angle=lines - angles.neutral,
         sigma=in_all_frames(angles.sigma),
-        sigma_random=in_all_frames(angles.uncertainty.random(scatter(time[ok], angles.line))),
+        sigma_random=in_all_frames(angles.uncertainty.random(scatter_of(time[ok], angles.line))),
         status=tuple(status),
         line=lines,
         mark_px=np.where(measured[:, None], mark_px, np.nan),
@@ -74,6 +76,7 @@ def series_of_angles(
         evidence=evidence,
         bounds={r: worst_case(r, levers) for r in {*CONTRACT_RADII_PX, *rig.pixel_error_px}},
     )
+    return with_derivatives(series)
 
 
 def why_zero_is_elsewhere(rig: Rig, command: Command | None, time: Floats) -> str | None:

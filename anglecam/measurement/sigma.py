@@ -1,67 +1,27 @@
-"""From errors in pixels to errors of the angle: worst cases, and the standard uncertainty of each frame.
+"""The standard uncertainty of each angle: every source of error, the parts they form, and what counts as random.
 
-The paper allows the mark to be misplaced by 6 px to 10 px and states 0.28° and 0.68° for it (Section on Fig. 8).
-No single lever arm gives both: as worst cases they belong to arms of 1228 px and 842.5 px, and at 842.5 px an error
-of 6 px gives at most 0.408°. The 0.28° is one particular point on the circle of possible positions; here the worst of
-them is computed, at the measured arm.
+The standard uncertainty combines the known sources of error (GUM 5.1.2): the noise of the picture, the mark's position
+on the pixel grid and in the codec's blocks, and the pivot, each times its sensitivity. Errors that differ from frame to
+frame are scatter, which a mean or a filter reduces. Errors of pivot, zero and view are common to all frames. An error
+that depends on the pose lies between: it scatters where the pose changes much from frame to frame, and not at rest. The
+scatter of the angles themselves says how much of it counts as random.
 
-A worst case is not an uncertainty. The standard uncertainty combines the known sources of error (GUM 5.1.2): the noise
-of the picture, the mark's position on the pixel grid and in the codec's blocks, and the pivot, each times its
-sensitivity. Errors that differ from frame to frame are scatter, which a mean or a filter reduces. Errors of pivot, zero
-and view are common to all frames. An error that depends on the pose lies between: it scatters where the pose changes
-much from frame to frame, and not at rest. The scatter of the angles themselves says how much of it counts as random.
+`anglecam.measurement.angles` and `anglecam.measurement.fine_angles` name the sources of an angle; how a source becomes
+an uncertainty, and how sources add, is here.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 _LEAST_DIFFERENCES = 30
 """Fewest differences from which a scatter is estimated; its standard uncertainty is then about a fifth."""
 _FAR = 4.0
 """Standard deviations beyond which a position's distance from the circle counts as an error of that frame alone."""
-
-
-def worst_case(radius_px: float, lever_px: ArrayLike) -> NDArray[np.float64]:
-    """Return the largest angle error of a lever with one end anywhere within a circle: asin(r/R).
-
-    The line from the pivot deviates most from the true direction where it is tangent to the circle around the true
-    point.
-
-    Parameters
-    ----------
-    radius_px : float
-        Radius r of the circle around the true mark point, px.
-    lever_px : array_like
-        Lever arm R, pivot to mark, px; NaN stays NaN.
-
-    Returns
-    -------
-    ndarray
-        rad, in the shape of ``lever_px``; π where the circle reaches the pivot, because any direction is possible then.
-    """
-    return _asin_or_pi(radius_px, lever_px)
-
-
-def worst_case_both_ends(radius_px: float, lever_px: ArrayLike) -> NDArray[np.float64]:
-    """Return the largest angle error with pivot and mark each anywhere within a circle: asin(2r/R).
-
-    Parameters
-    ----------
-    radius_px : float
-        Radius r of both circles, px.
-    lever_px : array_like
-        Lever arm R, px; NaN stays NaN.
-
-    Returns
-    -------
-    ndarray
-        rad, in the shape of ``lever_px``; π where the circles meet.
-    """
-    return _asin_or_pi(2.0 * radius_px, lever_px)
 
 
 @dataclass(frozen=True)
@@ -78,24 +38,43 @@ class Sigma:
     @property
     def total(self) -> NDArray[np.float64]:
         """(n,) all parts, added in squares."""
-        return np.sqrt(self.noise**2 + self.pose**2 + self.common**2)
+        return in_squares(self.noise, self.pose, self.common)
 
-    def random(self, scatter: float) -> NDArray[np.float64]:
+    def with_sources(
+        self, *, pose: Sequence[NDArray[np.float64]] = (), common: Sequence[NDArray[np.float64]] = ()
+    ) -> Sigma:
+        """Return this with further independent sources, (n,) rad each, added to two of its parts."""
+        return Sigma(self.noise, in_squares(self.pose, *pose), in_squares(self.common, *common))
+
+    def random(self, scatter: Scatter) -> NDArray[np.float64]:
         """Return the part that is independent from frame to frame, given the `scatter` of the angles, rad.
 
-        The noise counts whole. Of the part that depends on the pose there counts what the scatter shows beyond the
-        noise. Where the scatter is not known (NaN), all of it counts.
+        The noise counts, and of the part that depends on the pose what the usual scatter shows beyond the noise. If the
+        noise exceeds even the RMS scatter, only that much of it is noise: the mark's distance from the pivot, from
+        which noise is estimated, also varies slowly. Where the scatter is not known (NaN), both parts count whole.
         """
         noise2, pose2 = float(np.median(self.noise**2)), float(np.median(self.pose**2))
-        shown = (scatter**2 - noise2) / pose2 if pose2 > 0.0 and np.isfinite(scatter) else 1.0
-        return np.sqrt(self.noise**2 + min(max(shown, 0.0), 1.0) * self.pose**2)
+        known = np.isfinite(scatter.usual)
+        shown = (scatter.usual**2 - noise2) / pose2 if known and pose2 > 0.0 else 1.0
+        scatters = scatter.rms**2 / noise2 if known and noise2 > 0.0 else 1.0
+        return np.sqrt(min(scatters, 1.0) * self.noise**2 + min(max(shown, 0.0), 1.0) * self.pose**2)
 
 
-def scatter(time: NDArray[np.float64], angle: NDArray[np.float64]) -> float:
+@dataclass(frozen=True)
+class Scatter:
+    """Standard deviation of what differs from frame to frame in a smooth motion, rad, by two estimates."""
+
+    usual: float
+    """From the median of the absolute differences: that of most frames."""
+    rms: float
+    """From their mean square: at least a third of the scatter in any tenth of the frames."""
+
+
+def scatter_of(time: NDArray[np.float64], angle: NDArray[np.float64]) -> Scatter:
     """Estimate the standard deviation of what differs from frame to frame in a smooth motion.
 
     Fourth differences of five evenly spaced frames remove any cubic; of independent errors they have √70 times the
-    standard deviation. A motion that is not smooth makes the estimate larger.
+    standard deviation. A motion that is not smooth makes both estimates larger.
 
     Parameters
     ----------
@@ -106,24 +85,86 @@ def scatter(time: NDArray[np.float64], angle: NDArray[np.float64]) -> float:
 
     Returns
     -------
-    float
-        rad, from the median of the absolute differences; NaN with fewer than `_LEAST_DIFFERENCES`.
+    Scatter
+        NaN with fewer than `_LEAST_DIFFERENCES`.
 
     Examples
     --------
     >>> time = np.arange(3000) / 30
     >>> noise = 1e-3 * np.random.default_rng(0).standard_normal(3000)
-    >>> round(float(1e3 * scatter(time, 0.2 * np.sin(3.0 * time) + noise)), 1)
-    1.0
+    >>> found = scatter_of(time, 0.2 * np.sin(3.0 * time) + noise)
+    >>> round(1e3 * found.usual, 1), round(1e3 * found.rms, 1)
+    (1.0, 1.0)
     """
     if len(time) < _LEAST_DIFFERENCES + 4:
-        return float("nan")
+        return Scatter(float("nan"), float("nan"))
     steps = np.lib.stride_tricks.sliding_window_view(np.diff(time), 4)
     even = np.ptp(steps, axis=1) < 0.5 * steps.min(axis=1)  # no frame is missing; time stamps may be rounded
-    differences = np.diff(angle, n=4)[even]
+    differences = np.diff(angle, n=4)[even] / np.sqrt(70.0)
     if len(differences) < _LEAST_DIFFERENCES:
-        return float("nan")
-    return 1.4826 * float(np.median(np.abs(differences))) / np.sqrt(70.0)
+        return Scatter(float("nan"), float("nan"))
+    return Scatter(1.4826 * float(np.median(np.abs(differences))), float(np.sqrt((differences**2).mean())))
+
+
+def in_squares(*parts: NDArray[np.float64] | float) -> NDArray[np.float64]:
+    """Return the root of the sum of the squares of independent uncertainties.
+
+    Examples
+    --------
+    >>> float(in_squares(3.0, 4.0, 12.0))
+    13.0
+    """
+    return np.sqrt(sum(np.square(part) for part in parts))
+
+
+def sigma_by_pivot(
+    sensitivity: NDArray[np.float64], covariance_px2: NDArray[np.float64], neutral: NDArray[np.bool_] | None
+) -> NDArray[np.float64]:
+    """Return the uncertainty that the pivot contributes; what a frame shares with neutral cancels.
+
+    Parameters
+    ----------
+    sensitivity : ndarray
+        (n, 2) change of the direction by a displacement of the pivot, rad/px.
+    covariance_px2 : ndarray
+        (2, 2) of the pivot, px².
+    neutral : ndarray, optional
+        (n,) frames whose mean is subtracted; ``None`` where neutral is declared.
+
+    Returns
+    -------
+    ndarray
+        (n,) rad.
+    """
+    against = sensitivity if neutral is None else sensitivity - sensitivity[neutral].mean(axis=0)
+    return np.sqrt(np.einsum("ni,ij,nj->n", against, covariance_px2, against))
+
+
+def sigma_of_mean(
+    turn: NDArray[np.float64], noise: NDArray[np.float64], pose: float, filmed_px: NDArray[np.float64]
+) -> float:
+    """Return the standard uncertainty of the mean rotation of frames in few poses, rad.
+
+    The error that depends on the position on the pixel grid does not average out at rest. Where frames at rest scatter
+    more than the pixels' noise explains, that excess part differs from frame to frame and does average out: errors of a
+    codec that noise varies, or of a shaking camera.
+
+    Parameters
+    ----------
+    turn, noise : ndarray
+        (n,) rotations and their noise, rad.
+    pose : float
+        Standard deviation of the part that depends on the pose, rad.
+    filmed_px : ndarray
+        (n, 2) positions of the mark in the picture; frames on the same pixel share a pose, px.
+    """
+    n, places = len(turn), np.unique(np.round(filmed_px).astype(int), axis=0, return_inverse=True)[1].ravel()
+    count = np.bincount(places)
+    independent = 0.0
+    if n > len(count):
+        within = turn - (np.bincount(places, turn) / count)[places]
+        independent = float(np.clip((within**2).sum() / (n - len(count)) - (noise**2).mean(), 0.0, pose**2))
+    return float(np.sqrt(((noise**2).mean() + independent) / n + (pose**2 - independent) / len(count)))
 
 
 @dataclass(frozen=True)
@@ -223,21 +264,11 @@ def angle_sigma(
     along = np.column_stack([-arm[:, 1], arm[:, 0]]) / lever[:, None]
     if neutral is None:
         pose, rest = np.full(len(lever), errors.pose_px**2), 0.0
-        direction = along
     else:
         distance2 = ((mark_px - mark_px[neutral].mean(axis=0)) ** 2).sum(axis=1)
         poses = len(np.unique(np.round(mark_px[neutral]).astype(int), axis=0))
         rest = float((errors.noise_px[neutral] ** 2).mean()) / int(neutral.sum())
         # the mean over many poses has a small error, and shares little of it with any single pose
         pose = errors.pose_px**2 * (1.0 + 1.0 / poses - 2.0 / poses * np.exp(-distance2 / 2.0))
-        direction = along - along[neutral].mean(axis=0)
-    pivot = np.einsum("ni,ij,nj->n", direction, pivot_covariance_px2, direction)
-    return Sigma(errors.noise_px / lever, np.sqrt(pose) / lever, np.sqrt(rest + pivot) / lever)
-
-
-def _asin_or_pi(reach_px: float, lever_px: ArrayLike) -> NDArray[np.float64]:
-    lever = np.asarray(lever_px, float)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = reach_px / lever
-    angle = np.arcsin(np.clip(ratio, 0.0, 1.0))
-    return np.where(ratio >= 1.0, np.pi, angle)
+    pivot = sigma_by_pivot(along, pivot_covariance_px2, neutral)
+    return Sigma(errors.noise_px / lever, np.sqrt(pose) / lever, np.sqrt(rest + pivot**2) / lever)

@@ -15,6 +15,7 @@ import numpy as np
 
 from anglecam.data.series import AngleSeries
 from anglecam.data.typing import Floats
+from anglecam.measurement.derivatives import with_derivatives
 
 SMALLEST = math.radians(1e-3)
 """Smallest difference between the two angles that is considered, rad."""
@@ -84,7 +85,8 @@ def _from_marker(series: AngleSeries) -> AngleSeries | None:
     )
     sigma = np.where(ok, scatter, np.nan)
     pivot = np.where(ok[:, None], np.asarray(marker_px), np.nan)
-    return replace(series, angle=angle, line=line, sigma=sigma, sigma_random=sigma, pivot_px=pivot)
+    plain = replace(series, angle=angle, line=line, sigma=sigma, sigma_random=sigma, pivot_px=pivot)
+    return with_derivatives(plain)
 
 
 def _about_marker(series: AngleSeries) -> Floats:

@@ -17,9 +17,18 @@ from anglecam.measurement.clip import Measurement
 from anglecam.measurement.step_response import Response
 from anglecam.measurement.tracks import MeasuredTracks
 from anglecam.report.clip_tables import RESPONSE_HEADS, response_cells
-from anglecam.report.curves import Columns, angle_plot, curves_as_dict, series_columns, sigma_plot
+from anglecam.report.curves import (
+    DERIVATIVES,
+    Columns,
+    angle_plot,
+    curves_as_dict,
+    derivative_columns,
+    derivative_plots,
+    series_columns,
+    sigma_plot,
+)
 from anglecam.report.document import html_of, write_html
-from anglecam.report.figures import angle_panel, sigma_panel
+from anglecam.report.figures import angle_panel, derivative_panel, sigma_panel
 from anglecam.report.moments import choose_moments
 from anglecam.report.origin import Origin
 from anglecam.report.page_names import THUMBNAIL_ENDING, page_name
@@ -36,6 +45,13 @@ MEANINGS = {
     "undecodable": "the file is damaged here",
 }
 """Of the values of ``status``."""
+TITLES = {
+    "angle": "Angle",
+    "sigma": "Standard uncertainty",
+    "velocity": "Velocity",
+    "acceleration": "Acceleration",
+}
+"""Of the plots."""
 THUMBNAIL_PX = 240
 
 
@@ -68,7 +84,12 @@ def write_clip_html(
     changes = [] if command is None else command.time[1:][np.diff(command.angle) != 0.0].tolist()
     moments = choose_moments(series, series.sigma, "uncertainty", changes, MOST_OF_RECORDING)
     columns = series_columns(series, None if command is None else command.at(series.time))
-    recording = Columns(series.name, series.first_frame, columns)
+    recording = Columns(series.name, series.first_frame, columns | derivative_columns(series))
+    plots = {"angle": angle_plot([recording]), "sigma": sigma_plot(recording)}
+    drawn = {"angle": angle_panel(series), "sigma": sigma_panel(series)}
+    if series.derivatives is not None:
+        plots |= derivative_plots()
+        drawn |= {name: derivative_panel(series, name, unit) for name, unit in DERIVATIVES.items()}
     ok = series.ok
     ends = np.degrees([series.angle[ok].min(), series.angle[ok].max()])
     low, high = (f"{end:.2f}°".replace("-", "−") for end in ends)
@@ -79,7 +100,7 @@ def write_clip_html(
         "measure.html",
         contents=contents,
         made=made,
-        curves=curves_as_dict([recording], {"angle": angle_plot([recording]), "sigma": sigma_plot(recording)}),
+        curves=curves_as_dict([recording], plots),
         name=name,
         by=measurement.by,
         pivot=measurement.pivot,
@@ -90,8 +111,8 @@ def write_clip_html(
         sigma=_median_sigma(measurement),
         common=common_part(series),
         bounded=bool(series.bounds),
-        plots={"angle": "Angle", "sigma": "Standard uncertainty"},
-        drawn={"angle": angle_panel(series), "sigma": sigma_panel(series)},
+        plots={name: TITLES[name] for name in plots},
+        drawn=drawn,
         pictures=take_pictures(film, series, moments),
         answers=_response_table(answers),
         statuses=sorted(Counter(series.status).items(), key=lambda item: (item[0] != "ok", -item[1])),

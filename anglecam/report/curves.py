@@ -75,6 +75,8 @@ RANDOM_BAND = Band("95 % interval of the random part", SHADE, "random", "angle",
 """What differs from frame to frame."""
 TOTAL_BAND = Band("95 % interval with the common part", "#e3e7ec", "sigma", "angle", NORMAL_95, shown=False)
 """Also what all frames share."""
+DERIVATIVES = {"velocity": "°/s", "acceleration": "°/s²"}
+"""Units of the columns that `derivative_columns` adds."""
 
 
 def angle_plot(series: Sequence[Columns], curves: Sequence[Curve] = ()) -> Plot:
@@ -95,6 +97,23 @@ def sigma_plot(columns: Columns) -> Plot:
     parts = (Curve("common", "common part", COMMAND), Curve("random", "random part", AFTER))
     whole = (Curve("sigma", "σ of the angle", AFTER),)
     return Plot("σ, °", parts if "random" in columns.columns else whole, from_zero=True)
+
+
+def derivative_plots() -> dict[str, Plot]:
+    """Return the plots of velocity and acceleration with their uncertainties."""
+    return {
+        name: Plot(
+            f"{name}, {unit}",
+            (Curve(name, name, MEASURED),),
+            (Band("95 % interval (1.96 σ)", SHADE, f"{name}_sigma", name, NORMAL_95),),
+        )
+        for name, unit in DERIVATIVES.items()
+    }
+
+
+def derivative_columns(series: AngleSeries) -> dict[str, Floats]:
+    """Return velocity and acceleration and their sigmas by name, °/s and °/s²; empty where they are not known."""
+    return {} if series.derivatives is None else {k: np.degrees(v) for k, v in vars(series.derivatives).items()}
 
 
 def series_columns(series: AngleSeries, command: Floats | None = None) -> dict[str, Floats]:

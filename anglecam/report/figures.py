@@ -44,7 +44,10 @@ STYLE: Any = {
 
 
 def plot_series(series: AngleSeries, path: Path) -> None:
-    """Draw a measured clip: the angle over time with its 95 % interval, its sigma, and the frames without an angle.
+    """Draw a measured clip over time: angle, sigma, velocity and acceleration, and the frames without an angle.
+
+    The angle is shaded with the 95 % interval of the random part of its uncertainty. The legend states the common part
+    as a scale. Velocity and acceleration are drawn where they are known.
 
     Parameters
     ----------
@@ -54,15 +57,20 @@ def plot_series(series: AngleSeries, path: Path) -> None:
         A PNG file.
     """
     with plt.rc_context(STYLE):
-        figure, (top, bottom) = plt.subplots(
-            2, 1, figsize=(9, 5), sharex=True, height_ratios=(3, 1), layout="constrained"
+        rates = [] if series.derivatives is None else [("velocity", "°/s"), ("acceleration", "°/s²")]
+        heights = (3, 1, *(1.5 for _ in rates))
+        figure, (top, second, *others) = plt.subplots(
+            len(heights), 1, figsize=(9, 1.25 * sum(heights)), sharex=True, height_ratios=heights, layout="constrained"
         )
         _draw_angle(top, series)
         top.set_ylabel("angle from neutral, °")
         top.set_title(printable(series.name), parse_math=False)
-        _draw_sigma(bottom, series)
-        figure.legend(*_labels(top, bottom), loc="outside upper right", ncols=3, fontsize=8)
-        bottom.set_xlabel("time on the clip's clock, s")
+        _draw_sigma(second, series)
+        for axes, (name, unit) in zip(others, rates, strict=True):
+            _draw_derivative(axes, series, name)
+            axes.set_ylabel(f"{name}, {unit}")
+        figure.legend(*_labels(top, second), loc="outside upper right", ncols=3, fontsize=8)
+        (top, second, *others)[-1].set_xlabel("time on the clip's clock, s")
         path.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(path, dpi=110, format="png")
         plt.close(figure)
@@ -82,6 +90,11 @@ def angle_panel(series: AngleSeries) -> str:
 def sigma_panel(series: AngleSeries) -> str:
     """Draw the standard uncertainty over time, as SVG."""
     return panel("σ, °", lambda axes: _draw_sigma(axes, series))
+
+
+def derivative_panel(series: AngleSeries, name: str, unit: str) -> str:
+    """Draw ``velocity`` or ``acceleration`` over time with its 95 % interval, as SVG; ``unit`` is °/s or °/s²."""
+    return panel(f"{name}, {unit}", lambda axes: _draw_derivative(axes, series, name))
 
 
 def panel(ylabel: str, draw: Callable[[Axes], None], xlabel: str = "time, s") -> str:
@@ -105,7 +118,7 @@ def _draw_angle(axes: Axes, series: AngleSeries) -> None:
     degrees, half = np.degrees(series.angle), NORMAL_95 * np.degrees(shaded)
     if np.isfinite(half).any():
         share = series.common_share
-        common = f"; {100.0 * share:.2g} % of the angle in common" if np.isfinite(share) else ""
+        common = f"; scale uncertain by {100.0 * share:.2g} %" if np.isfinite(share) else ""
         label = f"95 % interval of the random part{common}" if parted else "95 % interval (1.96 σ)"
         axes.fill_between(series.time, degrees - half, degrees + half, color=SHADE, label=label)
     axes.plot(series.time, degrees, color=MEASURED, lw=1.0, marker=".", ms=2, label="angle")
@@ -123,6 +136,13 @@ def _draw_sigma(axes: Axes, series: AngleSeries) -> None:
         axes.plot(series.time, np.degrees(series.sigma_common), color=COMMAND, lw=1.0, label="common part")
         axes.plot(series.time, np.degrees(series.sigma_random), color=AFTER, lw=1.0, label="random part")
     axes.set(ylabel="σ, °", ylim=(0.0, None))
+
+
+def _draw_derivative(axes: Axes, series: AngleSeries, name: str) -> None:
+    value, sigma = (np.degrees(getattr(series.derivatives, field)) for field in (name, f"{name}_sigma"))
+    half = NORMAL_95 * sigma
+    axes.fill_between(series.time, value - half, value + half, color=SHADE)
+    axes.plot(series.time, value, color=MEASURED, lw=1.0)
 
 
 def _svg(figure: Figure) -> str:

@@ -15,6 +15,7 @@ from anglecam.io.command_csv import read_command
 from anglecam.io.rig import Rig, RigKeypoints, read_rig
 from anglecam.io.series_csv import read_series, write_series
 from anglecam.io.session import find_measurable, read_session
+from anglecam.measurement.derivatives import with_derivatives
 from anglecam.workflow.session import measure_session
 from support import broken
 
@@ -29,7 +30,7 @@ def _series(n: int = 30) -> AngleSeries:
     pivot = np.where(np.isnan(mouth), np.nan, [200.0, 300.0])
     bounds = {r: np.where(np.isnan(angle), np.nan, np.arcsin(r / 220.0)) for r in (6.0, 8.0, 10.0)}
     sigma = np.where(np.isnan(angle), np.nan, np.radians(0.01))
-    return AngleSeries("clip", time, angle, sigma, status, angle + 0.1, mouth, pivot, bounds)
+    return with_derivatives(AngleSeries("clip", time, angle, sigma, status, angle + 0.1, mouth, pivot, bounds))
 
 
 def test_a_series_reads_back_as_it_was_written(tmp_path):
@@ -42,6 +43,8 @@ def test_a_series_reads_back_as_it_was_written(tmp_path):
     np.testing.assert_allclose(back.time, series.time, rtol=1e-8)
     np.testing.assert_allclose(back.angle, series.angle, atol=np.radians(1e-6))
     np.testing.assert_allclose(back.mark_px, series.mark_px, atol=1e-4)
+    for name, values in vars(series.derivatives).items():
+        np.testing.assert_allclose(getattr(back.derivatives, name), values, atol=np.radians(1e-6))
 
 
 def test_columns_are_those_of_the_contract_and_an_unmeasured_row_is_empty(tmp_path):
@@ -53,6 +56,17 @@ def test_columns_are_those_of_the_contract_and_an_unmeasured_row_is_empty(tmp_pa
     assert rows[4][0] == "4"
     assert rows[4][2:11] == [""] * 9
     assert rows[4][11] == "occluded"
+    assert header[11:18] == [
+        "status",
+        "sigma_random_deg",
+        "sigma_common_deg",
+        "velocity_deg_s",
+        "velocity_sigma_deg_s",
+        "acceleration_deg_s2",
+        "acceleration_sigma_deg_s2",
+    ]
+    assert rows[4][12:18] == [""] * 6
+    assert float(rows[20][14]) == pytest.approx(10.0 * np.cos(20 / 30), abs=5.0 * float(rows[20][15]))
     assert float(rows[5][4]) == pytest.approx(np.degrees(np.arcsin(6 / 220)), abs=1e-4)
 
 

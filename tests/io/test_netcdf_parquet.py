@@ -13,6 +13,7 @@ from pyarrow import parquet
 
 from anglecam.cli import app as cli
 from anglecam.data.camera_evidence import CameraEvidence
+from anglecam.data.derivatives import Derivatives
 from anglecam.data.series import SERIES_COLUMNS as COLUMNS
 from anglecam.data.series import AngleSeries
 from anglecam.errors import InputError
@@ -42,6 +43,8 @@ def series() -> AngleSeries:
         mark_px=there(rng.uniform(0, 600, (n, 2))),
         pivot_px=there(rng.uniform(0, 600, (n, 2))),
         bounds={r: there(np.full(n, r / 180.0)) for r in (4.0, 6.0, 10.0)},
+        sigma_random=there(rng.uniform(0.0005, 0.001, n)),
+        derivatives=Derivatives(*there(rng.normal(size=(n, 4))).T.copy()),
     )
 
 
@@ -58,7 +61,14 @@ VARIANTS = {
     "without evidence": lambda series: series,
     "of a clip whose name is not text": lambda series: replace(series, name="nick\udcff\udce9-é"),
     "with None in every optional field": lambda series: replace(
-        series, line=None, mark_px=None, pivot_px=None, bounds={}, evidence=replace(EVIDENCE, marker_px=None)
+        series,
+        line=None,
+        mark_px=None,
+        pivot_px=None,
+        bounds={},
+        sigma_random=None,
+        derivatives=None,
+        evidence=replace(EVIDENCE, marker_px=None),
     ),
     "with numbers that a table would round": lambda series: replace(
         series, angle=np.nextafter(series.angle, 9.0), sigma=np.full(50, -0.0), bounds={0.1 + 0.2: np.full(50, 1e-310)}
@@ -70,6 +80,8 @@ def bits(value):
     """Return a value such that two are equal exactly if they are equal bit for bit, NaN and the sign of 0 included."""
     if isinstance(value, np.ndarray):
         return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, Derivatives):
+        return bits(vars(value))
     if isinstance(value, dict):
         return [(bits(key), bits(item)) for key, item in value.items()]
     if isinstance(value, tuple):

@@ -31,7 +31,8 @@ def fitted(*effects, sigma=1e-6):
 
 
 def series(time, angle):
-    return AngleSeries("one", time, angle, np.full(len(time), 1e-4), ("ok",) * len(time))
+    status = tuple("ok" if found else "occluded" for found in np.isfinite(angle))
+    return AngleSeries("one", time, angle, np.full(len(time), 1e-4), status)
 
 
 @pytest.mark.parametrize(

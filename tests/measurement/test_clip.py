@@ -12,9 +12,10 @@ import pytest
 from anglecam.errors import InputError
 from anglecam.io.command_csv import read_command
 from anglecam.io.rig import Rig, RigMark, RigPivot, read_rig
+from anglecam.measurement.bounds import worst_case, worst_case_both_ends
 from anglecam.measurement.clip import measure_clip
 from anglecam.measurement.mark_pass import detect_mark
-from anglecam.measurement.sigma import Sigma, angle_sigma, place_errors, scatter, worst_case, worst_case_both_ends
+from anglecam.measurement.sigma import Scatter, Sigma, angle_sigma, place_errors, scatter_of
 from anglecam.video.open_film import open_film
 from support import broken
 from support.drawn import Look, Recording, draw_frames, draw_session, write_clip
@@ -312,7 +313,7 @@ def test_the_random_part_is_the_scatter_of_frames_and_the_common_part_the_error_
         sigma = angle_sigma(mouth, used, covariance, errors, resting)
         about, without_noise = mouth - pivot, exact - used
         line = np.arctan2(-about[:, 1], about[:, 0])
-        random = sigma.random(scatter(np.arange(n) / 30, line))
+        random = sigma.random(scatter_of(np.arange(n) / 30, line))
         scattered.append((line - angle)[moving] / random[moving])
         line = np.arctan2(-without_noise[:, 1], without_noise[:, 0])
         shared.append((line - line[resting].mean() - angle)[away] / sigma.common[away])
@@ -327,9 +328,17 @@ def test_an_error_of_the_pose_is_random_as_far_as_it_scatters():
     rng = np.random.default_rng(2)
     slow = motion + pose * np.sin(3.0 * motion / 0.2) + noise * rng.standard_normal(300)
     fast = motion + np.hypot(noise, pose) * rng.standard_normal(300)
-    assert np.median(parts.random(scatter(time, slow))) == pytest.approx(noise, rel=0.3)
-    assert np.median(parts.random(scatter(time, fast))) == pytest.approx(np.hypot(noise, pose), rel=0.2)
-    assert np.median(parts.random(np.nan)) == pytest.approx(np.hypot(noise, pose))
+    assert np.median(parts.random(scatter_of(time, slow))) == pytest.approx(noise, rel=0.3)
+    assert np.median(parts.random(scatter_of(time, fast))) == pytest.approx(np.hypot(noise, pose), rel=0.2)
+    assert np.median(parts.random(Scatter(np.nan, np.nan))) == pytest.approx(np.hypot(noise, pose))
+
+
+def test_noise_that_does_not_scatter_is_common():
+    n = 400
+    time, noise, common = np.arange(n) / 30, 1e-4, 5e-3
+    parts = Sigma(np.full(n, 10.0 * noise), np.zeros(n), np.full(n, common))
+    angle = 0.2 * np.sin(2.0 * time) + noise * np.random.default_rng(2).standard_normal(n)
+    assert np.median(parts.random(scatter_of(time, angle))) == pytest.approx(noise, rel=0.15)
 
 
 @pytest.mark.parametrize("off", [(-60, 30), pytest.param((60, 20), marks=pytest.mark.sweep)])

@@ -48,6 +48,14 @@ def test_the_page_has_pictures_numbers_and_the_origin(measured, tmp_path):
         assert f'<th scope="row">{name}</th>' in page
 
 
+def test_the_page_draws_velocity_and_acceleration_and_states_the_common_part_as_a_scale(measured, tmp_path):
+    series, page = measured[1].series, unescape(write(measured, tmp_path).read_text())
+    for name, unit in (("velocity", "°/s"), ("acceleration", "°/s²")):
+        assert f'data-plot="{name}"' in page
+        assert f"{name}, {unit}" in page
+    assert f"the amplitude could be off by {100.0 * series.common_share:.2g} %" in page
+
+
 def test_equal_inputs_give_equal_pages_where_no_date_is_stated(measured, tmp_path):
     pages = [write(measured, tmp_path / name).read_bytes() for name in ("once", "again")]
     assert pages[0] == pages[1]
