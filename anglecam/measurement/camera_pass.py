@@ -142,8 +142,8 @@ def hold_camera(film: Film, progress: Progress = unseen) -> HeldCamera:
     if why is None and not (followed and moves_in_the_hand(moves, film.size)):
         return HeldCamera(film)  # nothing says that the camera moves: what is seen to move may be the mechanism
     if not followed:
-        how = "from one place with fixed focus and zoom, or so that a desk or a wall with edges fills the picture"
-        return HeldCamera(film, steady, f"{why}; film {how}")
+        how = "choose frames in which it does not: frames: {from: k0, to: k1} in rig.yaml"
+        return HeldCamera(film, steady, f"{why}; {how}")
     own = {field.name: getattr(film, field.name) for field in fields(film) if field.init}
     grey = images[0].mean(axis=2, keepdims=True).astype(np.uint8)
     return HeldCamera(FilmAtRest(**own, moves=moves, first=images[0], first_grey=grey))

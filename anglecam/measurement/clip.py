@@ -145,11 +145,10 @@ def measure_clip(
     dark = changes and lamp is None and rig.sync.lamp is not None
     clock = DARK if dark else note_on(offset)
     few = why_few(series.status, rig.least_measured)
-    other = followed.detections.doubt
+    other = followed.detections.doubt or why_still(followed.detections, followed.ok, rig)
     if other is None and followed.angles.registered is None:
         other = (
-            why_still(followed.detections, followed.ok, rig)
-            or why_elsewhere(followed.detections, rig)
+            why_elsewhere(followed.detections, rig)
             or why_not_rigid(followed.detections, followed.ok)
             or why_unproven(followed.detections, hand_held=isinstance(held, FilmAtRest))
         )

@@ -6,7 +6,6 @@ the mark in every frame.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import replace
@@ -26,6 +25,7 @@ from anglecam.measurement.frame_reading import Sought, read_frames
 from anglecam.measurement.parallel_reading import read_in_parts, readers_for
 from anglecam.measurement.pivot import HEIGHT_SHARE, find_pivot
 from anglecam.measurement.trust import shows_its_centre, travel
+from anglecam.measurement.what_is_seen import DECLARE_MARK, causes_seen, where_it_moves
 from anglecam.progress import Progress, Stage, counted, unseen
 from anglecam.video.film import Film, Frame, Sample
 from anglecam.vision.image.noise import pixel_noise
@@ -138,8 +138,7 @@ def detect_mark(
     if pivot is None:
         return (
             "no pivot found: the mark's path is too short to determine its centre, and there is no round"
-            " marker near it; in rig.yaml, hint at it to some 10 px: pivot: {near: [x, y]}, or declare it, also outside"
-            " the picture: pivot: {at: [x, y], sigma_px: s}"
+            " marker near it; declare it, also outside the picture: pivot: {at: [x, y], sigma_px: s} in rig.yaml"
         )
     notes = [note for note in (_choice(found, track), disagreement) if note]
     if shakes is not None:
@@ -299,17 +298,13 @@ def _no_mark(sample: Sample, rig: Rig) -> str:
     if not sample.decoded:
         return f"none of its {sample.count} frames can be decoded"
     hint = "" if rig.pivot.expected is None else ", rotating about {:g},{:g}".format(*rig.pivot.expected)
-    advice = "is it in the picture?"
-    if rig.pointed_mark is not None:
-        advice = (
-            "nothing of that colour turns through the declared place; point at a part of one colour that its "
-            "surroundings lack, or stick a round dot of such a colour on it"
-        )
-    return f"no mark found in {sample.count} of {sample.count} frames (colour {_colour(rig)}{hint}); {advice}"
+    seen = f"no mark found in {sample.count} of {sample.count} frames (colour {_colour(rig)}{hint})"
+    place = where_it_moves([frame.image for frame in sample.frames if frame.image is not None])
+    moves = "nothing is seen to move" if place is None else "something moves around {},{}".format(*place)
+    return f"{seen}; {moves}; {DECLARE_MARK}"
 
 
 def _nothing_measured(status: Sequence[str], sample: Sample, rig: Rig) -> str:
     if set(status) <= {"no_mouth", "undecodable"}:
         return _no_mark(sample, rig)
-    causes = ", ".join(f"{cause} in {k}" for cause, k in Counter(status).most_common())
-    return f"none of {len(status)} frames could be measured: {causes}"
+    return f"none of {len(status)} frames could be measured: {causes_seen(status)}"

@@ -13,6 +13,7 @@ import numpy as np
 from anglecam.data.typing import Flags, Floats
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.detections import Detections
+from anglecam.measurement.what_is_seen import DECLARE_MARK, place_of
 from anglecam.vision.mark.outline_turn import outline_bend, outline_turn
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.status import AMBIGUOUS
@@ -81,8 +82,8 @@ def why_two_alike(status: Sequence[str]) -> str | None:
     if both < _WITH_ANOTHER * len(status):
         return None
     return (
-        f"in {both} of {len(status)} frames two things may be the mark, and after them either may be followed; mark one"
-        " of them, or declare it: mark: {at: [x, y], frame: k} in rig.yaml"
+        f"in {both} of {len(status)} frames two things may be the mark, and after them either may be followed; point"
+        " at a part that only one of them has: mark: {at: [x, y], frame: k} in rig.yaml"
     )
 
 
@@ -106,8 +107,9 @@ def _why_another_later(detections: Detections, ok: Flags, angles: Angles) -> str
         return None
     k = int(jumps[0])
     return (
-        f"from frame {frames[k]} to {frames[k + 1]} the mark turns by {np.degrees(turned[k]):.0f}°, faster than it is"
-        " ever seen to turn, and another thing may be the mark; declare it: mark: {at: [x, y], frame: k} in rig.yaml"
+        f"from frame {frames[k]} to {frames[k + 1]} the mark, {place_of(detections)}, turns by"
+        f" {np.degrees(turned[k]):.0f}°, faster than it is ever seen to turn, and another thing may be the mark;"
+        f" {DECLARE_MARK}"
     )
 
 
@@ -146,15 +148,15 @@ def _why_not_its_line(detections: Detections, ok: Flags, angles: Angles) -> str 
     turned = float(np.std(line))
     if bend > max(MAX_OFF_CIRCLE * turned, FLOOR_PX / (_usual_length(regions)[0] / 2.0)):
         return (
-            f"the mark bends: its outline turns by {np.degrees(bend):.2g}° RMS otherwise than the line to its middle,"
-            f" which turns by {np.degrees(turned):.2g}°; declare another: mark: {{at: [x, y], frame: k}} in rig.yaml"
+            f"the mark {place_of(detections)} bends: its outline turns by {np.degrees(bend):.2g}° RMS otherwise than"
+            f" the line to its middle, which turns by {np.degrees(turned):.2g}°; {DECLARE_MARK}"
         )
     if abs(found[0]) < _OTHER_TURN + PIVOT_SIGMAS * found[1]:
         return None
     return (
-        "the mark reaches over its pivot and turns by another angle than the line to its middle,"
-        f" {1.0 + found[0]:.2g} times as far; to measure its rotation, hint at its pivot: pivot: {{near: [x, y]}} in"
-        " rig.yaml"
+        f"the mark {place_of(detections)} reaches over its pivot and turns by another angle than the line to its"
+        f" middle, {1.0 + found[0]:.2g} times as far; to measure its rotation, hint at its pivot:"
+        " pivot: {near: [x, y]} in rig.yaml"
     )
 
 
@@ -188,8 +190,8 @@ def why_not_rigid(detections: Detections, ok: Flags) -> str | None:
     if least > min(_LEAST_LENGTH * usual, usual - _LENGTH_PX):
         return None
     return (
-        f"the mark is {usual:.0f} px long, but only {least:.0f} px in some frames: something covers a part of it, or it"
-        " is no rigid thing; declare another: mark: {at: [x, y], frame: k} in rig.yaml"
+        f"the mark {place_of(detections)} is {usual:.0f} px long, but only {least:.0f} px are seen of it in some"
+        f" frames; {DECLARE_MARK}"
     )
 
 

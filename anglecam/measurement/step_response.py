@@ -9,7 +9,6 @@ GUM Supplement 1) and the difference that another spline makes.
 from __future__ import annotations
 
 import warnings
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -19,16 +18,12 @@ from scipy.interpolate import UnivariateSpline
 
 from anglecam.data.step_figures import HIGH, LOW, SETTLED, first_crossing, last_rise, settling
 from anglecam.data.typing import Floats
+from anglecam.measurement.rests import Rest, find_rests, gaps_after, resolution
 
-_STILL_SIGMAS, _STILL_SHARE = 3.0, 0.005
-"""Half-width of the band of a rest: multiple of sigma, or share of the clip's range, whichever is larger."""
-_FLAT = 0.5
-"""Share of that half-width by which the means of a rest's three parts may differ."""
-_LEAST_REST_S, _LEAST_REST_FRAMES = 0.1, 5
-_LEAST_WAY = 6.0
-"""Half-widths of that band; a smaller step between two rests is no response."""
-_GAP_FRAMES = 3.5
-"""Frame intervals without a measurement beyond which the motion in between is unknown."""
+_LEAST_WAY = 5.0
+"""Half-widths of the band of a rest; of a smaller step between two rests, 10 % and 90 % are within the noise."""
+_FEWEST = 10
+"""Frames of the shortest series in which a response can be seen."""
 _DRAWS = 100
 _MARGIN_FRAMES = 60
 """Frames of either rest that the spline is fitted to."""
@@ -66,19 +61,11 @@ class Response:
     """Greatest angular speed towards ``to_angle``, rad/s."""
 
 
-@dataclass(frozen=True)
-class _Rest:
-    first: int
-    last: int
-    level: float
-    sigma: float
-
-
 def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[float] = ()) -> tuple[Response, ...]:
     """Find every motion from one rest to another, and its figures.
 
-    A rest is an interval in which the angle stays in a narrow band without curvature or drift, and which lasts at least
-    as long as the rises before and after it. A turning point of a swing and a short pause are not rests. A motion that
+    A rest is an interval in which the angle stays in a narrow band, which no motion beside it goes on through
+    (`anglecam.measurement.rests`), and which lasts at least as long as the rises before and after it. A motion that
     goes beyond its end by more than its height is an excursion: no stable system of second order answers a step so.
 
     Parameters
@@ -102,24 +89,22 @@ def responses(time: Floats, angle: Floats, sigma: Floats, changes: Sequence[floa
     """
     seen = np.isfinite(angle) & np.isfinite(time)
     t, y, s = time[seen], angle[seen], sigma[seen]
-    if len(t) < 2 * _LEAST_REST_FRAMES:
+    if len(t) < _FEWEST:
         return ()
     s = np.where(np.isfinite(s), s, _roughness(y))
-    band = max(_STILL_SIGMAS * float(np.median(s)), _STILL_SHARE * float(np.ptp(y)))
-    rests = _lasting(_distinct(_rests(t, y, s, band), t, y, band), t, y, band)
-    found, frame = [], float(np.median(np.diff(t)))
-    for before, after in pairwise(rests):
+    band, found = resolution(y, s), []
+    for before, after in pairwise(find_rests(t, y, s)):
         # with a delay the angle stays at rest for a while after the change that moves it
         away = np.abs(y[before.last : after.first + 1] - before.level) > 2.0 * band
         leaves = t[before.last + int(np.argmax(away))]
         causes = [c for c in changes if t[before.first] <= c <= leaves]
         again = any(leaves < c < t[after.first] for c in changes)
         if abs(after.level - before.level) >= _LEAST_WAY * band and not again and not _is_excursion(y, before, after):
-            found.append(_response(t, y, s, before, after, causes[-1] if causes else None, frame))
+            found.append(_response(t, y, s, before, after, causes[-1] if causes else None))
     return tuple(found)
 
 
-def _is_excursion(y: Floats, before: _Rest, after: _Rest) -> bool:
+def _is_excursion(y: Floats, before: Rest, after: Rest) -> bool:
     """Return whether the angle between two rests overshoots either by more than 100 % of the way."""
     way = after.level - before.level
     share = (y[before.last : after.first + 1] - before.level) / way
@@ -149,103 +134,7 @@ def _roughness(y: Floats) -> float:
     return max(1.4826 * float(np.median(np.abs(second - np.median(second)))) / np.sqrt(6.0), 1e-9)
 
 
-def _rests(t: Floats, y: Floats, s: Floats, band: float) -> list[_Rest]:
-    """List the flat intervals within ±band, the longest chosen first, in order of time."""
-    frame = float(np.median(np.diff(t)))
-    parts = [_flat_part(y, first, last, band) for first, last in _windows(t, y, band, _GAP_FRAMES * frame)]
-    lasting = [p for p in parts if p[1] - p[0] + 1 >= _LEAST_REST_FRAMES and t[p[1]] - t[p[0]] >= _LEAST_REST_S]
-    taken: list[tuple[int, int]] = []
-    for first, last in sorted(lasting, key=lambda p: t[p[0]] - t[p[1]]):
-        if not any(first <= b and a <= last for a, b in taken):
-            taken.append((first, last))
-    rests = []
-    for first, last in sorted(taken):
-        # its first half may still contain the end of a swing
-        settled = slice((first + last) // 2, last + 1)
-        count = settled.stop - settled.start
-        # a median, because its last frames may belong to the next motion
-        level = float(np.median(y[settled]))
-        scatter = max(1.4826 * float(np.median(np.abs(y[settled] - level))), float(np.median(s[settled])))
-        rests.append(_Rest(first, last, level, scatter * np.sqrt(0.5 * np.pi / count)))
-    return rests
-
-
-def _flat_part(y: Floats, first: int, last: int, band: float) -> tuple[int, int]:
-    """Cut off one end until the rest has neither the curvature of a turning point nor the drift of a slow ramp."""
-    for cut in np.linspace(0.0, 0.75, 13):
-        off = round(cut * (last - first))
-        for a, b in ((first + off, last), (first, last - off)):
-            if b - a + 1 >= _LEAST_REST_FRAMES:
-                thirds = [float(part.mean()) for part in np.array_split(y[a : b + 1], 3)]
-                if np.ptp(thirds) <= _FLAT * band:
-                    return a, b
-    return first, first
-
-
-def _windows(t: Floats, y: Floats, band: float, gap: float) -> list[tuple[int, int]]:
-    """Return the longest intervals of rows in which the angle's range is within 2·band."""
-    windows: list[tuple[int, int]] = []
-    low: deque[int] = deque()
-    high: deque[int] = deque()
-    first = 0
-    for i in range(len(y)):
-        if i and t[i] - t[i - 1] > gap:
-            windows.append((first, i - 1))
-            first = i
-            low.clear()
-            high.clear()
-        while low and y[low[-1]] >= y[i]:
-            low.pop()
-        while high and y[high[-1]] <= y[i]:
-            high.pop()
-        low.append(i)
-        high.append(i)
-        if y[high[0]] - y[low[0]] > 2.0 * band:
-            windows.append((first, i - 1))
-            while y[high[0]] - y[low[0]] > 2.0 * band:
-                first += 1
-                for ends in (low, high):
-                    if ends[0] < first:
-                        ends.popleft()
-    windows.append((first, len(y) - 1))
-    return windows
-
-
-def _distinct(rests: list[_Rest], t: Floats, y: Floats, band: float) -> list[_Rest]:
-    """Of two rests with only the end of a swing between them keep the longer: the other is a turning point."""
-    kept: list[_Rest] = []
-    for rest in rests:
-        kept.append(rest)
-        while len(kept) > 1 and np.ptp(y[kept[-2].first : kept[-1].last + 1]) < _LEAST_WAY * band:
-            del kept[-2 if t[kept[-2].last] - t[kept[-2].first] < t[kept[-1].last] - t[kept[-1].first] else -1]
-    return kept
-
-
-def _lasting(rests: list[_Rest], t: Floats, y: Floats, band: float) -> list[_Rest]:
-    """Remove pauses: an interval shorter than the rise before or after it is no rest."""
-    while len(rests) > 1:
-        rises = [_rough_rise(t, y, a, b, band) for a, b in pairwise(rests)]
-        neighbours = [max(pair) for pair in pairwise([0.0, *rises, 0.0])]
-        lasting = [(t[r.last] - t[r.first]) / max(rise, 1e-9) for r, rise in zip(rests, neighbours, strict=True)]
-        if min(lasting) >= 1.0:
-            break
-        del rests[int(np.argmin(lasting))]
-    return rests
-
-
-def _rough_rise(t: Floats, y: Floats, before: _Rest, after: _Rest, band: float) -> float:
-    rows = slice(before.last, after.first + 1)
-    way = after.level - before.level
-    if abs(way) < 2.0 * band:
-        # out and back: neither rise can be longer than half the interval
-        return 0.5 * float(t[after.first] - t[before.last])
-    share = (y[rows] - before.level) / way
-    return first_crossing(t[rows], share, HIGH) - first_crossing(t[rows], share, LOW)
-
-
-def _response(
-    t: Floats, y: Floats, s: Floats, before: _Rest, after: _Rest, begun: float | None, frame: float
-) -> Response:
+def _response(t: Floats, y: Floats, s: Floats, before: Rest, after: Rest, begun: float | None) -> Response:
     rows = slice(max(before.first, before.last - _MARGIN_FRAMES), min(after.last, after.first + _MARGIN_FRAMES) + 1)
     t, y, s = t[rows], y[rows], s[rows]
     grid = np.interp(np.arange((len(t) - 1) * _PER_FRAME + 1) / _PER_FRAME, np.arange(len(t)), t)
@@ -274,8 +163,7 @@ def _response(
     # smoothing slows a rise: the bias of smoothing the curve a second time estimates that of the first
     sigma = np.sqrt(drawn.var(axis=0) + (drawn.mean(axis=0) - figures) ** 2 + interpolation**2)
     start, low, high, settled = figures[:4]
-    gaps = np.flatnonzero(np.diff(t) > _GAP_FRAMES * frame)
-    blind = [(t[g], t[g + 1]) for g in gaps]
+    blind = [(t[g], t[g + 1]) for g in gaps_after(t)]
 
     def figure(value: float, error: float, needs: Sequence[float], whole: bool = False) -> Figure:
         ends = min(needs), max(needs)

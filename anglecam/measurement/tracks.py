@@ -28,6 +28,7 @@ from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.measurement.sigma import PlaceErrors
 from anglecam.measurement.trust import why_few
 from anglecam.video.film import Film
+from anglecam.video.film_rows import ends_before, why_short
 from anglecam.vision.pivot.estimate import PivotEstimate
 
 _SHORTEST_PX = 1.0
@@ -51,7 +52,7 @@ class MeasuredTracks:
     notes: tuple[str, ...]
     """Messages to the user, a line each."""
     truncated: str | None = None
-    """How much of the film could be read, where it ends too early."""
+    """How many frames there are, where they end before the last that is wanted."""
     few: str | None = None
     """Message where less than the required share of the frames is measured."""
 
@@ -140,7 +141,8 @@ def measure_tracks(path: Path, rig: Rig, command: Command | None = None, *, film
     series = series_of_angles(recording_name(path), time, status, ok, angles, mark, shown, rig, evidence)
     zero = why_zero_is_elsewhere(rig, command, time[ok])
     notes = (*points.notes, *([zero] if zero else []))
-    return MeasuredTracks(series, angles, points.by, notes, few=why_few(series.status, rig.least_measured))
+    short = why_short(rig.frames.last, (rig.frames.first or 0) + len(time))
+    return MeasuredTracks(series, angles, points.by, notes, short, why_few(series.status, rig.least_measured))
 
 
 def _read_points(path: Path, rig: Rig, film: Film | None) -> tuple[RigKeypoints, _Points]:
@@ -155,6 +157,8 @@ def _read_points(path: Path, rig: Rig, film: Film | None) -> tuple[RigKeypoints,
     pair = choose_pair(tracks, marks.mouth, marks.pivot, least)
     first = rig.frames.first or 0
     wanted = slice(first, None if rig.frames.last is None else rig.frames.last + 1)
+    if len(pair.mark_px) <= first:
+        raise ends_before(path, first, len(pair.mark_px))
     mark, pivot = pair.mark_px[wanted], pair.pivot_px[wanted]
     rows = len(mark)
     both = int(np.isfinite(mark + pivot).all(axis=1).sum())

@@ -8,7 +8,6 @@ thing near it is no proof of a pivot: then somebody has to declare the pivot.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,6 +19,7 @@ from anglecam.measurement.angles import Angles
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.one_rigid_mark import FLOOR_PX, MAX_OFF_CIRCLE, PIVOT_SIGMAS, why_not_one_mark
 from anglecam.measurement.pivot import HINT_PX
+from anglecam.measurement.what_is_seen import DECLARE_MARK, causes_seen, place_of
 from anglecam.vision.pivot.circle import Circle
 
 _MAX_SCALE_SIGMA = 0.2
@@ -57,7 +57,7 @@ def why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig)
     if detections.moves and lost > (1.0 - rig.least_measured) * len(ok):
         return (
             f"in {lost} of {len(ok)} frames the mark is not found where a rotation about a fixed pivot would carry it;"
-            " it moves otherwise, or is another thing in the other frames"
+            f" in the others it is {place_of(detections)}; {DECLARE_MARK}"
         )
     travelled = travel(angles.mark_px)
     at_rest = not detections.moves or travelled < _TRAVEL_PX
@@ -72,8 +72,8 @@ def why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig)
         return otherwise
     if not declared and not seen_to_turn and not shows_its_centre(detections.circle):
         return (
-            "the mark's path is too short or too straight to show about which point it turns; hint at it: pivot: {near:"
-            f" [x, y]}}, or declare it: {_DECLARE}"
+            f"the mark's path {place_of(detections)} is too short or too straight to show about which point it turns;"
+            " hint at that point: pivot: {near: [x, y]} in rig.yaml"
         )
     return None
 
@@ -96,9 +96,8 @@ def why_few(status: Sequence[str], least: float) -> str | None:
     measured = sum(s == OK for s in status)
     if measured >= least * len(status):
         return None
-    causes = ", ".join(f"{cause} in {k}" for cause, k in Counter(s for s in status if s != OK).most_common())
     return (
-        f"only {measured} of {len(status)} frames are measured ({causes}), less than a share of {least:g};"
+        f"only {measured} of {len(status)} frames are measured ({causes_seen(status)}), less than a share of {least:g};"
         " to accept fewer, declare least_measured: in rig.yaml"
     )
 
@@ -131,8 +130,8 @@ def why_off_circle(detections: Detections, angles: Angles) -> str | None:
     if off <= max(MAX_OFF_CIRCLE * travelled, FLOOR_PX):
         return None
     return (
-        f"what moves does not turn about a fixed pivot: its distance from the centre varies by {off:.2g} px RMS"
-        f" while it travels {travelled:.2g} px RMS"
+        f"what moves {place_of(detections)} does not turn about a fixed pivot: its distance from the centre varies by"
+        f" {off:.2g} px RMS while it travels {travelled:.2g} px RMS; {DECLARE_MARK}"
     )
 
 
@@ -166,7 +165,7 @@ def why_elsewhere(detections: Detections, rig: Rig) -> str | None:
     expected = "{:g}, {:g}".format(*rig.pivot.near)
     return (
         f"what moves turns about {x:.0f},{y:.0f}, {np.hypot(*off):.0f} px from the hint pivot: {{near: [{expected}]}};"
-        " is another thing meant? Declare it: mark: {at: [x, y], frame: k} in rig.yaml"
+        f" {DECLARE_MARK}"
     )
 
 
@@ -195,8 +194,7 @@ def why_still(detections: Detections, ok: Flags, rig: Rig) -> str | None:
         return None
     x, y = detections.lens.distort(np.median(places, axis=0))
     return (
-        f"the declared mark stands still: around {x:.0f},{y:.0f} it travels {travel(places):.2g} px RMS;"
-        " declare what turns: mark: {at: [x, y], frame: k} in rig.yaml"
+        f"the declared mark stands still: around {x:.0f},{y:.0f} it travels {travel(places):.2g} px RMS; {DECLARE_MARK}"
     )
 
 
@@ -222,9 +220,8 @@ def why_unproven(detections: Detections, *, hand_held: bool) -> str | None:
     if detections.body is not None or shows_its_centre(detections.circle) or (detections.clear and not hand_held):
         return None
     places = np.array([r.centre_px for r in detections.regions if r is not None])
-    x, y = detections.lens.distort(np.median(places, axis=0))
     travelled = (
-        f"what is followed, around {x:.0f},{y:.0f}, travels {travel(places):.2g} px RMS, too little to show that it "
+        f"what is followed, {place_of(detections)}, travels {travel(places):.2g} px RMS, too little to show that it "
         "turns about the pivot"
     )
     if detections.clear:
@@ -232,10 +229,7 @@ def why_unproven(detections: Detections, *, hand_held: bool) -> str | None:
             f"{travelled}, and before a camera in the hand all things out of the plane that is held still seem to "
             "move; film it with a camera at rest"
         )
-    return (
-        f"{travelled}, and another thing moves nearly as much: nothing shows that it is the mark; declare it: "
-        "mark: {at: [x, y], frame: k} in rig.yaml"
-    )
+    return f"{travelled}, and another thing moves nearly as much: nothing shows that it is the mark; {DECLARE_MARK}"
 
 
 def travel(mark_px: Floats) -> float:

@@ -20,7 +20,7 @@ from anglecam.progress import Progress, counted
 from anglecam.threads import native_threads
 from anglecam.video.decode import Row
 from anglecam.video.display import Display
-from anglecam.video.film_rows import FilmRows, first_of_each
+from anglecam.video.film_rows import FilmRows, first_of_each, why_short
 from anglecam.video.picture import Picture
 from anglecam.video.read_ahead import read_ahead
 
@@ -226,11 +226,12 @@ class Film:
         return replace(self, rows=FilmRows(self.path, lambda wants: iter(rows)))
 
     def why_truncated(self, sample: Sample) -> str | None:
-        """Return how much could be read of a file that ends too early, ``None`` for a complete one."""
-        last = self.rows.wanted.last
+        """Return how much could be read of a film that ends before its last wanted frame; ``None`` for another."""
+        end = self.first_frame + sample.count
+        short = why_short(self.rows.wanted.last, end)
         if not self.cut_short or 0 < self.declared_frames <= sample.decoded:
-            return None
-        if last is not None and sample.count == last - self.first_frame + 1:
+            return short
+        if self.rows.wanted.last is not None and short is None:
             return None
         of = f" of {self.declared_frames}" if self.declared_frames else ""
         return f"truncated: {sample.decoded}{of} frames could be read"

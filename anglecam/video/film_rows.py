@@ -268,8 +268,33 @@ def ends_before(path: Path, first: int, count: int) -> InputError:
     count : int
         Number of frames that the film has.
     """
-    ends = f"it ends before frame {first}, the first that is wanted"
-    return InputError(f"{path}: {ends}; it has {count} frames, numbered from 0")
+    return InputError(f"{path}: {frames_there_are(count)}; frame {first} was asked for as the first (--from, frames:)")
+
+
+def frames_there_are(count: int) -> str:
+    """Return how many frames a film has, and how they are numbered.
+
+    Examples
+    --------
+    >>> frames_there_are(305)
+    'the film has 305 frames, numbered from 0 to 304'
+    """
+    return f"the film has {count} frames, numbered from 0 to {count - 1}"
+
+
+def why_short(last: int | None, count: int) -> str | None:
+    """Return a message where a film ends before the last frame that is wanted.
+
+    Parameters
+    ----------
+    last : int, optional
+        Number of that frame.
+    count : int
+        Number of frames that the film has.
+    """
+    if last is None or last < count:
+        return None
+    return f"{frames_there_are(count)}; frame {last} was asked for as the last (--to, frames:)"
 
 
 def first_of_each(stride: int, rows: Sequence[tuple[int, Row]]) -> list[tuple[int, Row]]:

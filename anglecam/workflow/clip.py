@@ -109,25 +109,7 @@ def measure_source(source: Source, *, progress: Progress = unseen) -> Measuremen
     with blame(source.path):
         if source.is_tracks or source.film is None:
             return measure_tracks(source.path, source.rig, source.command, film=source.film)
-        try:
-            return measure_clip(source.film, source.rig, source.command, progress=progress)
-        except InputError as problem:
-            if isinstance(problem.__cause__, OSError):  # the file is at fault, and not what it shows
-                raise
-            raise InputError(f"{problem}{_what_would_mend(str(problem))}") from problem
-
-
-def _what_would_mend(cause: str) -> str:
-    """Return what would mend a clip that cannot be measured, where its message does not say so."""
-    says_so = "rig.yaml" in cause or "; film " in cause
-    faults = ("cannot be", "be decoded", "no frames", "no such", "truncated", "it ends before")
-    of_the_file = any(words in cause for words in faults)
-    if says_so or of_the_file:
-        return ""
-    return (
-        "; film it with a mark in a colour that nothing else has, from a fixed camera, and choose frames in which it"
-        " moves (--from K)"
-    )
+        return measure_clip(source.film, source.rig, source.command, progress=progress)
 
 
 def write_measurement(

@@ -84,7 +84,16 @@ def test_the_rig_files_range_holds_and_the_command_line_overrides_it(clip, tmp_p
 @pytest.mark.parametrize(
     ("range_", "code", "cause"),
     [
-        (("--from", 60), 1, "swing.mkv: it ends before frame 60, the first that is wanted; it has 60 frames"),
+        (
+            ("--from", 60),
+            1,
+            "swing.mkv: the film has 60 frames, numbered from 0 to 59; frame 60 was asked for as the first",
+        ),
+        (
+            ("--to", 60),
+            1,
+            "swing.mkv: the film has 60 frames, numbered from 0 to 59; frame 60 was asked for as the last",
+        ),
         (("--from", 30, "--to", 20), 2, "no frame lies from 30 to 20"),
         (("--from", -1), 2, "--from"),
     ],
@@ -95,6 +104,15 @@ def test_a_range_without_frames_is_one_line(clip, tmp_path, status, range_, code
     assert cause in told
     assert "film it with" not in told
     assert "Traceback" not in told
+
+
+@pytest.mark.parametrize(("key", "asked"), [("from", "the first"), ("to", "the last")])
+def test_a_frame_of_the_rig_that_the_film_does_not_have_is_one_line(clip, tmp_path, status, key, asked):
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(f"frames: {{{key}: 400}}")
+    found, told = status("measure", clip, "--rig", rig, "--out", tmp_path)
+    assert found == 1
+    assert f"60 frames, numbered from 0 to 59; frame 400 was asked for as {asked}" in told
 
 
 @pytest.mark.parametrize(

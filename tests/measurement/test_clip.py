@@ -170,16 +170,40 @@ def test_a_clip_at_rest_is_measured_beside_a_larger_red_mug(tmp_path):
     assert np.degrees(np.abs(measured.series.angle)).max() < 0.01
 
 
-@pytest.mark.parametrize("by", ["colour", "place"])
-def test_a_declared_mark_that_stands_still_is_no_success(tmp_path, by):
+@pytest.mark.parametrize("pivot", ["near", "at"])
+@pytest.mark.parametrize("by", ["colour", "place", "box"])
+def test_a_declared_mark_that_stands_still_is_no_success(tmp_path, by, pivot):
     look = Look(lever_px=200.0)
     (x, y) = look.mouth(np.zeros(1))[0].tolist()
-    mouth = RigMark(rgb=look.lips_rgb) if by == "colour" else RigMark(at=(x, y), frame=3)
-    doubt = measure_clip(open_film(_film(tmp_path, look, np.zeros(30))), rig_of(look, mouth=mouth)).doubt
+    marks = {
+        "colour": RigMark(rgb=look.lips_rgb),
+        "place": RigMark(at=(x, y), frame=3),
+        "box": RigMark(box=(x - 3.0, y - 3.0, x + 3.0, y + 3.0), frame=3),
+    }
+    declared = RigPivot.model_validate({pivot: tuple(look.pivot)})
+    rig = rig_of(look, mouth=marks[by], pivot=declared)
+    doubt = measure_clip(open_film(_film(tmp_path, look, np.zeros(30))), rig).doubt
     assert doubt is not None
     place = re.search(r"the declared mark stands still: around (\d+),(\d+) it travels 0\.\d+ px", doubt)
     assert place is not None
     assert np.hypot(int(place[1]) - x, int(place[2]) - y) < 2.0
+
+
+@pytest.mark.parametrize("by", ["colour", "place", "box"])
+def test_a_declared_mark_that_stands_still_without_a_pivot_is_refused(tmp_path, by):
+    look = Look(lever_px=200.0)
+    (x, y) = look.mouth(np.zeros(1))[0].tolist()
+    marks = {
+        "colour": RigMark(rgb=look.lips_rgb),
+        "place": RigMark(at=(x, y), frame=3),
+        "box": RigMark(box=(x - 3.0, y - 3.0, x + 3.0, y + 3.0), frame=3),
+    }
+    try:
+        doubt = measure_clip(open_film(_film(tmp_path, look, np.zeros(30))), Rig(mouth=marks[by])).doubt
+    except InputError as refused:
+        doubt = str(refused)
+    assert doubt is not None
+    assert re.search("stands still|nothing is seen to turn", doubt)
 
 
 @pytest.mark.parametrize("rgb", [(225, 62, 70), pytest.param((150, 20, 20), marks=pytest.mark.sweep)])
@@ -236,7 +260,9 @@ def test_a_clip_without_the_declared_mouth_is_one_line_with_counts_and_colour(tm
     clip = broken.clip_without_mouth(tmp_path)
     with pytest.raises(InputError) as error:
         measure_clip(open_film(clip), Rig(mouth=RigMark(rgb=(190, 35, 40))))
-    assert str(error.value) == f"{clip}: no mark found in 30 of 30 frames (colour 190,35,40); is it in the picture?"
+    told = f"{clip}: no mark found in 30 of 30 frames (colour 190,35,40); something moves around "
+    assert str(error.value).startswith(told)
+    assert str(error.value).endswith("; point at what turns: mark: {at: [x, y], frame: k} in rig.yaml")
 
 
 @pytest.mark.sweep  # `tests/check/test_films.py` has a smaller one, refused in the same words

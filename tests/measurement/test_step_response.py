@@ -144,16 +144,90 @@ def test_no_response_is_invented(motion, sigma_deg):
         assert responses(time, np.radians(angle), np.full(len(time), np.radians(sigma_deg))) == ()
 
 
-def test_two_sines_are_no_steps():
-    found = []
-    for seed in range(30):
+def sines(count):
+    def motion(rng, t):
+        return sum(
+            rng.uniform(1, 20) * np.sin(2 * np.pi * rng.uniform(0.1, 2) * t + rng.uniform(0, 6.28))
+            for _ in range(count)
+        )
+
+    return motion
+
+
+def harmonics(rng, t):
+    f = rng.uniform(0.1, 1.0)
+    second = rng.uniform(0, 0.5) * np.sin(2 * np.pi * rng.choice([2, 3]) * f * t + rng.uniform(0, 6.28))
+    return rng.uniform(5, 20) * (np.sin(2 * np.pi * f * t) + second)
+
+
+def chirp(rng, t):
+    begins, ends = rng.uniform(0.05, 3, 2)
+    return rng.uniform(3, 20) * np.sin(2 * np.pi * (begins * t + (ends - begins) * t**2 / 2 / t[-1]))
+
+
+def free_decay(rng, t):
+    omega = rng.uniform(2, 15)
+    return rng.uniform(3, 30) * np.exp(-rng.uniform(0.005, 0.2) * omega * t) * np.cos(omega * t + rng.uniform(0, 6.28))
+
+
+def random_walk(rng, t):
+    return rng.uniform(0.1, 10) * np.sqrt(np.median(np.diff(t))) * np.cumsum(rng.standard_normal(len(t)))
+
+
+def needle(rng, t):
+    at, wide = rng.uniform(0.3, 0.7) * t[-1], rng.uniform(0.05, 0.1) * t[-1]
+    away = rng.uniform(5, 30) * np.exp(-(((t - at) / wide) ** 2))
+    return away + rng.uniform(0, 2) / (1 + np.exp(-3 * (t - at) / wide))
+
+
+def ramp(rng, t):
+    return rng.uniform(-30, 30) * t + rng.uniform(0, 1) * t**2
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [sines(2), sines(3), sines(5), harmonics, chirp, free_decay, random_walk, needle, ramp],
+    ids=["two sines", "three sines", "five sines", "harmonics", "chirp", "free decay", "walk", "needle", "ramp"],
+)
+def test_a_motion_without_steps_has_none_in_all_but_one_of_a_hundred_films(motion):
+    films = 0
+    for seed in range(100):
         rng = np.random.default_rng(seed)
-        time = np.arange(0.0, rng.uniform(3.0, 12.0), 1.0 / rng.choice([15, 30, 60]))
-        sines = zip(rng.uniform(2.0, 20.0, 2), rng.uniform(0.2, 1.5, 2), rng.uniform(0.0, 6.28, 2), strict=True)
-        angle = sum(size * np.sin(2.0 * np.pi * f * time + phase) for size, f, phase in sines)
-        angle = angle + noise(rng, len(time), 0.02)
-        found += responses(time, np.radians(angle), np.full(len(time), np.radians(0.02)))
-    assert found == []
+        time = np.arange(0.0, rng.uniform(3, 15), 1 / rng.choice([15, 30, 60, 120]))
+        sigma = float(rng.choice([0.002, 0.02, 0.1, 0.5]))
+        angle = motion(rng, time) + noise(rng, len(time), sigma)
+        films += bool(responses(time, np.radians(angle), np.full(len(time), np.radians(sigma))))
+    assert films <= 1
+
+
+def staircase(rng, kind):
+    """Return steps of a servo with a delay: time, angle, sigma, and the times of the commands and the heights."""
+    zeta = rng.uniform(0.05, 0.3) if kind == "ringing" else rng.uniform(0.3, 0.95)
+    omega, late, count = rng.uniform(8, 30), rng.uniform(0, 0.1), rng.integers(1, 6)
+    each = 4.5 / (zeta * omega) * rng.uniform(1.5, 4) + rng.uniform(0.3, 1.5)
+    commands = rng.uniform(0.5, 1.3) + each * np.arange(count)
+    time = np.arange(0, commands[-1] + each, 1 / rng.choice([30, 60, 120]))
+    heights = rng.uniform(3, 30, count) * rng.choice([-1, 1], count)
+    sigma, angle = float(rng.choice([0.002, 0.02, 0.1])), np.zeros(len(time))
+    for command, height in zip(commands, heights, strict=True):
+        since = time - command - late
+        angle += height * step_response(since, omega, zeta)
+        if kind == "creeping":
+            angle += 0.05 * height * (1 - np.exp(-np.maximum(since, 0) / (0.2 * each)))
+    return time, angle + noise(rng, len(time), sigma), sigma, commands, heights
+
+
+@pytest.mark.parametrize("kind", ["damped", "ringing", "creeping"])
+def test_steps_of_a_servo_are_found_each_with_its_height(kind):
+    missed = asked = 0
+    for seed in range(15):
+        time, angle, sigma, commands, heights = staircase(np.random.default_rng(seed), kind)
+        found = responses(time, np.radians(angle), np.full(len(time), np.radians(sigma)), tuple(commands))
+        seen = {one.start.value: np.degrees(one.to_angle.value - one.from_angle.value) for one in found}
+        asked += len(commands)
+        missed += sum(abs(seen.get(c, 0.0) / h - 1) > 0.07 for c, h in zip(commands, heights, strict=True))
+        assert set(seen) <= set(commands)
+    assert missed <= 0.02 * asked
 
 
 def test_an_excursion_that_ends_elsewhere_is_no_step():

@@ -119,7 +119,9 @@ def test_few_measured_frames_are_counted_with_their_causes():
     assert why_few(status, 0.45) is None
     message = why_few(status, 0.5)
     assert message is not None
-    assert message.startswith("only 9 of 20 frames are measured (occluded in 6, no_mouth in 5)")
+    assert message.startswith(
+        "only 9 of 20 frames are measured (what is seen looks otherwise in 6, nothing like it is seen in 5)"
+    )
 
 
 def test_a_hint_away_from_the_point_that_the_motion_shows_is_no_success(tmp_path):

@@ -269,7 +269,7 @@ def test_a_range_has_its_frames_at_their_times_in_the_film(decoder, monkeypatch,
 def test_a_film_that_ends_before_the_range_says_so_at_every_reading(decoder):
     film = new_film(decoder, **{"from": 12})
     for _ in range(2):
-        with pytest.raises(InputError, match="it ends before frame 12"):
+        with pytest.raises(InputError, match="frame 12 was asked for as the first"):
             list(film.frames())
 
 
