@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from anglecam.data.series import AngleSeries
 from anglecam.identification.identified import Identified
@@ -12,12 +13,18 @@ from anglecam.io.rig import Rig, read_rig
 from anglecam.io.session import read_session
 from anglecam.io.yaml_schema import validate
 from anglecam.loop.verdict import Verdict
+from anglecam.measurement.clip import Measurement
 from anglecam.neck.large_angle import LargeAngleNeck
 from anglecam.workflow.clip import measure_source, open_source
 from anglecam.workflow.session import close_session, identify_session, measure_session
 
 
-def measure(clip: str | Path, rig: Rig | Mapping[str, Any] | str | Path | None = None) -> AngleSeries:
+def measure(
+    clip: str | Path,
+    rig: Rig | Mapping[str, Any] | str | Path | None = None,
+    *,
+    bodies: Literal["first", "all"] = "first",
+) -> AngleSeries:
     """Measure the angle in every frame of a clip, or of tracks of points in its place.
 
     Parameters
@@ -27,11 +34,13 @@ def measure(clip: str | Path, rig: Rig | Mapping[str, Any] | str | Path | None =
     rig : Rig, mapping or path, optional
         In place of that ``rig.yaml``: a `Rig`, the keys of such a file, or another such file. Angles in it are degrees,
         as their names say.
+    bodies : {'first', 'all'}
+        ``all``: look for all bodies that move in a film, and measure those that turn.
 
     Returns
     -------
     AngleSeries
-        A row a frame, radians.
+        A row a frame, radians. Its ``bodies`` are what moves in the film, each with its series if it was measured.
 
     Raises
     ------
@@ -54,7 +63,8 @@ def measure(clip: str | Path, rig: Rig | Mapping[str, Any] | str | Path | None =
     >>> len(last_second.time)
     30
     """
-    return measure_source(open_source(Path(clip), _rig(rig))).series
+    measured = measure_source(open_source(Path(clip), _rig(rig)), every_body=bodies == "all")
+    return replace(measured.series, bodies=measured.bodies) if isinstance(measured, Measurement) else measured.series
 
 
 def _rig(rig: Rig | Mapping[str, Any] | str | Path | None) -> Rig | None:

@@ -6,6 +6,7 @@ What is wrong with a call is found before the modules that measure are loaded, w
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,6 +40,13 @@ if TYPE_CHECKING:
     from anglecam.workflow.clip import Source
 
 
+class Bodies(StrEnum):
+    """Which of the bodies that move in a film are measured."""
+
+    first = "first"
+    all = "all"
+
+
 def measure(
     clips: Annotated[
         list[Path],
@@ -49,6 +57,9 @@ def measure(
     first: FirstFrame = None,
     last: LastFrame = None,
     overlay: Annotated[bool, typer.Option("--overlay", help="Also write NAME.overlay.mp4.")] = False,
+    bodies: Annotated[
+        Bodies, typer.Option("--bodies", help="all: also find and measure what else turns, NAME.b2.angles.csv, ….")
+    ] = Bodies.first,
     also: Annotated[
         list[Also] | None, typer.Option("--also", help="Also write NAME.angles.nc or .parquet; repeatable.")
     ] = None,
@@ -67,7 +78,7 @@ def measure(
 
         def measure_one(files: ClipFiles, progress: Progress) -> Measurement | MeasuredTracks:
             source = open_files(files)
-            measurement = _measure(source, progress)
+            measurement = _measure(source, progress, every_body=bodies is Bodies.all)
             name = measurement.series.name
             progress(Stage("writing the series and its plot"))
             answers = write_measurement(measurement, source.command, out, also or ())
@@ -245,10 +256,10 @@ def _clips_and_tracks(folder: Path, rig: Rig | None) -> list[Path]:
     return found
 
 
-def _measure(source: Source, progress: Progress) -> Measurement | MeasuredTracks:
+def _measure(source: Source, progress: Progress, *, every_body: bool = False) -> Measurement | MeasuredTracks:
     from anglecam.workflow.clip import measure_source
 
-    measurement = measure_source(source, progress=progress)
+    measurement = measure_source(source, progress=progress, every_body=every_body)
     for note in measurement.notes:
         screen.print(printable(f"{source.path}: {note}"), soft_wrap=True, highlight=False, markup=False)
     return measurement

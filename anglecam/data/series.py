@@ -97,6 +97,8 @@ class AngleSeries:
     """Part of ``sigma`` that differs from frame to frame, rad; the rest, in squares, is common to all frames."""
     derivatives: Derivatives | None = None
     """Velocity and acceleration; ``None`` in a series from a file without them, or without a stated sigma."""
+    bodies: tuple[Body, ...] = field(default=(), repr=False)
+    """What moves in the film, this series' body first; empty where nobody looked."""
     evidence: CameraEvidence = NO_EVIDENCE
     """Evidence of the film besides the angle; empty for a series without a film."""
 
@@ -223,3 +225,28 @@ class AngleSeries:
                 ["median standard uncertainty", f"{sigma:.2g}°" if np.isfinite(sigma) else "not stated"],
             ]
         return html_table(self.name, ["", ""], rows) + html_curve(self.time, self.angle, "angle over time")
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body that moves in a film."""
+
+    number: int
+    """From 1, the body that is measured first."""
+    pivot_px: tuple[float, float] | None
+    """About where it turns, px; of a joint its place in the median pose of the body that carries it. ``None`` for a
+    body that does not turn."""
+    joint_to: int | None
+    """Number of the body that carries its pivot; ``None`` for a pivot at rest."""
+    extent_px: float
+    """Root mean square distance of its pixels from their middle, px."""
+    amplitude: float
+    """Half the range of its angle in the film, rad."""
+    posterior: float
+    """Probability that it predicts the film better than its rivals; see `anglecam.engine.every_body.probability`."""
+    moves: str
+    """``turns``, ``translates`` or ``otherwise``."""
+    series: AngleSeries | None = field(default=None, repr=False)
+    """Its angle in every frame; ``None`` where it was not measured."""
+    relative: Floats | None = field(default=None, repr=False)
+    """(n,) its angle less that of the body that carries its pivot, rad; ``None`` without either of them."""

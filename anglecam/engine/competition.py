@@ -66,7 +66,7 @@ def compete(sample: Sample, proposals: Sequence[Proposal]) -> list[Explanation]:
     still = score(small, NOTHING, [None] * len(small.pictures))
     rough: list[tuple[Score, Proposal]] = []
     for proposal in proposals:
-        fit = refine(small, _every_other(proposal), 1)
+        fit = refine(small, proposal.every_other(), 1)
         if fit is not None:
             better = replace(proposal, centre_px=fit.proposal.centre_px, turn=_all_turns(proposal, fit))
             rough.append((score(small, proposal.name, fit.proposal.poses(small)), better))
@@ -94,10 +94,6 @@ def halved(sample: Sample) -> Sample:
     )
 
 
-def _every_other(proposal: Proposal) -> Proposal:
-    return replace(proposal, turn=proposal.turn[::2])
-
-
 def _all_turns(proposal: Proposal, fit: Fit) -> Floats:
     """Return the turns of a proposal with those of every other frame as they were fitted."""
     turn, fitted = proposal.turn.copy(), fit.proposal.turn
@@ -109,14 +105,13 @@ def _all_turns(proposal: Proposal, fit: Fit) -> Floats:
 
 def _alike(sample: Sample, one: Proposal, other: Proposal) -> bool:
     """Return whether two proposals move what turns about the first one's centre to the same places."""
-    both = np.isfinite(one.turn) & np.isfinite(other.turn)
+    both = np.isfinite(one.in_film() + other.in_film()).all(axis=(1, 2))
     if both.sum() < 4:
         return False
+    seen = [replace(p, turn=np.where(both, p.turn, np.nan)) for p in (one, other)]
     height, width = sample.pictures.shape[1:]
     corners = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]]) * [width, height]
-    first, second = (
-        np.stack([turned(sample.place(p.centre_px), float(t)) for t in p.turn[both]]) for p in (one, other)
-    )
+    first, second = (np.stack([pose for pose in p.poses(sample) if pose is not None]) for p in seen)
     base = np.median(one.turn[both] - other.turn[both])
     back = turned(sample.place(other.centre_px), float(base))
     placed = corners @ first[:, :, :2].swapaxes(1, 2) + first[:, None, :, 2]
@@ -125,7 +120,11 @@ def _alike(sample: Sample, one: Proposal, other: Proposal) -> bool:
 
 
 def _sliding(sample: Sample, fit: Fit) -> Score:
-    """Return the score of the same body where its middle moves on a straight line, as far as it does, unturned."""
+    return score(sample, "slides", sliding_poses(sample, fit))
+
+
+def sliding_poses(sample: Sample, fit: Fit) -> list[Floats | None]:
+    """Return the (2, 3) poses of a body whose middle moves on a straight line, as far as it does, unturned."""
     poses = fit.proposal.poses(sample)
     rows, columns = np.nonzero(fit.target.visibility)
     middle = np.array([columns.mean(), rows.mean()]) - fit.target.pad
@@ -134,4 +133,4 @@ def _sliding(sample: Sample, fit: Fit) -> Score:
     mean = shifts[known].mean(axis=0)
     axis = np.linalg.svd(shifts[known] - mean)[2][0]
     straight = mean + ((shifts - mean) @ axis)[:, None] * axis
-    return score(sample, "slides", [turned(middle, 0.0, one) if np.isfinite(one).all() else None for one in straight])
+    return [turned(middle, 0.0, one) if np.isfinite(one).all() else None for one in straight]

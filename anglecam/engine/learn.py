@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 from anglecam.data.typing import Floats
 from anglecam.engine.competition import Explanation, compete
 from anglecam.engine.proposals import blobs, features, polar
+from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample, Stills, sample_part, sample_stills
 from anglecam.engine.score import Proposal
 from anglecam.engine.target import turned
@@ -47,7 +48,9 @@ class Learnt:
 
     sample: Sample
     explanations: tuple[Explanation, ...]
-    """Of the sample; the first is the most probable one that obeys the hints."""
+    """The first, of the sample, is the most probable one that obeys the hints."""
+    wider: Sample | None = None
+    """That of the explanations after the first, where the first is seen closer."""
 
     @property
     def turns(self) -> bool:
@@ -89,11 +92,11 @@ def _explained(sample: Sample, stills: Stills, hints: Hints) -> Learnt:
     found = sorted(compete(sample, proposals), key=lambda one: _rank(Learnt(sample, (one,)), hints))
     if not found:
         return Learnt(sample, ())
-    closer = sample_part(stills, _swept(sample, found[0]))
+    closer = sample_part(stills, swept(sample, found[0].fit))
     if closer is not None and closer.scale > _CLOSER * sample.scale:
-        again = compete(closer, [_in_frames(found[0].fit.proposal, sample, closer)])
+        again = compete(closer, [found[0].fit.proposal.in_frames(sample.frames, closer.frames)])
         if again and (again[0].turns or not found[0].turns):
-            return Learnt(closer, (again[0], *found[1:]))
+            return Learnt(closer, (again[0], *found[1:]), sample)
     return Learnt(sample, tuple(found))
 
 
@@ -136,19 +139,12 @@ _BESIDE_PX = 3.0
 """Of the sample: by which a place that is pointed at may lie beside the body."""
 
 
-def _swept(sample: Sample, one: Explanation) -> Floats:
+def swept(sample: Sample, fit: Fit) -> Floats:
     """Return left, top, right, bottom of what a body covers in the frames, with a margin, px of the film."""
-    rows, columns = np.nonzero(one.fit.target.visibility)
-    places = np.column_stack([columns, rows]) - float(one.fit.target.pad)
-    centre = sample.place(one.fit.proposal.centre_px)
-    poses = [turned(centre, float(turn)) for turn in one.fit.proposal.turn[one.fit.seen]]
+    rows, columns = np.nonzero(fit.target.visibility)
+    places = np.column_stack([columns, rows]) - float(fit.target.pad)
+    poses = [pose for pose in fit.proposal.poses(sample) if pose is not None]
     low = np.min([(places @ pose[:, :2].T + pose[:, 2]).min(axis=0) for pose in poses], axis=0)
     high = np.max([(places @ pose[:, :2].T + pose[:, 2]).max(axis=0) for pose in poses], axis=0)
     margin = max(4.0, _MARGIN * float((high - low).max()))
     return np.concatenate([sample.in_film(low - margin), sample.in_film(high + margin)])
-
-
-def _in_frames(one: Proposal, sample: Sample, other: Sample) -> Proposal:
-    """Return a proposal for a sample as one for another sample of the film."""
-    turn = dict(zip(sample.frames.tolist(), one.turn, strict=True))
-    return Proposal(one.name, one.centre_px, np.array([turn.get(k, np.nan) for k in other.frames.tolist()]))

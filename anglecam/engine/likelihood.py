@@ -2,7 +2,8 @@
 
     L(pose) = Σᵢ log p(picture(xᵢ) | body's pixel i) − log p(picture(xᵢ) | background at xᵢ),     xᵢ = pose(yᵢ)
 
-Pixels that the body does not cover are the same in both explanations and cancel.
+Pixels that the body does not cover are the same in both explanations and cancel. Pixels that are unknown, NaN, say
+nothing for either.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def _between(picture, x, y):  # type: ignore[no-untyped-def]
     "int64[::1], int64, float64[:, :, ::1])",
     cache=True,
     nogil=True,
-    fastmath=True,
+    fastmath={"nsz", "arcp", "contract", "afn", "reassoc"},  # all but that no value is NaN
     error_model="numpy",
 )
 def pose_gains(picture, background, precision, excess, places, body, part, parts, poses):  # type: ignore[no-untyped-def]
@@ -64,7 +65,7 @@ def pose_gains(picture, background, precision, excess, places, body, part, parts
     Parameters
     ----------
     picture : ndarray
-        (h, w) float32.
+        (h, w) float32; NaN where it is unknown.
     background : ndarray
         (h, w) float32, its mean, grey levels.
     precision : ndarray
@@ -105,6 +106,8 @@ def pose_gains(picture, background, precision, excess, places, body, part, parts
                 continue
             seen = _between(picture, x, y)
             off = seen - body[i, 0]
+            if not off * off >= 0.0:
+                continue
             off_behind = seen - _between(background, x, y)
             behind = precision[int(y + np.float32(0.5)), int(x + np.float32(0.5))]
             as_body = sqrt(sharp[i]) * exp(half * off * off * sharp[i]) + floor

@@ -17,7 +17,7 @@ from scipy import special
 from anglecam.data.typing import Flags, Floats
 from anglecam.engine.likelihood import pose_gains
 from anglecam.engine.sample import Sample
-from anglecam.engine.score import Proposal
+from anglecam.engine.score import Proposal, carried_by
 from anglecam.engine.target import Picture, Target, learn_target, turned
 
 _STEPS_PX = (2.0, 1.0, 0.5)
@@ -41,6 +41,8 @@ _FINE_PX = 0.5
 """Step of the last search, px."""
 _LEAST_INFORMATION = 1e-4
 """1/px²: a place that nothing shows is uncertain by 100 px."""
+STANDS: Floats = np.zeros(2)
+"""Shift, px, of a centre that nothing carries."""
 _ODDS = float(special.logit(0.95))
 """Logarithm of the odds at which a body counts as seen."""
 
@@ -183,19 +185,21 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
         if body is None:
             return fit
         frames = [frame_of(sample, target, picture) for picture in sample.pictures]
-        centre = sample.place(proposal.centre_px)
-        turn = _searched(frames, body, centre, proposal.turn)
+        centre, carriers = sample.place(proposal.centre_px), proposal.carriers(sample)
+        shifts = carried_by(carriers, centre)
+        turn = _searched(frames, body, centre, proposal.turn, shifts)
         seen = np.isfinite(turn)
         if seen.sum() < 4:
             return fit
         free = [
-            _free_pose(frames[k], body, _as_parameters(turned(centre, turn[k]), body)) for k in np.flatnonzero(seen)
+            _free_pose(frames[k], body, _as_parameters(turned(centre, turn[k], shifts[k]), body))
+            for k in np.flatnonzero(seen)
         ]
         q, information = np.array([one[0] for one in free]), np.array([one[1] for one in free])
-        centre, covariance, turn[seen], off_px = common_centre(q, information, centre, body.middle)
+        centre, covariance, turn[seen], off_px = common_centre(q, information, centre, body.middle, carriers[seen])
         travel = float(np.hypot(np.std(q[:, 1:], axis=0).sum(), body.reach * np.std(q[:, 0])))
         usual = _usual_information(turn[seen], information)
-        near = _about(frames, body, centre, turn)
+        near = _about(frames, body, centre, turn, carried_by(carriers, centre))
         turn, gain = np.array([one.turn for one in near]), np.array([one.gain for one in near])
         ratios = np.array([one.ratio for one in near])
         sigma = with_ratio(np.array([one.sigma for one in near]), ratios)
@@ -224,8 +228,12 @@ def _usual_information(turn: Floats, information: Floats) -> Floats:
     return np.asarray(np.median(back.swapaxes(1, 2) @ information @ back, axis=0))
 
 
-def sensitivities(sample: Sample, fit: Fit, body: Body, turn: Floats) -> tuple[Floats, Floats]:
+def sensitivities(
+    sample: Sample, fit: Fit, body: Body, turn: Floats, carrier_turn: Floats | float = 0.0
+) -> tuple[Floats, Floats]:
     """Return how much turns (n,) change with an error of the centre, and with a shift of the body.
+
+    ``carrier_turn`` are those of what carries the centre, rad.
 
     Returns
     -------
@@ -239,20 +247,21 @@ def sensitivities(sample: Sample, fit: Fit, body: Body, turn: Floats) -> tuple[F
     information = turned_by @ fit.information @ turned_by.swapaxes(1, 2)
     tangent = np.concatenate([np.ones((len(turn), 1)), slope @ arm], axis=1)
     along = np.einsum("ni,nij->nj", tangent, information)
-    moved = np.einsum("ni,nij->nj", along[:, 1:], np.eye(2) - rotation)
+    carried = _rotations(np.broadcast_to(carrier_turn, turn.shape))[0]
+    moved = np.einsum("ni,nij->nj", along[:, 1:], carried - rotation)
     scale = sample.scale / np.einsum("ni,ni->n", along, tangent)[:, None]
     return -moved * scale, along[:, 1:] * scale
 
 
-def gains_about(frame: Frame, body: Body, centre: Floats, turns: Floats) -> Floats:
-    """Return the gains of turns (m,) about a centre, for each of the body's parts (m, `PARTS`)."""
-    return body.gains(frame, poses_about(centre, turns))
+def gains_about(frame: Frame, body: Body, centre: Floats, turns: Floats, shift: Floats = STANDS) -> Floats:
+    """Return the gains of turns (m,) about a centre that is shifted, for each of the body's parts (m, `PARTS`)."""
+    return body.gains(frame, poses_about(centre, turns, shift))
 
 
-def poses_about(centre: Floats, turns: Floats) -> Floats:
-    """Return the (m, 2, 3) maps of a body that is turned about a centre (2,), px, by angles (m,), rad."""
+def poses_about(centre: Floats, turns: Floats, shift: Floats = STANDS) -> Floats:
+    """Return the (m, 2, 3) maps of a body that is turned about a centre (2,), px, by angles (m,), rad, and shifted."""
     rotation = _rotations(turns)[0]
-    return np.concatenate([rotation, (centre - rotation @ centre)[:, :, None]], axis=2)
+    return np.concatenate([rotation, (centre + shift - rotation @ centre)[:, :, None]], axis=2)
 
 
 def turns_to_try(body: Body, centre: Floats, size: tuple[int, int], known: Floats) -> Floats:
@@ -286,13 +295,13 @@ def turns_to_try(body: Body, centre: Floats, size: tuple[int, int], known: Float
     return turns[:: max(1, -(-len(turns) // _MOST_TURNS))]
 
 
-def _searched(frames: list[Frame], body: Body, centre: Floats, turn: Floats) -> Floats:
+def _searched(frames: list[Frame], body: Body, centre: Floats, turn: Floats, shifts: Floats) -> Floats:
     """Return the turns with those that are unknown sought wherever the body may be."""
     tried = turns_to_try(body, centre, frames[0].picture.shape, turn[np.isfinite(turn)])
     few = body.thinned(max(1, len(body.places) // 250))
     found = turn.copy()
-    for k in np.flatnonzero(~np.isfinite(turn)):
-        gains = gains_about(frames[k], few, centre, tried).sum(axis=1)
+    for k in np.flatnonzero(~np.isfinite(turn) & np.isfinite(shifts).all(axis=1)):
+        gains = gains_about(frames[k], few, centre, tried, shifts[k]).sum(axis=1)
         best = int(np.argmax(gains))
         if gains[best] > np.log(len(tried)) + _ODDS:
             found[k] = tried[best]
@@ -363,12 +372,12 @@ def _as_parameters(pose: Floats, body: Body) -> Floats:
 
 
 def common_centre(
-    q: Floats, information: Floats, start: Floats, middle: Floats
+    q: Floats, information: Floats, start: Floats, middle: Floats, carriers: Floats
 ) -> tuple[Floats, Floats, Floats, float]:
-    """Fit one centre of rotation to free poses.
+    """Fit one centre of rotation to free poses: one that stands still, or one that another body carries.
 
-    A body that turns by θ about a centre C, from a pose that is s₀ off, displaces its middle m by
-    s = s₀ + (R(θ) − 1)(m − C + s₀).
+    What carries the centre C maps a place x to R₁x + t₁; what stands still, to x. A body that turns by θ about C, and
+    that was taken for s₀ off, displaces its middle m by s = R₁(C + s₀) + t₁ + R(θ)(m − C) − m.
 
     Parameters
     ----------
@@ -378,11 +387,13 @@ def common_centre(
         (n, 3, 3) inverse covariances.
     start, middle : ndarray
         (2,) first guess of the centre, and middle of the body, px.
+    carriers : ndarray
+        (n, 2, 3) poses of what carries the centre: the unit matrix and no shift where it stands still.
 
     Returns
     -------
     centre : ndarray
-        (2,) px.
+        (2,) px, in the coordinates of what carries it.
     covariance : ndarray
         (2, 2) px²; scaled by how far the poses are from turns about it.
     turn : ndarray
@@ -395,17 +406,18 @@ def common_centre(
     turn = q[:, 0].copy()
     normal, scale = np.eye(4), 1.0
     for step in range(12):
-        turn = _nearest(q, information, turn, pivot, shift, middle)
+        place = carried_by(carriers, pivot) + carriers[:, :, :2] @ shift
+        turn = _nearest(q, information, turn, pivot, place, middle)
         rotation, slope = _rotations(turn)
         arm = middle - pivot
-        off = q - np.column_stack([turn, shift + rotation @ arm - arm])
+        off = q - np.column_stack([turn, place + rotation @ arm - arm])
         chi2 = np.einsum("ni,nij,nj->n", off, information, off)
         scale = max(1.0, float(np.median(chi2)))
         weighted = information * np.minimum(1.0, 3.0 / np.sqrt(np.maximum(chi2 / scale, 1e-9)))[:, None, None]
         by_turn = np.concatenate([np.ones((len(q), 1)), slope @ arm], axis=1)
         by_rest = np.zeros((len(q), 3, 4))
-        by_rest[:, 1:, :2] = np.eye(2)
-        by_rest[:, 1:, 2:] = np.eye(2) - rotation
+        by_rest[:, 1:, :2] = carriers[:, :, :2]
+        by_rest[:, 1:, 2:] = carriers[:, :, :2] - rotation
         of_turn = np.einsum("ni,nij,nj->n", by_turn, weighted, by_turn)
         mixed = np.einsum("ni,nij,njk->nk", by_turn, weighted, by_rest)
         force_turn = np.einsum("ni,nij,nj->n", by_turn, weighted, off) / of_turn
@@ -420,9 +432,10 @@ def common_centre(
             break
     to_centre = np.hstack([np.eye(2), np.eye(2)])
     covariance = scale * to_centre @ np.linalg.pinv(normal) @ to_centre.T
-    turn = _nearest(q, information, turn, pivot, shift, middle)
+    place = carried_by(carriers, pivot) + carriers[:, :, :2] @ shift
+    turn = _nearest(q, information, turn, pivot, place, middle)
     arm = middle - pivot
-    off = q - np.column_stack([turn, shift + _rotations(turn)[0] @ arm - arm])
+    off = q - np.column_stack([turn, place + _rotations(turn)[0] @ arm - arm])
     # what a pose does not show, as a ball its own turn, does not count
     seen = np.einsum("ni,nij,nj->n", off, information, off) / np.trace(information[:, 1:, 1:], axis1=1, axis2=2)
     # the median squared distance in the plane is 2 ln 2 times the variance of either coordinate
@@ -430,12 +443,12 @@ def common_centre(
     return pivot + shift, covariance, turn, off_px
 
 
-def _nearest(q: Floats, information: Floats, turn: Floats, pivot: Floats, shift: Floats, middle: Floats) -> Floats:
-    """Return the turns about a pivot that are nearest to free poses, in the metric of their information."""
+def _nearest(q: Floats, information: Floats, turn: Floats, pivot: Floats, shifts: Floats, middle: Floats) -> Floats:
+    """Return the turns about a pivot, shifted by (n, 2), that are nearest to free poses in the metric of these."""
     arm = middle - pivot
     for _ in range(3):
         rotation, slope = _rotations(turn)
-        off = q - np.column_stack([turn, shift + rotation @ arm - arm])
+        off = q - np.column_stack([turn, shifts + rotation @ arm - arm])
         tangent = np.concatenate([np.ones((len(q), 1)), slope @ arm], axis=1)
         along = np.einsum("ni,nij->nj", tangent, information)
         step = np.einsum("ni,ni->n", along, off) / np.maximum(np.einsum("ni,ni->n", along, tangent), 1e-12)
@@ -469,12 +482,12 @@ class Turn:
 NOT_SEEN = Turn(float("nan"), float("nan"), float("nan"), 0.0)
 
 
-def turn_near(frame: Frame, body: Body, centre: Floats, guess: float) -> Turn:
-    """Return the turn of most likelihood within some pixels of a guess."""
+def turn_near(frame: Frame, body: Body, centre: Floats, guess: float, shift: Floats = STANDS) -> Turn:
+    """Return the turn of most likelihood within some pixels of a guess, about a centre that is shifted."""
     arm = body.arm(centre)
     step = _FINE_PX / arm
     tried: Floats = guess + step * np.arange(-6.0, 7.0)
-    of_parts = gains_about(frame, body, centre, tried)
+    of_parts = gains_about(frame, body, centre, tried, shift)
     gains = of_parts.sum(axis=1)
     at = int(np.clip(np.argmax(gains), 1, len(tried) - 2))
     curvature = float(gains[at - 1] + gains[at + 1] - 2.0 * gains[at])
@@ -488,10 +501,11 @@ def turn_near(frame: Frame, body: Body, centre: Floats, guess: float) -> Turn:
     return Turn(tried[at] + step * along, step / np.sqrt(-curvature), ratio, float(gains.max()))
 
 
-def _about(frames: list[Frame], body: Body, centre: Floats, turn: Floats) -> list[Turn]:
+def _about(frames: list[Frame], body: Body, centre: Floats, turn: Floats, shifts: Floats) -> list[Turn]:
     """Return the turns about a centre near first guesses; not seen where the body gains nothing."""
     found = [
-        turn_near(frames[k], body, centre, guess) if np.isfinite(guess) else NOT_SEEN for k, guess in enumerate(turn)
+        turn_near(frames[k], body, centre, guess, shifts[k]) if np.isfinite(guess) else NOT_SEEN
+        for k, guess in enumerate(turn)
     ]
     return [one if one.gain > _ODDS else NOT_SEEN for one in found]
 

@@ -70,7 +70,7 @@ class Sample:
 
     def excess(self, picture: NDArray[np.float32]) -> float:
         """Return by how much the variance of a pixel at rest is larger in a frame than usual, grey levels²."""
-        usual = _MAD * float(np.median(np.abs(picture - self.median)))
+        usual = _MAD * float(np.nanmedian(np.abs(picture - self.median)))
         return max(0.0, usual**2 - self.noise**2)
 
     def place(self, point_px: Floats) -> Floats:
@@ -126,7 +126,7 @@ def sample_stills(stills: Stills) -> list[Sample]:
     height, width = stills.images[0].shape[:2]
     small = min(1.0, LONGEST_PX / max(width, height))
     whole = np.stack([_seen(*one, small) for one in zip(stills.images, stills.moves, strict=True)])
-    boxes = _changed_boxes(steady_light(whole[_alike(whole)]))
+    boxes = changed_boxes(steady_light(whole[_alike(whole)]))
     found = (sample_part(stills, box / small) for box in boxes)
     return [one for one in found if one is not None]
 
@@ -215,10 +215,12 @@ def _quadratic(x: Floats, y: Floats) -> Floats:
 def noise_of(pictures: NDArray[np.float32]) -> float:
     """Return the standard deviation of a pixel where nothing moves, grey levels.
 
-    It is the lower quartile over the picture, as something may move in most of it.
+    It is the lower quartile over the picture, as something may move in most of it, of the pixels that are known in all
+    pictures.
     """
     deviation = np.median(np.abs(pictures - np.median(pictures, axis=0)), axis=0)
-    return max(_LEAST_NOISE, _MAD * float(np.quantile(deviation, 0.25)))
+    known = deviation[np.isfinite(deviation)]
+    return max(_LEAST_NOISE, _MAD * float(np.quantile(known, 0.25))) if known.size else _LEAST_NOISE
 
 
 def _seen(
@@ -238,7 +240,7 @@ def _seen(
     return cv2.resize(grey[part], shown, interpolation=cv2.INTER_AREA).astype(np.float32)
 
 
-def _changed_boxes(pictures: NDArray[np.float32]) -> list[Floats]:
+def changed_boxes(pictures: NDArray[np.float32]) -> list[Floats]:
     """Return left, top, right, bottom, px, of where most of the change is, and of smaller parts with much change."""
     noise = noise_of(pictures)
     off = np.abs(pictures - np.median(pictures, axis=0))

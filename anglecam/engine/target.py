@@ -58,6 +58,11 @@ class Target:
             np.asarray(spread + (1.0 - seen) * self.background_variance),
         )
 
+    def covers(self, pose: Floats) -> NDArray[np.bool_]:
+        """Return (h, w) whether the body in a pose covers a pixel of the picture, or a part of it."""
+        height, width = self.background.shape
+        return cv2.warpAffine(self.visibility, _onto_picture(pose, self.pad), (width, height)) > 0.0
+
 
 def turned(centre: Floats, turn: float, shift: Floats | None = None) -> Floats:
     """Return the (2, 3) map of a body that is turned about a centre (2,), px, counter-clockwise as seen, rad."""

@@ -16,6 +16,7 @@ from scipy import stats
 from anglecam.data.typing import Flags, Floats, Image
 from anglecam.engine.path import steadiest_path
 from anglecam.engine.refine import (
+    STANDS,
     Body,
     Fit,
     Turn,
@@ -28,7 +29,7 @@ from anglecam.engine.refine import (
     with_ratio,
 )
 from anglecam.engine.sample import Sample
-from anglecam.engine.score import NOTHING, score
+from anglecam.engine.score import NOTHING, carried_by, score
 from anglecam.engine.target import Picture
 
 _STEP_PX = 2.0
@@ -103,8 +104,9 @@ def _temper(search: Search) -> float:
     2·mean·d/variance.
     """
     ahead = []
+    shifts = carried_by(search.fit.proposal.carriers(search.sample), search.centre)
     for k in np.flatnonzero(search.fit.seen):
-        found = candidates(search, search.sample.pictures[k])
+        found = candidates(search, search.sample.pictures[k], shifts[k])
         right = search.fit.proposal.turn[k]
         wrong = [one.gain for one in found if abs(_wrapped(one.turn - right)) * search.arm > _APART_PX]
         ahead.append(search.fit.gain[k] - max(wrong, default=0.0))
@@ -113,10 +115,13 @@ def _temper(search: Search) -> float:
     return variance / (2.0 * mean) if mean > 0.0 else variance
 
 
-def candidates(search: Search, picture: Picture) -> list[Turn]:
-    """Return the turns at which a body may be in a picture, those of most likelihood."""
+def candidates(search: Search, picture: Picture, shift: Floats = STANDS) -> list[Turn]:
+    """Return the turns at which a body may be in a picture, those of most likelihood.
+
+    The body's centre is shifted by (2,) px of the sample where another body carries it.
+    """
     frame = frame_of(search.sample, search.fit.target, picture)
-    gains = gains_about(frame, search.few, search.centre, search.turns).sum(axis=1)
+    gains = gains_about(frame, search.few, search.centre, search.turns, shift).sum(axis=1)
     peaks: list[float] = []
     for at in np.argsort(-gains):
         turn = float(search.turns[at])
@@ -125,12 +130,12 @@ def candidates(search: Search, picture: Picture) -> list[Turn]:
         if len(peaks) == _PEAKS:
             break
     around = np.array(peaks)[:, None] + np.array([-1.0, 0.0, 1.0]) * 0.5 * _STEP_PX / search.arm
-    whole = gains_about(frame, search.body, search.centre, around.ravel()).sum(axis=1).reshape(-1, 3)
+    whole = gains_about(frame, search.body, search.centre, around.ravel(), shift).sum(axis=1).reshape(-1, 3)
     best = float(whole.max())
     floor = max(_HOPELESS * best, float(np.log(len(search.turns))) * search.fit.ratio)
     order = [k for k in np.argsort(-whole.max(axis=1)) if whole[k].max() > floor][:_CANDIDATES]
     near = [float(around[k, int(np.argmax(whole[k]))]) for k in order]
-    found = [turn_near(frame, search.body, search.centre, turn) for turn in near]
+    found = [turn_near(frame, search.body, search.centre, turn, shift) for turn in near]
     apart: list[Turn] = []
     for one in sorted((one for one in found if np.isfinite(one.turn)), key=lambda one: -one.gain):
         if all(_another(search, one, other) for other in apart):

@@ -199,6 +199,8 @@ class Rig(Declared):
     camera: RigCamera = RigCamera()
     frames: RigFrames = RigFrames()
     """Which frames of a film are measured."""
+    body: Annotated[int, Field(ge=1, le=6)] | None = None
+    """Number, in ``NAME.bodies.json``, of the body that is measured first, where several move."""
     marks: RigKeypoints | None = None
     """For sessions whose recordings are tracks of points."""
     source: Literal["camera", "encoder"] = "camera"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,8 @@ from anglecam.data.typing import Floats, Image
 from anglecam.engine.learn import Hints, learn
 from anglecam.engine.reasons import why_ambiguous, why_jump, why_not_as_hinted, why_nothing_turns
 from anglecam.engine.refine import Turn, sensitivities
-from anglecam.engine.sample import FRAMES, Stills
+from anglecam.engine.sample import FRAMES, Sample, Stills
+from anglecam.engine.target import Picture as Grey
 from anglecam.engine.tracking import Search, Track, candidates, chosen, search_for, steadier
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
@@ -28,6 +30,7 @@ from anglecam.vision.pivot.circle import Circle
 from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
 from anglecam.vision.status import AMBIGUOUS, OCCLUDED, UNDECODABLE
 
+Find = Callable[[int, Grey], list[Turn]]
 _KEPT_BYTES = 200_000_000
 """Memory for the reduced pictures of a film, which may have to be looked through again."""
 _SHIFTED_PX = 0.05
@@ -64,20 +67,22 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     pictures = film.stills(FRAMES)
     if hints.mark_px is not None and all(picture.index != hints.mark_frame for picture in pictures):
         pictures = sorted([*pictures, _picture(film, hints.mark_frame)], key=lambda picture: picture.index)
-    learnt = learn(_stills(pictures, camera), hints)
+    learnt = learn(stills_of(pictures, camera), hints)
     if learnt is None or not learnt.turns:
         raise InputError(f"{film.path}: {why_nothing_turns(learnt, film.first_frame)}")
     search = search_for(learnt.sample, learnt.explanations[0].fit)
-    seen = _follow(camera, search, progress)
+    seen = follow(camera, search.sample, lambda _, picture: candidates(search, picture), progress)
     again = steadier(search, seen.found, seen.time, seen.pictures)
     if again is not None:
-        search, seen = again, _again(seen, again) or _follow(camera, again, progress)
+        search = again
+        seen = _again(seen, again) or follow(camera, again.sample, lambda _, p: candidates(again, p), progress)
     track = chosen(seen.found, seen.time, search)
     jump = why_jump(track.turn, film.first_frame)
     if jump is not None:
         raise InputError(f"{film.path}: {jump}")
     doubt = why_not_as_hinted(learnt, hints) or why_ambiguous(track.ambiguous, film.first_frame)
-    return replace(_detections(film, rig, seen, _motion(search, track, seen.decoded)), doubt=doubt)
+    body = rigid_motion(search, track, seen.decoded)
+    return replace(_detections(film, rig, seen, body), doubt=doubt, learnt=learnt)
 
 
 def _hints(film: Film, rig: Rig) -> Hints:
@@ -101,7 +106,7 @@ def _image(picture: Picture, camera: HeldCamera) -> Image | None:
     return picture.brightness if camera.steady is None else picture.colours
 
 
-def _stills(pictures: list[Picture], camera: HeldCamera) -> Stills:
+def stills_of(pictures: list[Picture], camera: HeldCamera) -> Stills:
     """Return pictures, without those in which the camera's motion is unknown."""
     images, maps, numbers = list[Image](), list[Floats | None](), list[int]()
     for picture in pictures:
@@ -125,7 +130,7 @@ def _affine(move: CameraMove) -> Floats:
 
 
 @dataclass(frozen=True)
-class _Seen:
+class Seen:
     """What one reading of all frames found."""
 
     time: Floats
@@ -139,11 +144,29 @@ class _Seen:
     """As the body was sought in them; empty where they take too much memory."""
 
 
-def _follow(camera: HeldCamera, search: Search, progress: Progress) -> _Seen:
+def follow(camera: HeldCamera, sample: Sample, find: Find, progress: Progress) -> Seen:
+    """Read all frames of a clip, and find where a body may be in each.
+
+    Parameters
+    ----------
+    camera : HeldCamera
+        The clip.
+    sample : Sample
+        As whose pictures the frames are seen.
+    find : callable
+        Returns the turns at which the body may be in a frame, from its number and the picture.
+    progress : Progress
+        Called with the stage, and after each frame.
+
+    Returns
+    -------
+    Seen
+        Of the n frames.
+    """
     film = camera.film
     time, decoded, repeated = list[float](), list[bool](), list[bool]()
     moves, found, kept = list[CameraMove](), list[list[Turn]](), list[Image | None]()
-    keep = film.count * search.sample.median.size < _KEPT_BYTES
+    keep = film.count * sample.median.size < _KEPT_BYTES
     before: Image | None = None
     shown = film.pictures(lambda picture: _image(picture, camera))
     for picture, image in watched(shown, progress, "following what turns", film.count):
@@ -158,14 +181,14 @@ def _follow(camera: HeldCamera, search: Search, progress: Progress) -> _Seen:
             moves.append(move)
         unknown = image is None or (move is not None and not move.known)
         affine = None if move is None or unknown else _affine(move)
-        small = None if unknown or image is None else search.sample.seen(image, affine)
-        found.append([] if small is None else candidates(search, small))
+        small = None if unknown or image is None else sample.seen(image, affine)
+        found.append([] if small is None else find(picture.index, small))
         if keep:
             kept.append(None if small is None else np.clip(np.round(small), 0, 255).astype(np.uint8))
-    return _Seen(np.array(time), found, decoded, repeated, moves, kept)
+    return Seen(np.array(time), found, decoded, repeated, moves, kept)
 
 
-def _again(seen: _Seen, search: Search) -> _Seen | None:
+def _again(seen: Seen, search: Search) -> Seen | None:
     """Return what another search finds in the same pictures; ``None`` where they were not kept."""
     if not seen.pictures:
         return None
@@ -173,11 +196,25 @@ def _again(seen: _Seen, search: Search) -> _Seen | None:
     return replace(seen, found=found)
 
 
-def _motion(search: Search, track: Track, decoded: list[bool]) -> RigidMotion:
+def rigid_motion(search: Search, track: Track, decoded: list[bool], carrier_turn: Floats | float = 0.0) -> RigidMotion:
+    """Return the motion of a body that was followed in the n frames of a clip.
+
+    Parameters
+    ----------
+    search : Search
+        For the body.
+    track : Track
+        Its turns.
+    decoded : list of bool
+        Which frames could be decoded.
+    carrier_turn : float or (n,) ndarray
+        Turns of what carries the body's centre, rad.
+    """
     fit, sample = search.fit, search.sample
     known = np.isfinite(track.turn)
     sensitivity, sigma = np.full((len(track.turn), 2), np.nan), track.sigma.copy()
-    sensitivity[known], shift = sensitivities(sample, fit, search.body, track.turn[known])
+    carried = np.broadcast_to(carrier_turn, known.shape)[known]
+    sensitivity[known], shift = sensitivities(sample, fit, search.body, track.turn[known], carried)
     off_px = np.hypot(fit.off_px, _SHIFTED_PX / sample.scale)
     sigma[known] = np.hypot(sigma[known], np.hypot(*shift.T) / np.sqrt(2.0) * off_px)
     middle = float(np.median(track.turn[known])) if known.any() else 0.0
@@ -200,7 +237,7 @@ def _motion(search: Search, track: Track, decoded: list[bool]) -> RigidMotion:
     )
 
 
-def _detections(film: Film, rig: Rig, seen: _Seen, body: RigidMotion) -> Detections:
+def _detections(film: Film, rig: Rig, seen: Seen, body: RigidMotion) -> Detections:
     sample = film.sample(FRAMES)
     images = [frame.image for frame in sample.frames if frame.image is not None]
     lens = lens_from_rig(rig, film.size, film.path)

@@ -12,17 +12,28 @@ from numpy.typing import NDArray
 from anglecam.camera.shutter import rig_as_shown
 from anglecam.data.camera_evidence import CameraEvidence
 from anglecam.data.command import Command
-from anglecam.data.series import OK, AngleSeries
+from anglecam.data.series import OK, AngleSeries, Body
 from anglecam.data.typing import Flags, Floats
+from anglecam.engine.every_body import MOST
+from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.io.session import recording_name
 from anglecam.measurement.angles import Angles
+from anglecam.measurement.bodies import (
+    body_name,
+    first_body,
+    found_body,
+    note_on_others,
+    other_finalists,
+    renumbered,
+)
 from anglecam.measurement.camera_pass import FilmAtRest, as_seen_at_rest, hold_camera
 from anglecam.measurement.clock_sync import DARK, note_on, offset_of, on_clip_clock, see_lamp
 from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.duplicates import duplicate_frames
 from anglecam.measurement.followed import Followed, follow_mark_or_body
 from anglecam.measurement.one_rigid_mark import why_not_rigid
+from anglecam.measurement.other_bodies import OtherBody, of_any_body, other_bodies
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
 from anglecam.measurement.trust import why_elsewhere, why_few, why_still, why_unproven
 from anglecam.progress import Progress, Stage, unseen
@@ -58,6 +69,11 @@ class Measurement:
     other_thing: str | None = None
     """Message where the mark is seen in part, turns about another point than the hint's, or may be another thing."""
 
+    bodies: tuple[Body, ...] = ()
+    """What is seen to move, the measured body first."""
+    several: str | None = None
+    """Message where another thing turns as well, and the rig does not say which one is meant."""
+
     @property
     def pivot(self) -> str:
         """Source of the pivot's position."""
@@ -86,7 +102,7 @@ class Measurement:
         coarse = None if self.why_coarse is None else f"measured on the {self.by} alone: {self.why_coarse}"
         # the whole body shows the pivot itself
         doubt = None if self.why_coarse is None else self.detections.pivot.doubt
-        found = (doubt, coarse, self.interlaced, self.zero, self.clock)
+        found = (doubt, coarse, self.several, self.interlaced, self.zero, self.clock)
         return (*self.detections.notes, *(note for note in found if note is not None))
 
     @property
@@ -102,6 +118,7 @@ def measure_clip(
     *,
     progress: Progress = unseen,
     mark: FoundMark | None = None,
+    every_body: bool = False,
 ) -> Measurement:
     """Measure the angle in every frame of a clip.
 
@@ -117,6 +134,9 @@ def measure_clip(
         Called with each stage, and after each frame of those that go through the frames.
     mark : FoundMark, optional
         The mark, where it was found before (`anglecam.measurement.mark_pass.seek_mark`); then nothing else is followed.
+    every_body : bool
+        Whether to look for all bodies that move, and to measure those that turn. Otherwise those are stated that are
+        known without a further look.
 
     Returns
     -------
@@ -138,15 +158,30 @@ def measure_clip(
     held = camera.film
     rig = as_seen_at_rest(rig, held)
     followed = follow_mark_or_body(camera, rig, command, progress, mark)
+    others: list[OtherBody] = []
+    if every_body or (rig.body or 1) > 1:
+        others = other_bodies(camera, rig, command, followed, progress, MOST if every_body else rig.body or 1)
     progress(Stage("working out angles and uncertainties"))
-    detections = _as_filmed(followed.detections, held)
-    series = _series(held, rig, followed, detections.status, lamp)
+    bodies = _bodies(held, rig, followed, others, lamp)
+    seen = [one.moving for one in others] or other_finalists(followed.detections)
+    note = note_on_others(bodies[0], seen, followed.detections, rig)
+    if not others:
+        bodies += tuple(found_body(number, one, None, None) for number, one in enumerate(seen, start=2))
+    wanted = rig.body or 1
+    if wanted > 1:
+        bodies = _with_first(film, bodies, wanted)
+        followed = others[wanted - 2].followed or followed
+        rig = of_any_body(rig)
+    if not every_body:
+        bodies = (bodies[0], *(replace(body, series=None, relative=None) for body in bodies[1:]))
+    detections, series = _as_filmed(followed.detections, held), bodies[0].series
+    assert series is not None
     zero = why_zero_is_elsewhere(rig, command, followed.time[followed.ok])
     dark = changes and lamp is None and rig.sync.lamp is not None
     clock = DARK if dark else note_on(offset)
     few = why_few(series.status, rig.least_measured)
     other = followed.detections.doubt or why_still(followed.detections, followed.ok, rig)
-    if other is None and followed.angles.registered is None:
+    if other is None and followed.angles.registered is None and wanted == 1:
         other = (
             why_elsewhere(followed.detections, rig)
             or why_not_rigid(followed.detections, followed.ok)
@@ -164,6 +199,8 @@ def measure_clip(
         interlaced,
         few,
         other,
+        bodies,
+        note,
     )
 
 
@@ -195,18 +232,53 @@ def _moved(contour_px: NDArray[np.int32], move: Floats) -> NDArray[np.int32]:
     return np.asarray(moved.round().astype(np.int32).reshape(contour_px.shape))
 
 
+def _bodies(
+    film: Film, rig: Rig, first: Followed, others: Sequence[OtherBody], lamp: tuple[float, float] | None
+) -> tuple[Body, ...]:
+    """Return the bodies that were measured, with their series."""
+    name = recording_name(film.path)
+    bodies = [first_body(first, _series(film, rig, first, name, np.zeros((len(first.ok), 2)), lamp))]
+    for number, one in enumerate(others, start=2):
+        series = None
+        if one.followed is not None:
+            series = _series(film, of_any_body(rig), one.followed, body_name(name, number), one.shifts_px, lamp)
+        carrier = None if one.moving.joint_to is None else bodies[one.moving.joint_to].series
+        bodies.append(found_body(number, one.moving, series, carrier))
+    return tuple(bodies)
+
+
+def _with_first(film: Film, bodies: Sequence[Body], wanted: int) -> tuple[Body, ...]:
+    """Return bodies in another order, numbered anew, so that the wanted one is the first.
+
+    Raises
+    ------
+    InputError
+        Where there is no such body, or it was not seen to turn.
+    """
+    if wanted > len(bodies) or bodies[wanted - 1].series is None:
+        fault = f"only {len(bodies)} are seen to move" if wanted > len(bodies) else "that body is not seen to turn"
+        raise InputError(f"{film.path}: body: {wanted} is declared in rig.yaml, but {fault}")
+    return renumbered([bodies[wanted - 1], *bodies[: wanted - 1], *bodies[wanted:]], recording_name(film.path))
+
+
 def _series(
-    film: Film, rig: Rig, followed: Followed, status: Sequence[str], lamp: tuple[float, float] | None
+    film: Film,
+    rig: Rig,
+    followed: Followed,
+    name: str,
+    shifts_px: Floats,
+    lamp: tuple[float, float] | None,
 ) -> AngleSeries:
-    """Return the series of all frames, the duplicates marked."""
+    """Return the series of all frames, the duplicates marked; the pivot is shifted by (n, 2)."""
     detections, ok, angles = followed.detections, followed.ok, followed.angles
-    status = [OK if k else s for k, s in zip(ok, status, strict=True)]
+    filmed = _as_filmed(detections, film).status
+    status = [OK if k else s for k, s in zip(ok, filmed, strict=True)]
     lines, noise = np.full((2, len(status)), np.nan)
     lines[ok], noise[ok] = angles.line, angles.frame_noise(ok)
     for i in duplicate_frames(lines, noise, detections.repeated):
         status[i] = "duplicate"
-    marks = detections.in_picture(in_all_frames(ok, angles.mark_px))
-    pivots = detections.in_picture(np.broadcast_to(angles.pivot.centre_px, (len(status), 2)))
+    marks = detections.in_picture(in_all_frames(ok, angles.mark_px) + shifts_px)
+    pivots = detections.in_picture(angles.pivot.centre_px + shifts_px)
     hand_held = isinstance(film, FilmAtRest)
     if isinstance(film, FilmAtRest):
         marks, pivots = film.in_picture(marks), film.in_picture(pivots)
@@ -219,7 +291,7 @@ def _series(
         lamp_s=lamp,
     )
     time = followed.time
-    return series_of_angles(recording_name(film.path), time, status, ok, angles, marks, pivots, rig, evidence)
+    return series_of_angles(name, time, status, ok, angles, marks, pivots, rig, evidence)
 
 
 def _outline_turn(detections: Detections, ok: NDArray[np.bool_]) -> tuple[float, float] | None:

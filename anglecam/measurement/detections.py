@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from anglecam.camera.lens import Lens
 from anglecam.data.typing import Floats
+from anglecam.engine.learn import Learnt
 from anglecam.errors import InputError
 from anglecam.io.rig import RigMark
 from anglecam.measurement.body_ahead import TurnsAhead
@@ -76,6 +77,8 @@ class Detections:
     """Rotation of the body, where it was learnt before all frames were read."""
     doubt: str | None = None
     """Why what was followed may be another thing in a part of the frames, or another one than the rig means."""
+    learnt: Learnt | None = None
+    """What moves in the film, where a body is followed without a mark."""
     found: FoundMark | None = None
     """The mark by a sample of frames; ``None`` where a body is followed without one."""
 

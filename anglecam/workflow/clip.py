@@ -13,6 +13,7 @@ import numpy as np
 
 from anglecam.data.command import Command
 from anglecam.errors import InputError, blame
+from anglecam.io.bodies_json import write_bodies
 from anglecam.io.clip_files import ClipFiles, FrameRange, read_clip_files, recording_files
 from anglecam.io.files import write_json
 from anglecam.io.netcdf_parquet import Also, write_also
@@ -86,7 +87,9 @@ def open_files(files: ClipFiles) -> Source:
         return Source(files.path, files.rig, files.command, film)
 
 
-def measure_source(source: Source, *, progress: Progress = unseen) -> Measurement | MeasuredTracks:
+def measure_source(
+    source: Source, *, progress: Progress = unseen, every_body: bool = False
+) -> Measurement | MeasuredTracks:
     """Measure the angle in every frame.
 
     Parameters
@@ -95,6 +98,8 @@ def measure_source(source: Source, *, progress: Progress = unseen) -> Measuremen
         From `open_source` or `open_recording`.
     progress : Progress
         Called with each stage; tracks are measured without it.
+    every_body : bool
+        Whether all bodies that turn are measured; of tracks there is one.
 
     Returns
     -------
@@ -109,7 +114,7 @@ def measure_source(source: Source, *, progress: Progress = unseen) -> Measuremen
     with blame(source.path):
         if source.is_tracks or source.film is None:
             return measure_tracks(source.path, source.rig, source.command, film=source.film)
-        return measure_clip(source.film, source.rig, source.command, progress=progress)
+        return measure_clip(source.film, source.rig, source.command, progress=progress, every_body=every_body)
 
 
 def write_measurement(
@@ -118,7 +123,10 @@ def write_measurement(
     out: Path,
     also: Iterable[Also] = (),
 ) -> tuple[Response, ...]:
-    """Write ``NAME.angles.csv``, a plot and, where the angle moves from rest to rest, ``NAME.responses.json``.
+    """Write the results of a clip.
+
+    ``NAME.angles.csv`` and a plot; where the angle moves from rest to rest, ``NAME.responses.json``; of a film
+    ``NAME.bodies.json``, and ``NAME.b2.angles.csv`` and so on of the bodies that were measured besides the first.
 
     Parameters
     ----------
@@ -148,6 +156,11 @@ def write_measurement(
         write_json(out / f"{series.name}.responses.json", responses_as_dicts(answers))
     plot_series(series, out / f"{series.name}.png")
     write_also(series, also, out / series.name)
+    if isinstance(measurement, Measurement):
+        write_bodies(measurement.bodies, out / f"{series.name}.bodies.json")
+        for body in measurement.bodies[1:]:
+            if body.series is not None:
+                write_series(body.series, out / f"{body.series.name}{SERIES_ENDING}")
     return answers
 
 
