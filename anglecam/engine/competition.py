@@ -5,6 +5,7 @@ Every proposal is fitted to a small sample first. Those that predict best are fi
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -63,14 +64,17 @@ def compete(sample: Sample, proposals: Sequence[Proposal]) -> list[Explanation]:
     """
     small = halved(sample)
     still = score(small, NOTHING, [None] * len(small.pictures))
-    rough: list[tuple[float, Proposal]] = []
+    rough: list[tuple[Score, Proposal]] = []
     for proposal in proposals:
         fit = refine(small, proposal.every_other(), 1)
         if fit is not None:
-            lead = score(small, proposal.name, fit.proposal.poses(small)).lead(still)
-            rough.append((lead, replace(proposal, centre_px=fit.proposal.centre_px, turn=_all_turns(proposal, fit))))
+            better = replace(proposal, centre_px=fit.proposal.centre_px, turn=_all_turns(proposal, fit))
+            rough.append((score(small, proposal.name, fit.proposal.poses(small)), better))
+    # what explains much of a few frames, and what explains a little of all
+    most = sorted(rough, key=lambda one: -one[0].total)
+    surest = sorted(rough, key=lambda one: -one[0].lead(still))
     finalists: list[Proposal] = []
-    for _, proposal in sorted(rough, key=lambda one: -one[0]):
+    for _, proposal in itertools.chain.from_iterable(zip(most, surest, strict=True)):
         if len(finalists) < _FINALISTS and not any(_alike(sample, proposal, other) for other in finalists):
             finalists.append(proposal)
     fits = [fit for proposal in finalists if (fit := refine(sample, proposal)) is not None]

@@ -50,21 +50,28 @@ def _between(picture, x, y):  # type: ignore[no-untyped-def]
 
 
 @njit(
-    "float64[:, ::1](float32[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], int64[::1], int64, "
-    "float64[:, :, ::1])",
+    "float64[:, ::1](float32[:, ::1], float32[:, ::1], float32[:, ::1], float32, float32[:, ::1], float32[:, ::1], "
+    "int64[::1], int64, float64[:, :, ::1])",
     cache=True,
     nogil=True,
     fastmath={"nsz", "arcp", "contract", "afn", "reassoc"},  # all but that no value is NaN
+    error_model="numpy",
 )
-def pose_gains(picture, behind, places, body, part, parts, poses):  # type: ignore[no-untyped-def]
+def pose_gains(picture, background, precision, excess, places, body, part, parts, poses):  # type: ignore[no-untyped-def]
     """Return the gain L of each pose, by parts of the body.
+
+    Between pixels, picture and background are interpolated alike, which averages the noise of either.
 
     Parameters
     ----------
     picture : ndarray
         (h, w) float32; NaN where it is unknown.
-    behind : ndarray
-        (h, w) float32, log density of its pixels as background.
+    background : ndarray
+        (h, w) float32, its mean, grey levels.
+    precision : ndarray
+        (h, w) float32, inverse variance of its pixels in this picture, 1/grey levels².
+    excess : float
+        By how much the variance of a pixel is larger in this picture than usual, grey levels².
     places : ndarray
         (n, 2) float32, the body's pixels in its own coordinates.
     body : ndarray
@@ -83,12 +90,12 @@ def pose_gains(picture, behind, places, body, part, parts, poses):  # type: igno
     """
     height, width = picture.shape
     gains = np.zeros((len(poses), parts))
-    floor = np.float32(_OUTLIERS / 256.0)
+    floor = np.float32(_OUTLIERS / 256.0 * sqrt(2.0 * pi) / (1.0 - _OUTLIERS))
+    half = np.float32(-0.5)
     n = len(places)
-    scale, half = np.empty(n, np.float32), np.empty(n, np.float32)
+    sharp = np.empty(n, np.float32)
     for i in range(n):
-        scale[i] = (1.0 - _OUTLIERS) / sqrt(2.0 * pi * body[i, 1])
-        half[i] = -0.5 / body[i, 1]
+        sharp[i] = np.float32(1.0) / (body[i, 1] + excess)
     for m in range(len(poses)):
         a, b, c = np.float32(poses[m, 0, 0]), np.float32(poses[m, 0, 1]), np.float32(poses[m, 0, 2])
         d, e, f = np.float32(poses[m, 1, 0]), np.float32(poses[m, 1, 1]), np.float32(poses[m, 1, 2])
@@ -97,8 +104,13 @@ def pose_gains(picture, behind, places, body, part, parts, poses):  # type: igno
             y = d * places[i, 0] + e * places[i, 1] + f
             if x < 0.0 or y < 0.0 or x >= width - 1 or y >= height - 1:
                 continue
-            off = _between(picture, x, y) - body[i, 0]
+            seen = _between(picture, x, y)
+            off = seen - body[i, 0]
             if not off * off >= 0.0:
                 continue
-            gains[m, part[i]] += log(scale[i] * exp(half[i] * off * off) + floor) - _between(behind, x, y)
+            off_behind = seen - _between(background, x, y)
+            behind = precision[int(y + np.float32(0.5)), int(x + np.float32(0.5))]
+            as_body = sqrt(sharp[i]) * exp(half * off * off * sharp[i]) + floor
+            as_background = sqrt(behind) * exp(half * off_behind * off_behind * behind) + floor
+            gains[m, part[i]] += log(as_body / as_background)
     return gains

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from anglecam.data.typing import Flags, Floats
-from anglecam.engine.likelihood import log_density, pose_gains
+from anglecam.engine.likelihood import pose_gains
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import Proposal, carried_by
 from anglecam.engine.target import Picture, Target, learn_target, turned
@@ -48,6 +48,27 @@ _ODDS = float(special.logit(0.95))
 
 
 @dataclass(frozen=True)
+class Frame:
+    """A picture in which a body is sought."""
+
+    picture: Picture
+    """(h, w) grey levels."""
+    background: Picture
+    """(h, w) what is behind the body, grey levels."""
+    precision: Picture
+    """(h, w) inverse variance of its pixels in this picture, 1/grey levels²."""
+    excess: float
+    """By how much the variance of a pixel is larger in it than usual, grey levels²."""
+
+
+def frame_of(sample: Sample, target: Target, picture: Picture) -> Frame:
+    """Return a picture as a body is sought in it."""
+    excess = sample.excess(picture)
+    precision = np.float32(1.0) / (target.background_variance + np.float32(excess))
+    return Frame(picture, target.background, precision, excess)
+
+
+@dataclass(frozen=True)
 class Body:
     """The pixels by which a body is located."""
 
@@ -64,9 +85,19 @@ class Body:
     part: NDArray[np.int64]
     """(n,) part of the body to which each belongs, by direction and distance from the middle."""
 
-    def gains(self, picture: Picture, behind: Picture, poses: Floats) -> Floats:
+    def gains(self, frame: Frame, poses: Floats) -> Floats:
         """Return the gains of poses (m, 2, 3), for each of the body's parts (m, `PARTS`)."""
-        of_parts = pose_gains(picture, behind, self.places, self.values, self.part, PARTS, poses)
+        of_parts = pose_gains(
+            frame.picture,
+            frame.background,
+            frame.precision,
+            np.float32(frame.excess),
+            self.places,
+            self.values,
+            self.part,
+            PARTS,
+            poses,
+        )
         return np.asarray(of_parts) * self.stands_for
 
     def arm(self, centre: Floats) -> float:
@@ -153,22 +184,22 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
         body = body_of(target)
         if body is None:
             return fit
-        behind = [log_density(p, target.background, target.background_variance) for p in sample.pictures]
+        frames = [frame_of(sample, target, picture) for picture in sample.pictures]
         centre, carriers = sample.place(proposal.centre_px), proposal.carriers(sample)
         shifts = carried_by(carriers, centre)
-        turn = _searched(sample, behind, body, centre, proposal.turn, shifts)
+        turn = _searched(frames, body, centre, proposal.turn, shifts)
         seen = np.isfinite(turn)
         if seen.sum() < 4:
             return fit
         free = [
-            _free_pose(sample.pictures[k], behind[k], body, _as_parameters(turned(centre, turn[k], shifts[k]), body))
+            _free_pose(frames[k], body, _as_parameters(turned(centre, turn[k], shifts[k]), body))
             for k in np.flatnonzero(seen)
         ]
         q, information = np.array([one[0] for one in free]), np.array([one[1] for one in free])
         centre, covariance, turn[seen], off_px = common_centre(q, information, centre, body.middle, carriers[seen])
         travel = float(np.hypot(np.std(q[:, 1:], axis=0).sum(), body.reach * np.std(q[:, 0])))
         usual = _usual_information(turn[seen], information)
-        near = _about(sample, behind, body, centre, turn, carried_by(carriers, centre))
+        near = _about(frames, body, centre, turn, carried_by(carriers, centre))
         turn, gain = np.array([one.turn for one in near]), np.array([one.gain for one in near])
         ratios = np.array([one.ratio for one in near])
         sigma = with_ratio(np.array([one.sigma for one in near]), ratios)
@@ -222,11 +253,9 @@ def sensitivities(
     return -moved * scale, along[:, 1:] * scale
 
 
-def gains_about(
-    picture: Picture, behind: Picture, body: Body, centre: Floats, turns: Floats, shift: Floats = STANDS
-) -> Floats:
+def gains_about(frame: Frame, body: Body, centre: Floats, turns: Floats, shift: Floats = STANDS) -> Floats:
     """Return the gains of turns (m,) about a centre that is shifted, for each of the body's parts (m, `PARTS`)."""
-    return body.gains(picture, behind, poses_about(centre, turns, shift))
+    return body.gains(frame, poses_about(centre, turns, shift))
 
 
 def poses_about(centre: Floats, turns: Floats, shift: Floats = STANDS) -> Floats:
@@ -266,22 +295,20 @@ def turns_to_try(body: Body, centre: Floats, size: tuple[int, int], known: Float
     return turns[:: max(1, -(-len(turns) // _MOST_TURNS))]
 
 
-def _searched(
-    sample: Sample, behind: list[Picture], body: Body, centre: Floats, turn: Floats, shifts: Floats
-) -> Floats:
+def _searched(frames: list[Frame], body: Body, centre: Floats, turn: Floats, shifts: Floats) -> Floats:
     """Return the turns with those that are unknown sought wherever the body may be."""
-    tried = turns_to_try(body, centre, sample.median.shape, turn[np.isfinite(turn)])
+    tried = turns_to_try(body, centre, frames[0].picture.shape, turn[np.isfinite(turn)])
     few = body.thinned(max(1, len(body.places) // 250))
     found = turn.copy()
     for k in np.flatnonzero(~np.isfinite(turn) & np.isfinite(shifts).all(axis=1)):
-        gains = gains_about(sample.pictures[k], behind[k], few, centre, tried, shifts[k]).sum(axis=1)
+        gains = gains_about(frames[k], few, centre, tried, shifts[k]).sum(axis=1)
         best = int(np.argmax(gains))
         if gains[best] > np.log(len(tried)) + _ODDS:
             found[k] = tried[best]
     return found
 
 
-def _free_pose(picture: Picture, behind: Picture, body: Body, start: Floats) -> tuple[Floats, Floats, float]:
+def _free_pose(frame: Frame, body: Body, start: Floats) -> tuple[Floats, Floats, float]:
     """Return the pose of most likelihood near a first guess, its information and its gain.
 
     The pose is the turn, rad, and the shift of the middle, px. The gain is approximated by a quadratic function.
@@ -291,7 +318,7 @@ def _free_pose(picture: Picture, behind: Picture, body: Body, start: Floats) -> 
     for h in _STEPS_PX:
         for _ in range(2):
             points = q + h * _STENCIL * units
-            gains = body.gains(picture, behind, _poses(points, body)).sum(axis=1)
+            gains = body.gains(frame, _poses(points, body)).sum(axis=1)
             best = gains[0]
             slope, curvature = _quadratic(gains, h)
             values, axes = np.linalg.eigh(curvature)
@@ -299,7 +326,7 @@ def _free_pose(picture: Picture, behind: Picture, body: Body, start: Floats) -> 
             steps = np.where(values < 0.0, along / np.maximum(-values, 1e-9), 2.0 * h * np.sign(along))
             steps = axes @ np.clip(steps, -2.0 * h, 2.0 * h)
             trial = q + steps * units
-            reached = float(body.gains(picture, behind, _poses(trial[None], body)).sum())
+            reached = float(body.gains(frame, _poses(trial[None], body)).sum())
             top = int(np.argmax(gains))
             if reached > gains[top]:
                 moved, q, best = float(np.abs(steps).max()), trial, reached
@@ -455,14 +482,12 @@ class Turn:
 NOT_SEEN = Turn(float("nan"), float("nan"), float("nan"), 0.0)
 
 
-def turn_near(
-    picture: Picture, behind: Picture, body: Body, centre: Floats, guess: float, shift: Floats = STANDS
-) -> Turn:
+def turn_near(frame: Frame, body: Body, centre: Floats, guess: float, shift: Floats = STANDS) -> Turn:
     """Return the turn of most likelihood within some pixels of a guess, about a centre that is shifted."""
     arm = body.arm(centre)
     step = _FINE_PX / arm
     tried: Floats = guess + step * np.arange(-6.0, 7.0)
-    of_parts = gains_about(picture, behind, body, centre, tried, shift)
+    of_parts = gains_about(frame, body, centre, tried, shift)
     gains = of_parts.sum(axis=1)
     at = int(np.clip(np.argmax(gains), 1, len(tried) - 2))
     curvature = float(gains[at - 1] + gains[at + 1] - 2.0 * gains[at])
@@ -476,12 +501,10 @@ def turn_near(
     return Turn(tried[at] + step * along, step / np.sqrt(-curvature), ratio, float(gains.max()))
 
 
-def _about(
-    sample: Sample, behind: list[Picture], body: Body, centre: Floats, turn: Floats, shifts: Floats
-) -> list[Turn]:
+def _about(frames: list[Frame], body: Body, centre: Floats, turn: Floats, shifts: Floats) -> list[Turn]:
     """Return the turns about a centre near first guesses; not seen where the body gains nothing."""
     found = [
-        turn_near(sample.pictures[k], behind[k], body, centre, guess, shifts[k]) if np.isfinite(guess) else NOT_SEEN
+        turn_near(frames[k], body, centre, guess, shifts[k]) if np.isfinite(guess) else NOT_SEEN
         for k, guess in enumerate(turn)
     ]
     return [one if one.gain > _ODDS else NOT_SEEN for one in found]

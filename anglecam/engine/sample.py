@@ -40,6 +40,15 @@ _LEAST_SIDE_PX = 8
 _MAD = 1.4826
 _DARK, _BRIGHT = 16.0, 235.0
 """Grey levels between which a pixel follows the light; black and white of television."""
+_LIGHT_PIXELS, _LEAST_LIGHT_PIXELS = 2000, 50
+"""By which the light of a frame is found, usually and at least."""
+_LEAST_LIGHT = 0.005
+"""Standard deviation of the logarithm of a pixel's brightness: half a grey level of a hundred."""
+_TUKEY = 4.685
+"""Standard deviations from which on a pixel has no weight (95 % efficient for normal errors)."""
+_LIGHT_ROUNDS = 5
+_PRIOR = 1.0
+"""Weight, in pixels, of light that changes alike everywhere."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +67,11 @@ class Sample:
     """Standard deviation of a pixel where nothing moves, grey levels, the codec's errors included."""
     median: NDArray[np.float32] = field(repr=False)
     """(h, w) of the pictures; the light of other frames is compared with it."""
+
+    def excess(self, picture: NDArray[np.float32]) -> float:
+        """Return by how much the variance of a pixel at rest is larger in a frame than usual, grey levels²."""
+        usual = _MAD * float(np.nanmedian(np.abs(picture - self.median)))
+        return max(0.0, usual**2 - self.noise**2)
 
     def place(self, point_px: Floats) -> Floats:
         """Map points (…, 2) of the film, px, to the sample."""
@@ -160,19 +174,42 @@ def sample_of(pictures: NDArray[np.generic], frames: NDArray[np.int64], scale: f
 
 
 def steady_light(pictures: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return (K, h, w) pictures, each divided by its brightness relative to their median.
-
-    Light and exposure multiply the light that falls on a pixel, and so, by whatever power the camera applies, its grey
-    level. What moves does not count, because the median of the ratios is taken, nor what is black or saturated.
-    """
+    """Return (K, h, w) pictures, each divided by its brightness relative to their median (`in_light`)."""
     median = np.median(pictures, axis=0)
     return np.stack([in_light(picture, median) for picture in pictures])
 
 
 def in_light(picture: NDArray[np.float32], median: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return a picture divided by its brightness relative to a median picture."""
+    """Return a picture divided by its brightness relative to a median picture.
+
+    Light and exposure multiply the light that falls on a pixel, and so, by whatever power the camera applies, its grey
+    level. The logarithm of the factor is a quadratic function of the place: light falls aslant, and lenses darken
+    towards the corners. What moves has no weight (Tukey's biweight), nor what is black or saturated.
+    """
     fair = (median > _DARK) & (picture > _DARK) & (median < _BRIGHT) & (picture < _BRIGHT)
-    return np.asarray(picture / np.median(picture[fair] / median[fair]) if fair.any() else picture, np.float32)
+    rows, columns = (some[:: max(1, fair.sum() // _LIGHT_PIXELS)] for some in np.nonzero(fair))
+    height, width = picture.shape
+    if len(rows) < _LEAST_LIGHT_PIXELS:
+        return picture
+    terms = _quadratic(columns / width, rows / height)
+    ratio = np.log(picture[rows, columns] / median[rows, columns])
+    prior = np.diag([0.0, *np.full(terms.shape[1] - 1, _PRIOR)])
+    factor = np.array([np.median(ratio), *np.zeros(terms.shape[1] - 1)])
+    for _ in range(_LIGHT_ROUNDS):
+        off = ratio - terms @ factor
+        scale = max(_LEAST_LIGHT, _MAD * float(np.median(np.abs(off))))
+        weight = np.maximum(0.0, 1.0 - (off / (_TUKEY * scale)) ** 2) ** 2
+        weighted = terms.T * weight
+        factor = np.linalg.solve(weighted @ terms + prior, weighted @ ratio)
+    y, x = np.indices((height, width)).reshape(2, -1)
+    light = np.exp(_quadratic(x / width, y / height) @ factor)
+    return np.asarray(picture / light.reshape(height, width), np.float32)
+
+
+def _quadratic(x: Floats, y: Floats) -> Floats:
+    """Return (n, 6) functions of places, in widths and heights of the picture."""
+    x, y = x - 0.5, y - 0.5
+    return np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y])
 
 
 def noise_of(pictures: NDArray[np.float32]) -> float:

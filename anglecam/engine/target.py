@@ -112,12 +112,16 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
     variance = variance * (often + 1.0) / np.maximum(often - 1.0, 1.0)
     variance = variance + sample.noise**2 + _FRACTION2 * _slope2(appearance)
     visibility = blank
+    excess = [np.float32(sample.excess(picture)) for picture in used]
     for _ in range(_ROUNDS):
         behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
         gain = blank.copy()
         for frame, j, m in zip(held, known, maps, strict=True):
-            as_background = cv2.warpAffine(log_density(used[j], background, behind), m, size, flags=back)
-            gain += np.where(np.isfinite(frame), log_density(frame, appearance, variance) - as_background, 0.0)
+            # interpolation averages the noise of a frame, so that both are compared with the interpolated one
+            here, spread = (cv2.warpAffine(one, m, size, flags=back) for one in (background, behind))
+            as_body = log_density(frame, appearance, variance + excess[j])
+            as_background = log_density(frame, here, spread + excess[j])
+            gain += np.where(np.isfinite(frame), as_body - as_background, 0.0)
         # a pixel of the body has two parameters, mean and variance (Schwarz, Annals of Statistics 6, 1978)
         seen = np.isfinite(appearance) & (cv2.GaussianBlur(gain, (0, 0), 1.0) > np.log(len(known)))
         visibility = seen.astype(np.float32)

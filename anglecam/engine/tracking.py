@@ -14,7 +14,6 @@ import numpy as np
 from scipy import stats
 
 from anglecam.data.typing import Flags, Floats, Image
-from anglecam.engine.likelihood import log_density
 from anglecam.engine.path import steadiest_path
 from anglecam.engine.refine import (
     STANDS,
@@ -22,6 +21,7 @@ from anglecam.engine.refine import (
     Fit,
     Turn,
     body_of,
+    frame_of,
     gains_about,
     refine,
     turn_near,
@@ -120,8 +120,8 @@ def candidates(search: Search, picture: Picture, shift: Floats = STANDS) -> list
 
     The body's centre is shifted by (2,) px of the sample where another body carries it.
     """
-    behind = log_density(picture, search.fit.target.background, search.fit.target.background_variance)
-    gains = gains_about(picture, behind, search.few, search.centre, search.turns, shift).sum(axis=1)
+    frame = frame_of(search.sample, search.fit.target, picture)
+    gains = gains_about(frame, search.few, search.centre, search.turns, shift).sum(axis=1)
     peaks: list[float] = []
     for at in np.argsort(-gains):
         turn = float(search.turns[at])
@@ -130,12 +130,12 @@ def candidates(search: Search, picture: Picture, shift: Floats = STANDS) -> list
         if len(peaks) == _PEAKS:
             break
     around = np.array(peaks)[:, None] + np.array([-1.0, 0.0, 1.0]) * 0.5 * _STEP_PX / search.arm
-    whole = gains_about(picture, behind, search.body, search.centre, around.ravel(), shift).sum(axis=1).reshape(-1, 3)
+    whole = gains_about(frame, search.body, search.centre, around.ravel(), shift).sum(axis=1).reshape(-1, 3)
     best = float(whole.max())
     floor = max(_HOPELESS * best, float(np.log(len(search.turns))) * search.fit.ratio)
     order = [k for k in np.argsort(-whole.max(axis=1)) if whole[k].max() > floor][:_CANDIDATES]
     near = [float(around[k, int(np.argmax(whole[k]))]) for k in order]
-    found = [turn_near(picture, behind, search.body, search.centre, turn, shift) for turn in near]
+    found = [turn_near(frame, search.body, search.centre, turn, shift) for turn in near]
     apart: list[Turn] = []
     for one in sorted((one for one in found if np.isfinite(one.turn)), key=lambda one: -one.gain):
         if all(_another(search, one, other) for other in apart):

@@ -143,7 +143,7 @@ def hold_camera(film: Film, progress: Progress = unseen) -> HeldCamera:
         return HeldCamera(film)  # nothing says that the camera moves: what is seen to move may be the mechanism
     if not followed:
         how = "choose frames in which it does not: frames: {from: k0, to: k1} in rig.yaml"
-        return HeldCamera(film, steady, f"{film.path}: {why}; {how}")
+        return HeldCamera(film, steady, f"{why}; {how}")
     own = {field.name: getattr(film, field.name) for field in fields(film) if field.init}
     grey = images[0].mean(axis=2, keepdims=True).astype(np.uint8)
     return HeldCamera(FilmAtRest(**own, moves=moves, first=images[0], first_grey=grey))

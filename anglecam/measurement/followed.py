@@ -25,9 +25,9 @@ from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.carried_marks import carried_marks, smeared_marks, with_marks
 from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.fine_angles import fine_angles
-from anglecam.measurement.mark_pass import MarkNotFoundError, PivotNotFoundError, detect_mark
+from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
-from anglecam.measurement.trust import require_rotation
+from anglecam.measurement.trust import why_no_rotation
 from anglecam.progress import Progress, unseen
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
@@ -81,18 +81,21 @@ def follow_mark_or_body(
         Where nothing turns about a fixed pivot: one line with the causes.
     """
     film = camera.film
-    try:
-        mark = detect_mark(film, rig, camera, progress, known)
-        return _measured(film, rig, command, mark, progress)
-    except PivotNotFoundError:
-        if known is not None:
-            raise
-    except MarkNotFoundError:
-        if known is not None or rig.mark_rgb is not None or film.undecodable == len(film.times):
-            raise
-    if camera.unknown is not None:
-        raise InputError(camera.unknown)
-    return _measured(film, rig, command, detect_body(camera, rig, progress), progress)
+    mark = detect_mark(film, rig, camera, progress, known)
+    by_mark = mark if isinstance(mark, str) else _measured(film, rig, command, mark, progress)
+    if isinstance(by_mark, Followed):
+        return by_mark
+    # a mark that moves otherwise is what the film shows, unless something else may be declared
+    final = known is not None or film.undecodable == len(film.times) or not (isinstance(mark, str) or _hinted(rig))
+    cause = camera.unknown or (by_mark if final else None)
+    by_body = cause or _measured(film, rig, command, detect_body(camera, rig, progress), progress)
+    if isinstance(by_body, Followed):
+        return by_body
+    raise InputError(f"{film.path}: {by_body}")
+
+
+def _hinted(rig: Rig) -> bool:
+    return rig.pointed_mark is not None or rig.pivot.expected is not None
 
 
 def _measured(
@@ -101,8 +104,8 @@ def _measured(
     command: Command | None,
     detections: Detections,
     progress: Progress,
-) -> Followed:
-    """Return the angles of what was detected, finer where more of the body than the mark can be registered."""
+) -> Followed | str:
+    """Return the angles of what was detected, finer where more of it can be registered, or why they are none."""
     ok = np.array([s == OK for s in detections.status])
     row = _mark_rows(detections)
     time = measurement_time(detections.time, row, detections.size[1], rig.camera.row_time_s)
@@ -125,8 +128,7 @@ def _measured(
             angles = coarse_angles(detections, ok, time, rig, command)
             filmed = detections.in_picture(in_all_frames(ok, angles.mark_px))[ok]
             angles = fine_angles(angles, registered, np.flatnonzero(ok), filmed, time[ok], rig, command)
-    require_rotation(film.path, detections, ok, angles, rig)
-    return Followed(detections, ok, time, angles, why_coarse)
+    return why_no_rotation(detections, ok, angles, rig) or Followed(detections, ok, time, angles, why_coarse)
 
 
 def _rolls(detections: Detections) -> Floats:

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -44,11 +43,7 @@ _CLEAR = 2.0
 
 
 class MarkNotFoundError(InputError):
-    """No thing of the clip can be followed as a mark, so that a body without one may be tried."""
-
-
-class PivotNotFoundError(InputError):
-    """The mark alone does not show about which point it turns; the body may show it."""
+    """No thing of the clip can be followed as a mark."""
 
 
 def seek_mark(film: Film, rig: Rig) -> FoundMark:
@@ -75,7 +70,10 @@ def seek_mark(film: Film, rig: Rig) -> FoundMark:
     """
     lens = lens_from_rig(rig, film.size, film.path)
     sample, samples = _sampled(film, rig, None, lens)
-    return _sought(film, rig, sample, samples, lens, any_colour=True)
+    found = _sought(rig, samples, lens, any_colour=True)
+    if found is None:
+        raise MarkNotFoundError(f"{film.path}: {_no_mark(sample, rig)}")
+    return found
 
 
 def detect_mark(
@@ -84,7 +82,7 @@ def detect_mark(
     camera: HeldCamera | None = None,
     progress: Progress = unseen,
     mark: FoundMark | None = None,
-) -> Detections:
+) -> Detections | str:
     """Find the mark in every frame of a clip, and the pivot.
 
     Parameters
@@ -102,15 +100,14 @@ def detect_mark(
 
     Returns
     -------
-    Detections
-        At least one frame has the status ``ok``.
+    Detections or str
+        At least one frame has the status ``ok``. Or why there is no mark, no frame in which it can be measured, or no
+        point about which it turns.
 
     Raises
     ------
-    MarkNotFoundError
-        Where there is no mark, or no frame in which it can be measured: one line with file, count and cause.
     InputError
-        Where the file cannot be read, or the mark shows no pivot: one line with file and cause.
+        Where the file cannot be read: one line with file and cause.
     """
     path, steady = film.path, None if camera is None else camera.steady
     lens = lens_from_rig(rig, film.size, path)
@@ -118,9 +115,11 @@ def detect_mark(
     sample, samples = _sampled(film, rig, steady, lens)
     noise = pixel_noise([f.image for f in sample.frames if f.image is not None])
     with readers_for(film) if steady is None else nullcontext() as readers:
-        found = _sought(film, rig, sample, samples, lens) if mark is None else mark
+        found = _sought(rig, samples, lens) if mark is None else mark
+        if found is None:
+            return _no_mark(sample, rig)
         if camera is not None and camera.unknown is not None:
-            raise InputError(camera.unknown)
+            return camera.unknown
         progress(Stage("learning how the body looks"))
         body = _body_ahead(film, found, samples, rig, lens) if steady is None else None
         sought = Sought(found, body, steady)
@@ -135,10 +134,10 @@ def detect_mark(
         for s, d, h in zip(track.status, reading.decoded, hidden, strict=True)
     )
     if OK not in status:
-        raise MarkNotFoundError(_nothing_measured(path, status, sample, rig))
+        return _nothing_measured(status, sample, rig)
     if pivot is None:
-        raise PivotNotFoundError(
-            f"{path}: no pivot found: the mark's path is too short to determine its centre, and there is no round"
+        return (
+            "no pivot found: the mark's path is too short to determine its centre, and there is no round"
             " marker near it; declare it, also outside the picture: pivot: {at: [x, y], sigma_px: s} in rig.yaml"
         )
     notes = [note for note in (_choice(found, track), disagreement) if note]
@@ -180,14 +179,9 @@ def _sampled(film: Film, rig: Rig, steady: BackgroundMotion | None, lens: Lens) 
     return sample, _samples(film, frames, pointed, steady, lens)
 
 
-def _sought(
-    film: Film, rig: Rig, sample: Sample, samples: Samples, lens: Lens, *, any_colour: bool = False
-) -> FoundMark:
+def _sought(rig: Rig, samples: Samples, lens: Lens, *, any_colour: bool = False) -> FoundMark | None:
     near = None if rig.pivot.expected is None else lens.rectify(rig.pivot.expected)
-    found = find_mark(samples, rig.mark_rgb, near, any_colour=any_colour) if samples.images else None
-    if found is None:
-        raise MarkNotFoundError(_no_mark(film.path, sample, rig))
-    return found
+    return find_mark(samples, rig.mark_rgb, near, any_colour=any_colour) if samples.images else None
 
 
 def _body_ahead(film: Film, found: FoundMark, samples: Samples, rig: Rig, lens: Lens) -> BodyAhead | None:
@@ -300,17 +294,17 @@ def _colour(rig: Rig) -> str:
     return "auto" if rig.mark_rgb is None else ",".join(map(str, rig.mark_rgb))
 
 
-def _no_mark(path: Path, sample: Sample, rig: Rig) -> str:
+def _no_mark(sample: Sample, rig: Rig) -> str:
     if not sample.decoded:
-        return f"{path}: none of its {sample.count} frames can be decoded"
+        return f"none of its {sample.count} frames can be decoded"
     hint = "" if rig.pivot.expected is None else ", rotating about {:g},{:g}".format(*rig.pivot.expected)
     seen = f"no mark found in {sample.count} of {sample.count} frames (colour {_colour(rig)}{hint})"
     place = where_it_moves([frame.image for frame in sample.frames if frame.image is not None])
     moves = "nothing is seen to move" if place is None else "something moves around {},{}".format(*place)
-    return f"{path}: {seen}; {moves}; {DECLARE_MARK}"
+    return f"{seen}; {moves}; {DECLARE_MARK}"
 
 
-def _nothing_measured(path: Path, status: Sequence[str], sample: Sample, rig: Rig) -> str:
+def _nothing_measured(status: Sequence[str], sample: Sample, rig: Rig) -> str:
     if set(status) <= {"no_mouth", "undecodable"}:
-        return _no_mark(path, sample, rig)
-    return f"{path}: none of {len(status)} frames could be measured: {causes_seen(status)}"
+        return _no_mark(sample, rig)
+    return f"none of {len(status)} frames could be measured: {causes_seen(status)}"

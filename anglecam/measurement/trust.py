@@ -9,13 +9,11 @@ thing near it is no proof of a pivot: then somebody has to declare the pivot.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 from anglecam.data.series import OK
 from anglecam.data.typing import Flags, Floats
-from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.detections import Detections
@@ -34,13 +32,11 @@ _TRAVEL_PX = 0.5
 """Least RMS travel of a mark that moves, px. Noise, rain and flicker shift the centroid of a thing at rest by 0.2."""
 
 
-def require_rotation(path: Path, detections: Detections, ok: Flags, angles: Angles, rig: Rig) -> None:
-    """Refuse a clip whose angles are not those of a rotation about a fixed pivot.
+def why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig) -> str | None:
+    """Return a message where the angles are not those of a rotation about a fixed pivot.
 
     Parameters
     ----------
-    path : Path
-        The clip, for the message.
     detections : Detections
         The coarse pass.
     ok : ndarray
@@ -50,41 +46,11 @@ def require_rotation(path: Path, detections: Detections, ok: Flags, angles: Angl
     rig : Rig
         Whether the pivot is declared.
 
-    Raises
-    ------
-    InputError
-        One line with the cause, and what can be declared.
-    """
-    cause = _why_no_rotation(detections, ok, angles, rig)
-    if cause is not None:
-        raise InputError(f"{path}: {cause}")
-
-
-def why_few(status: Sequence[str], least: float) -> str | None:
-    """Return a message where less than a share of the frames is measured.
-
-    Parameters
-    ----------
-    status : sequence of str
-        Of every frame.
-    least : float
-        The share that the rig requires: ``least_measured``.
-
     Returns
     -------
     str or None
-        With the counts and causes, and how to accept fewer.
+        With the cause, and what can be declared.
     """
-    measured = sum(s == OK for s in status)
-    if measured >= least * len(status):
-        return None
-    return (
-        f"only {measured} of {len(status)} frames are measured ({causes_seen(status)}), less than a share of {least:g};"
-        " to accept fewer, declare least_measured: in rig.yaml"
-    )
-
-
-def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig) -> str | None:
     declared = rig.pivot.expected is not None
     seen_to_turn = detections.body is not None or angles.registered is not None
     lost = sum(s == "no_mouth" for s, measured in zip(detections.status, ok, strict=True) if not measured)
@@ -110,6 +76,30 @@ def _why_no_rotation(detections: Detections, ok: Flags, angles: Angles, rig: Rig
             " hint at that point: pivot: {near: [x, y]} in rig.yaml"
         )
     return None
+
+
+def why_few(status: Sequence[str], least: float) -> str | None:
+    """Return a message where less than a share of the frames is measured.
+
+    Parameters
+    ----------
+    status : sequence of str
+        Of every frame.
+    least : float
+        The share that the rig requires: ``least_measured``.
+
+    Returns
+    -------
+    str or None
+        With the counts and causes, and how to accept fewer.
+    """
+    measured = sum(s == OK for s in status)
+    if measured >= least * len(status):
+        return None
+    return (
+        f"only {measured} of {len(status)} frames are measured ({causes_seen(status)}), less than a share of {least:g};"
+        " to accept fewer, declare least_measured: in rig.yaml"
+    )
 
 
 def _why_not_seen_to_turn(angles: Angles) -> str | None:

@@ -204,8 +204,10 @@ class Film:
         return self._samples[most]
 
     def stills(self, most: int) -> list[Picture]:
-        """Return the pictures of the frames that `sample` returns, to be converted when they are needed."""
-        return self._evenly_spaced(most)[0]
+        """Return at most ``most`` pictures, spread over the film, to be converted when they are needed."""
+        decoded = [(number, row) for number, row in self.rows.kept.rows if row[1] is not None]
+        chosen = np.linspace(0, len(decoded) - 1, min(most, len(decoded))).round().astype(int)
+        return [self.picture(*decoded[k]) for k in chosen]
 
     def _evenly_spaced(self, most: int) -> tuple[list[Picture], int]:
         """Return at most ``most`` pictures, and of how many they are chosen."""

@@ -36,6 +36,9 @@ _ELONGATED = 2.5
 _TOLERANCE_PX = 2.0
 _ALIKE = 0.5
 """Difference of the logarithms of size and contrast up to which two patches may be one object."""
+_STRAIGHT = 30.0
+"""Radius of a circle, in sides of the picture, that passes for a straight line: over the whole side it is off by 1/240
+of it, and over what usually moves by less than a pixel. What slides has to be proposed, too, as a rival."""
 _DRAWS = 1500
 """Of one level and sign."""
 _MOST = 12
@@ -59,7 +62,7 @@ class Patches:
 def proposals(sample: Sample) -> list[Proposal]:
     """Return at most twelve proposals, those for which most frames vote first."""
     count = len(sample.pictures)
-    longest = 10.0 * max(sample.pictures.shape[1:])
+    longest = _STRAIGHT * max(sample.pictures.shape[1:])
     tracks = []
     for patches in _all_patches(sample):
         if len(np.unique(patches.frame)) < max(3, count // 4):

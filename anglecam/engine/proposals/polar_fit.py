@@ -160,6 +160,8 @@ def roundness(x: Array, y: Array, value: Array, centres: Floats) -> Floats:
     mean = value.mean()
     total = ((value - mean) ** 2).sum()
     result = np.zeros(len(centres))
+    if total == 0.0:
+        return result  # a single pixel has no rings
     for i in range(len(centres)):
         far = np.sqrt((x - centres[i, 0]) ** 2 + (y - centres[i, 1]) ** 2)
         count, inside = np.zeros(int(far.max()) + 2), np.zeros(int(far.max()) + 2)
