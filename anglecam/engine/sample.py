@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -37,7 +38,10 @@ _LEAST_NOISE = 0.5
 _LEAST_FRAMES = 8
 """Fewest frames from which a body and its background can be learnt, each half from the other."""
 _LEAST_SIDE_PX = 8
-_MAD = 1.4826
+_MAD, _AT_REST = 1.4826, 3.1383
+"""Standard deviation of normal values over the median of their magnitudes, and over the lower quartile."""
+_NOISIER = 3.0
+"""Times the upper quartile of all frames that the noise of a frame may be."""
 _DARK, _BRIGHT = 16.0, 235.0
 """Grey levels between which a pixel follows the light; black and white of television."""
 _LIGHT_PIXELS, _LEAST_LIGHT_PIXELS = 2000, 50
@@ -70,8 +74,18 @@ class Sample:
 
     def excess(self, picture: NDArray[np.float32]) -> float:
         """Return by how much the variance of a pixel at rest is larger in a frame than usual, grey levels²."""
-        usual = _MAD * float(np.nanmedian(np.abs(picture - self.median)))
-        return max(0.0, usual**2 - self.noise**2)
+        return max(0.0, min(self._deviation(picture), self._most_noise) ** 2 - self.noise**2)
+
+    @cached_property
+    def _most_noise(self) -> float:
+        """Grey levels. What differs more is no noise: something else is before the camera."""
+        return _NOISIER * float(np.quantile([self._deviation(picture) for picture in self.pictures], 0.75))
+
+    def _deviation(self, picture: NDArray[np.float32]) -> float:
+        """Return the standard deviation of pixels at rest about the median, grey levels."""
+        off = np.abs(picture - self.median)
+        known = off[np.isfinite(off)]
+        return _AT_REST * float(np.quantile(known, 0.25)) if known.size else 0.0
 
     def place(self, point_px: Floats) -> Floats:
         """Map points (…, 2) of the film, px, to the sample."""
