@@ -73,6 +73,15 @@ def turned(centre: Floats, turn: float, shift: Floats | None = None) -> Floats:
     return np.column_stack([rotation, offset])
 
 
+def rotations(turn: Floats) -> tuple[Floats, Floats]:
+    """Return the (n, 2, 2) matrices of turns (n,), rad, as in `turned`, and their derivatives."""
+    cos, sin = np.cos(turn), np.sin(turn)
+    return (
+        np.stack([np.stack([cos, sin], -1), np.stack([-sin, cos], -1)], 1),
+        np.stack([np.stack([-sin, cos], -1), np.stack([-cos, -sin], -1)], 1),
+    )
+
+
 def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int64]) -> Target:
     """Learn body and background from some frames of a sample.
 

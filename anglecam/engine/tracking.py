@@ -14,20 +14,19 @@ import numpy as np
 from scipy import stats
 
 from anglecam.data.typing import Flags, Floats, Image
-from anglecam.engine.path import steadiest_path
-from anglecam.engine.refine import (
+from anglecam.engine.body import (
     STANDS,
     Body,
-    Fit,
     Turn,
     body_of,
     frame_of,
     gains_about,
-    refine,
     turn_near,
     turns_to_try,
     with_ratio,
 )
+from anglecam.engine.path import steadiest_path
+from anglecam.engine.refine import Fit, refine
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import NOTHING, carried_by, score
 from anglecam.engine.target import Picture

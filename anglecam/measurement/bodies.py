@@ -9,8 +9,8 @@ import numpy as np
 
 from anglecam.data.series import AngleSeries, Body
 from anglecam.data.typing import Floats
+from anglecam.engine.body import body_of
 from anglecam.engine.every_body import Moving, elsewhere, probability, turns_relative
-from anglecam.engine.refine import body_of
 from anglecam.engine.sample import FRAMES
 from anglecam.io.rig import Rig
 from anglecam.measurement.detections import Detections

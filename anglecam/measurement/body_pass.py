@@ -10,9 +10,10 @@ import numpy as np
 from anglecam.camera.lens import lens_from_rig
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
+from anglecam.engine.body import Turn
 from anglecam.engine.learn import Hints, learn
 from anglecam.engine.reasons import why_ambiguous, why_jump, why_not_as_hinted, why_nothing_turns
-from anglecam.engine.refine import Turn, sensitivities
+from anglecam.engine.refine import sensitivities
 from anglecam.engine.sample import FRAMES, Sample, Stills
 from anglecam.engine.target import Picture as Grey
 from anglecam.engine.tracking import Search, Track, candidates, chosen, search_for, steadier

@@ -15,9 +15,10 @@ from anglecam.camera.shutter import measurement_time
 from anglecam.data.command import Command
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats
+from anglecam.engine.body import Turn
 from anglecam.engine.every_body import MOST, Moving, further_bodies, without
 from anglecam.engine.reasons import why_ambiguous, why_jump
-from anglecam.engine.refine import Turn, sensitivities
+from anglecam.engine.refine import sensitivities
 from anglecam.engine.sample import FRAMES
 from anglecam.engine.score import Proposal, carried_by
 from anglecam.engine.target import Picture
