@@ -55,7 +55,7 @@ def follow_mark_or_body(
     progress: Progress = unseen,
     known: FoundMark | None = None,
 ) -> Followed:
-    """Measure the angle of the mark or, where none is declared and none is found, of the body that turns.
+    """Measure the angle of the mark or, where no colour is declared and no mark turns, of the body that turns.
 
     Parameters
     ----------
@@ -85,17 +85,13 @@ def follow_mark_or_body(
     by_mark = mark if isinstance(mark, str) else _measured(film, rig, command, mark, progress)
     if isinstance(by_mark, Followed):
         return by_mark
-    # a mark that moves otherwise is what the film shows, unless something else may be declared
-    final = known is not None or film.undecodable == len(film.times) or not (isinstance(mark, str) or _hinted(rig))
+    # nothing else is meant by a colour, nor in the other parts of a film
+    final = known is not None or film.undecodable == len(film.times) or rig.mark_rgb is not None
     cause = camera.unknown or (by_mark if final else None)
     by_body = cause or _measured(film, rig, command, detect_body(camera, rig, progress), progress)
     if isinstance(by_body, Followed):
         return by_body
     raise InputError(f"{film.path}: {by_body}")
-
-
-def _hinted(rig: Rig) -> bool:
-    return rig.pointed_mark is not None or rig.pivot.expected is not None
 
 
 def _measured(

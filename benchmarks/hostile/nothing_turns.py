@@ -272,8 +272,7 @@ def _lissajous(colour: tuple[int, ...]) -> Iterator[np.ndarray]:
     return _balls(path, 11, colour, room(seed=37))
 
 
-def _elastic() -> Iterator[np.ndarray]:
-    swing = np.radians(18) * np.sin(2 * np.pi * 0.8 * T)
+def _elastic(swing: np.ndarray) -> Iterator[np.ndarray]:
     length = 140 + 22 * np.sin(2 * np.pi * 1.7 * T + 1.0)
 
     def draw(picture: np.ndarray, i: int) -> None:
@@ -347,5 +346,7 @@ def films() -> Iterator[Film]:
     yield Film("ellipse-red", _ellipse(RED, 0.75, 36))
     yield Film("ellipse-blue", _ellipse(BLUE, 0.7, 37))
     yield Film("lissajous-red", _lissajous(RED))
-    yield Film("elastic-pendulum-red", _elastic())
+    swing = np.radians(18) * np.sin(2 * np.pi * 0.8 * T)
+    # its mark turns about no fixed point, but its thread does
+    yield Film("elastic-pendulum-red", _elastic(swing), angle_deg=np.degrees(swing))
     yield Film("spiral-red", _spiral())
