@@ -1,8 +1,8 @@
 """The most probable way through the turns that a body may have in each frame, if it goes on as it went before.
 
 The change of its speed from frame to frame has a distribution with long tails (Cauchy): mostly small, and sometimes
-sudden. A step is rather short than long. The cost of a way is found by dynamic programming over the turns of two
-neighbouring frames.
+sudden. So have its steps: most are no longer than most others of the film. The cost of a way is found by dynamic
+programming over the turns of two neighbouring frames.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from anglecam.data.typing import Floats
 _TURN = 2.0 * np.pi
 _FAST = np.pi / 3.0
 """Standard deviation of a step between frames, rad: of steps that look alike, as of a wheel's spokes, the shorter."""
+_MOST = 0.9
+"""Share of the steps that are no longer than the scale of their distribution."""
 _SAME = 6.0
 """Multiple of the resolution by which two steps are other ones."""
 _ROUNDS = 3
@@ -54,16 +56,18 @@ def steadiest_path(
         return path, margin
     angle, gain, time = [turns[k] for k in used], [gains[k] for k in used], times[used]
     steps = [_wrapped(b[None, :] - a[:, None]) for a, b in pairwise(angle)]
-    scale = resolution
+    scale, longest = resolution, _FAST
     for _ in range(_ROUNDS):
-        order, apart = _least_cost(steps, gain, time, scale, resolution)
-        scale = max(resolution, _usual_change(np.array([a[k] for a, k in zip(angle, order, strict=True)]), time))
+        order, apart = _least_cost(steps, gain, time, (scale, longest), resolution)
+        way = np.array([a[k] for a, k in zip(angle, order, strict=True)])
+        scale = max(resolution, _usual_change(way, time))
+        longest = max(resolution, float(np.quantile(np.abs(_wrapped(np.diff(way))), _MOST)))
     path[used], margin[used] = order, apart
     return path, margin
 
 
 def _least_cost(
-    steps: list[Floats], gain: list[Floats], time: Floats, scale: float, resolution: float
+    steps: list[Floats], gain: list[Floats], time: Floats, scales: tuple[float, float], resolution: float
 ) -> tuple[list[int], Floats]:
     """Return the turns of the way of least cost, and for each by how much the best way with another step costs more."""
     n = len(gain)
@@ -71,12 +75,12 @@ def _least_cost(
     until = [-gain[0][:, None] - gain[1][None, :]]
     arrived: list[NDArray[np.int64]] = []
     for k in range(1, n - 1):
-        cost = until[-1][:, :, None] + _change_cost(steps[k - 1], steps[k], time[k - 1 : k + 2], scale)
+        cost = until[-1][:, :, None] + _change_cost(steps[k - 1], steps[k], time[k - 1 : k + 2], *scales)
         arrived.append(cost.argmin(axis=0))
         until.append(cost.min(axis=0) - gain[k + 1][None, :])
     since = [np.zeros((len(gain[-2]), len(gain[-1])))]
     for k in range(n - 2, 0, -1):
-        change = _change_cost(steps[k - 1], steps[k], time[k - 1 : k + 2], scale)
+        change = _change_cost(steps[k - 1], steps[k], time[k - 1 : k + 2], *scales)
         since.append((change + (since[-1] - gain[k + 1][None, :])[None]).min(axis=2))
     since.reverse()
     a, b = np.unravel_index(int(until[-1].argmin()), until[-1].shape)
@@ -98,12 +102,13 @@ def _wrapped(turn: Floats) -> Floats:
     return np.asarray((turn + np.pi) % _TURN - np.pi)
 
 
-def _change_cost(before: Floats, after: Floats, time: Floats, scale: float) -> Floats:
+def _change_cost(before: Floats, after: Floats, time: Floats, scale: float, longest: float) -> Floats:
     """Return (a, b, c) cost of the step (b, c) after the step (a, b); a step may lead around either way."""
     first, second = time[1] - time[0], time[2] - time[1]
     expected = before[:, :, None] * (second / first)
     change = _wrapped(after[None] - expected) / (scale * max(1.0, second / first))
-    return np.asarray(np.log1p(change**2) + 0.5 * (after[None] / _FAST) ** 2)
+    step = np.log1p((after / longest) ** 2) + 0.5 * (after / _FAST) ** 2
+    return np.asarray(np.log1p(change**2) + step[None])
 
 
 def _usual_change(angle: Floats, time: Floats) -> float:
