@@ -22,6 +22,8 @@ _FINALISTS = 4
 """Proposals that are fitted to the whole sample."""
 SURE = 6.0
 """Standard errors by which a body that turns has to predict better than its rivals."""
+EXPECTED = 2.0
+"""The same where somebody says that it turns: chance does as well once in 40 times."""
 OFF_CENTRE = 0.03
 """Share of its travel by which a body may be off a turn about one centre; its angle is then off by as much."""
 LEAST_TURN = np.radians(1.0)
@@ -39,6 +41,8 @@ class Explanation:
     rival: Score
     """Of the same frames by the best of what it may be mistaken for: nothing moves, or a body moves along a straight
     line and does not turn."""
+    sure: float = SURE
+    """Standard errors that its lead has to reach."""
 
     @property
     def lead(self) -> float:
@@ -49,10 +53,10 @@ class Explanation:
     def turns(self) -> bool:
         """Whether it is a body that turns about one centre."""
         turned = float(np.ptp(self.fit.proposal.turn[self.fit.seen]))
-        return self.lead >= SURE and self.fit.off_centre <= OFF_CENTRE and turned >= LEAST_TURN
+        return self.lead >= self.sure and self.fit.off_centre <= OFF_CENTRE and turned >= LEAST_TURN
 
 
-def compete(sample: Sample, proposals: Sequence[Proposal]) -> list[Explanation]:
+def compete(sample: Sample, proposals: Sequence[Proposal], declared: Sequence[Proposal] = ()) -> list[Explanation]:
     """Return the explanations of a sample, the surest first.
 
     Parameters
@@ -61,9 +65,22 @@ def compete(sample: Sample, proposals: Sequence[Proposal]) -> list[Explanation]:
         K frames.
     proposals : sequence of Proposal
         Many, of which most are wrong.
+    declared : sequence of Proposal
+        From what somebody declares: the best of them are fitted to the whole sample whatever else is found.
     """
     small = halved(sample)
     still = score(small, NOTHING, [None] * len(small.pictures))
+    finalists = _unlike(sample, _in_order(small, declared, still), [], _FINALISTS // 2)
+    finalists += _unlike(sample, _in_order(small, proposals, still), finalists, _FINALISTS)
+    fits = [fit for proposal in finalists if (fit := refine(sample, proposal)) is not None]
+    rivals = [score(sample, NOTHING, [None] * len(sample.pictures)), *(_sliding(sample, fit) for fit in fits)]
+    best = max(rivals, key=lambda one: one.total)
+    found = [Explanation(fit, score(sample, fit.proposal.name, fit.proposal.poses(sample)), best) for fit in fits]
+    return sorted(found, key=lambda one: (not one.turns, -one.score.total if one.turns else -one.lead))
+
+
+def _in_order(small: Sample, proposals: Sequence[Proposal], still: Score) -> list[Proposal]:
+    """Return proposals that are fitted to a small sample, those that predict best first."""
     rough: list[tuple[Score, Proposal]] = []
     for proposal in proposals:
         fit = refine(small, proposal.every_other(), 1)
@@ -73,15 +90,16 @@ def compete(sample: Sample, proposals: Sequence[Proposal]) -> list[Explanation]:
     # what explains much of a few frames, and what explains a little of all
     most = sorted(rough, key=lambda one: -one[0].total)
     surest = sorted(rough, key=lambda one: -one[0].lead(still))
-    finalists: list[Proposal] = []
-    for _, proposal in itertools.chain.from_iterable(zip(most, surest, strict=True)):
-        if len(finalists) < _FINALISTS and not any(_alike(sample, proposal, other) for other in finalists):
-            finalists.append(proposal)
-    fits = [fit for proposal in finalists if (fit := refine(sample, proposal)) is not None]
-    rivals = [score(sample, NOTHING, [None] * len(sample.pictures)), *(_sliding(sample, fit) for fit in fits)]
-    best = max(rivals, key=lambda one: one.total)
-    found = [Explanation(fit, score(sample, fit.proposal.name, fit.proposal.poses(sample)), best) for fit in fits]
-    return sorted(found, key=lambda one: (not one.turns, -one.score.total if one.turns else -one.lead))
+    return [proposal for _, proposal in itertools.chain.from_iterable(zip(most, surest, strict=True))]
+
+
+def _unlike(sample: Sample, proposals: Sequence[Proposal], taken: Sequence[Proposal], most: int) -> list[Proposal]:
+    """Return the first proposals that differ from each other and from those that are taken."""
+    chosen: list[Proposal] = []
+    for proposal in proposals:
+        if len(chosen) < most and not any(_alike(sample, proposal, other) for other in (*taken, *chosen)):
+            chosen.append(proposal)
+    return chosen
 
 
 def halved(sample: Sample) -> Sample:

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from anglecam.data.typing import Floats
-from anglecam.engine.competition import Explanation, compete
-from anglecam.engine.proposals import blobs, features, polar
+from anglecam.engine.competition import EXPECTED, Explanation, compete
+from anglecam.engine.hints import NO_HINTS, Hints, obeys
+from anglecam.engine.proposals import blobs, declared, features, polar
 from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample, Stills, sample_part, sample_stills
 from anglecam.engine.score import Proposal
-from anglecam.engine.target import turned
 from anglecam.threads import one_opencv_thread
 
 Finder = Callable[[Sample], list[Proposal]]
@@ -23,23 +23,6 @@ CLOSER = 1.3
 """Least enlargement for which the pictures are sampled again."""
 _MARGIN = 0.1
 """Of the surroundings of what a body sweeps, as a share of its extent."""
-
-
-@dataclass(frozen=True)
-class Hints:
-    """What somebody declares about the body; px of the film."""
-
-    pivot_px: Floats | None = None
-    """(2,) about where it turns."""
-    pivot_sigma_px: float = 30.0
-    """Standard uncertainty of each coordinate."""
-    mark_px: Floats | None = None
-    """(4,) box, left, top, right, bottom, that covers a part of it."""
-    mark_frame: int = 0
-    """In which frame of the film."""
-
-
-NO_HINTS = Hints()
 
 
 @dataclass(frozen=True)
@@ -89,15 +72,22 @@ def learn(stills: Stills, hints: Hints = NO_HINTS) -> Learnt | None:
 
 def _explained(sample: Sample, stills: Stills, hints: Hints) -> Learnt:
     proposals = [one for find in FINDERS for one in find(sample)]
-    found = sorted(compete(sample, proposals), key=lambda one: _rank(Learnt(sample, (one,)), hints))
+    fits = compete(sample, proposals, declared.proposals(sample, hints))
+    found = sorted(_expected(fits, sample, hints), key=lambda one: _rank(Learnt(sample, (one,)), hints))
     if not found:
         return Learnt(sample, ())
     closer = sample_part(stills, swept(sample, found[0].fit))
     if closer is not None and closer.scale > CLOSER * sample.scale:
         again = compete(closer, [found[0].fit.proposal.in_frames(sample.frames, closer.frames)])
+        again = _expected(again, closer, hints)
         if again and (again[0].turns or not found[0].turns):
             return Learnt(closer, (again[0], *found[1:]), sample)
     return Learnt(sample, tuple(found))
+
+
+def _expected(found: Sequence[Explanation], sample: Sample, hints: Hints) -> list[Explanation]:
+    """Return explanations; of a body that somebody says to turn less has to be shown."""
+    return [replace(one, sure=EXPECTED) if hints and obeys(one.fit, sample, hints) else one for one in found]
 
 
 def _rank(one: Learnt, hints: Hints) -> int:
@@ -107,36 +97,7 @@ def _rank(one: Learnt, hints: Hints) -> int:
     """
     if not one.turns:
         return 2
-    return 0 if obeys(one.explanations[0], one.sample, hints) else 1
-
-
-def obeys(one: Explanation, sample: Sample, hints: Hints) -> bool:
-    """Return whether a body turns about the hinted pivot and is where it was pointed at."""
-    if hints.pivot_px is not None:
-        off = one.fit.proposal.centre_px - hints.pivot_px
-        spread = one.fit.covariance_px2 + hints.pivot_sigma_px**2 * np.eye(2)
-        if off @ np.linalg.solve(spread, off) > _FAR:
-            return False
-    if hints.mark_px is None:
-        return True
-    k = int(np.argmin(np.abs(sample.frames - hints.mark_frame)))
-    turn = one.fit.proposal.turn[k]
-    if sample.frames[k] != hints.mark_frame or not np.isfinite(turn):
-        return True  # nothing contradicts it
-    rows, columns = np.nonzero(one.fit.target.visibility)
-    places = np.column_stack([columns, rows]) - float(one.fit.target.pad)
-    pose = turned(sample.place(one.fit.proposal.centre_px), float(turn))
-    there = sample.in_film(places @ pose[:, :2].T + pose[:, 2])
-    there = np.vstack([there, one.fit.proposal.centre_px])  # a hub is not seen to turn
-    slack = _BESIDE_PX / sample.scale
-    low, high = hints.mark_px[:2] - slack, hints.mark_px[2:] + slack
-    return bool(((there >= low) & (there <= high)).all(axis=1).any())
-
-
-_FAR = 9.0
-"""Squared standard uncertainties by which a hint may be off the centre: true hints are so in 1 % of all films."""
-_BESIDE_PX = 3.0
-"""Of the sample: by which a place that is pointed at may lie beside the body."""
+    return 0 if obeys(one.explanations[0].fit, one.sample, hints) else 1
 
 
 def swept(sample: Sample, fit: Fit) -> Floats:

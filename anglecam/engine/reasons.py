@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from anglecam.data.typing import Flags, Floats
-from anglecam.engine.competition import OFF_CENTRE, SURE
-from anglecam.engine.learn import Hints, Learnt, obeys
+from anglecam.engine.competition import OFF_CENTRE
+from anglecam.engine.hints import Hints, obeys
+from anglecam.engine.learn import Learnt
 
 _UNSURE = 10
 """Frames in which a look-alike pose is nearly as probable: each is wrong with a probability of less than 0.05, so that
@@ -36,8 +37,10 @@ def why_nothing_turns(learnt: Learnt | None, first_frame: int) -> str:
     seen = f"something moves around {x:.0f},{y:.0f}"
     if learnt.explanations:
         best = learnt.explanations[0]
-        if best.lead < SURE:
-            seen += f", but nothing shows that it turns: {best.lead:.1f} standard errors, of {SURE:g} that it takes"
+        if best.lead < best.sure:
+            seen += (
+                f", but nothing shows that it turns: {best.lead:.1f} standard errors, of {best.sure:g} that it takes"
+            )
         elif best.fit.off_centre <= OFF_CENTRE:
             seen += ", but it turns by less than 1°, which a thing that stretches does as well"
         else:
@@ -86,7 +89,7 @@ def why_jump(turn: Floats, first_frame: int) -> str | None:
 def why_not_as_hinted(learnt: Learnt, hints: Hints) -> str | None:
     """Return a sentence where what turns is not what the hints say."""
     first = learnt.explanations[0]
-    if obeys(first, learnt.sample, hints):
+    if obeys(first.fit, learnt.sample, hints):
         return None
     x, y = first.fit.proposal.centre_px
     meant = []

@@ -8,6 +8,7 @@ around changes the picture in rings, and their centre is found without following
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -90,12 +91,16 @@ class _Followed:
     """By how much the frames are better predicted than without a turn, nats."""
 
 
-def proposals(sample: Sample) -> list[Proposal]:
-    """Return what may turn in a sample, at most `MOST`, likely ones first."""
+def proposals(sample: Sample, near_px: Sequence[Floats] = ()) -> list[Proposal]:
+    """Return what may turn in a sample, at most `MOST`, likely ones first.
+
+    With places (2,) of the film, px, it is sought about these alone.
+    """
     runs = []
     for sharp in (False, True):
         coarse, fine = _stack(sample, *_COARSE, sharp), _stack(sample, *_FINE, sharp)
-        runs.append([(fine.scale, one) for one in _search(coarse, fine)] if len(coarse.changed[0]) > 0 else [])
+        near = [(sample.place(at) + 0.5) * coarse.scale - 0.5 for at in near_px]
+        runs.append([(fine.scale, one) for one in _search(coarse, fine, near)] if len(coarse.changed[0]) > 0 else [])
     mixed = [one for pair in itertools.zip_longest(*runs) for one in pair if one is not None]
     return [
         Proposal(
@@ -107,14 +112,17 @@ def proposals(sample: Sample) -> list[Proposal]:
     ]
 
 
-def _search(coarse: _Stack, fine: _Stack) -> list[_Followed]:
+def _search(coarse: _Stack, fine: _Stack, near: Sequence[Floats]) -> list[_Followed]:
     """Return the bodies that are best followed, half of `MOST`."""
-    grid = [_best(coarse, centre, 1, 2) for centre in _centres(coarse)]
+    grid = [_best(coarse, centre, 1, 2) for centre in near or _centres(coarse)]
     starts: list[_Followed] = []
     for one in sorted(grid, key=lambda one: -one.gain):
         if len(starts) < MOST // 2 and all(np.hypot(*(one.centre - c.centre)) > 1.5 * _STEP for c in starts):
             starts.append(one)
-    found = [_climb(coarse, _best(coarse, centre, 2, 2), (0.5, 0.25), 0) for centre in round_centres(coarse)]
+    found = [
+        _climb(coarse, _best(coarse, centre, 2, 2), (0.5, 0.25), 0)
+        for centre in ([] if near else round_centres(coarse))
+    ]
     found += [_climb(coarse, one, (_STEP / 2, _STEP / 4, _STEP / 8), 0) for one in starts]
     result: list[_Followed] = []
     for one in found:

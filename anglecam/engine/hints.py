@@ -1,0 +1,60 @@
+"""What somebody declares about the body, and whether a body is the declared one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from anglecam.data.typing import Floats
+from anglecam.engine.refine import Fit
+from anglecam.engine.sample import Sample
+from anglecam.engine.target import turned
+
+_FAR = 9.0
+"""Squared standard uncertainties by which a hint may be off the centre: true hints are so in 1 % of all films."""
+_BESIDE_PX = 3.0
+"""Of the sample: by which a place that is pointed at may lie beside the body."""
+
+
+@dataclass(frozen=True)
+class Hints:
+    """What is declared; px of the film."""
+
+    pivot_px: Floats | None = None
+    """(2,) about where it turns."""
+    pivot_sigma_px: float = 30.0
+    """Standard uncertainty of each coordinate."""
+    mark_px: Floats | None = None
+    """(4,) box, left, top, right, bottom, that covers a part of it."""
+    mark_frame: int = 0
+    """In which frame of the film."""
+
+    def __bool__(self) -> bool:
+        return self.pivot_px is not None or self.mark_px is not None
+
+
+NO_HINTS = Hints()
+
+
+def obeys(fit: Fit, sample: Sample, hints: Hints) -> bool:
+    """Return whether a body turns about the hinted pivot and is where it was pointed at."""
+    if hints.pivot_px is not None:
+        off = fit.proposal.centre_px - hints.pivot_px
+        spread = fit.covariance_px2 + hints.pivot_sigma_px**2 * np.eye(2)
+        if off @ np.linalg.solve(spread, off) > _FAR:
+            return False
+    if hints.mark_px is None:
+        return True
+    k = int(np.argmin(np.abs(sample.frames - hints.mark_frame)))
+    turn = fit.proposal.turn[k]
+    if sample.frames[k] != hints.mark_frame or not np.isfinite(turn):
+        return True  # nothing contradicts it
+    rows, columns = np.nonzero(fit.target.visibility)
+    places = np.column_stack([columns, rows]) - float(fit.target.pad)
+    pose = turned(sample.place(fit.proposal.centre_px), float(turn))
+    there = sample.in_film(places @ pose[:, :2].T + pose[:, 2])
+    there = np.vstack([there, fit.proposal.centre_px])  # a hub is not seen to turn
+    slack = _BESIDE_PX / sample.scale
+    low, high = hints.mark_px[:2] - slack, hints.mark_px[2:] + slack
+    return bool(((there >= low) & (there <= high)).all(axis=1).any())
