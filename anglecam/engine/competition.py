@@ -22,8 +22,6 @@ _FINALISTS = 4
 """Proposals that are fitted to the whole sample."""
 SURE = 6.0
 """Standard errors by which a body that turns has to predict better than its rivals."""
-EXPECTED = 2.0
-"""The same where somebody says that it turns: chance does as well once in 40 times."""
 OFF_CENTRE = 0.03
 """Share of its travel by which a body may be off a turn about one centre; its angle is then off by as much."""
 LEAST_TURN = np.radians(1.0)
@@ -41,8 +39,6 @@ class Explanation:
     rival: Score
     """Of the same frames by the best of what it may be mistaken for: nothing moves, or a body moves along a straight
     line and does not turn."""
-    sure: float = SURE
-    """Standard errors that its lead has to reach."""
 
     @property
     def lead(self) -> float:
@@ -53,7 +49,7 @@ class Explanation:
     def turns(self) -> bool:
         """Whether it is a body that turns about one centre."""
         turned = float(np.ptp(self.fit.proposal.turn[self.fit.seen]))
-        return self.lead >= self.sure and self.fit.off_centre <= OFF_CENTRE and turned >= LEAST_TURN
+        return self.lead >= SURE and self.fit.off_centre <= OFF_CENTRE and turned >= LEAST_TURN
 
 
 def compete(sample: Sample, proposals: Sequence[Proposal], declared: Sequence[Proposal] = ()) -> list[Explanation]:

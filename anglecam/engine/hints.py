@@ -30,9 +30,6 @@ class Hints:
     mark_frame: int = 0
     """In which frame of the film."""
 
-    def __bool__(self) -> bool:
-        return self.pivot_px is not None or self.mark_px is not None
-
 
 NO_HINTS = Hints()
 

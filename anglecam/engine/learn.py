@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from anglecam.data.typing import Floats
-from anglecam.engine.competition import EXPECTED, Explanation, compete
+from anglecam.engine.competition import Explanation, compete
 from anglecam.engine.hints import NO_HINTS, Hints, obeys
 from anglecam.engine.proposals import blobs, declared, features, polar
 from anglecam.engine.refine import Fit
@@ -73,21 +73,15 @@ def learn(stills: Stills, hints: Hints = NO_HINTS) -> Learnt | None:
 def _explained(sample: Sample, stills: Stills, hints: Hints) -> Learnt:
     proposals = [one for find in FINDERS for one in find(sample)]
     fits = compete(sample, proposals, declared.proposals(sample, hints))
-    found = sorted(_expected(fits, sample, hints), key=lambda one: _rank(Learnt(sample, (one,)), hints))
+    found = sorted(fits, key=lambda one: _rank(Learnt(sample, (one,)), hints))
     if not found:
         return Learnt(sample, ())
     closer = sample_part(stills, swept(sample, found[0].fit))
     if closer is not None and closer.scale > CLOSER * sample.scale:
         again = compete(closer, [found[0].fit.proposal.in_frames(sample.frames, closer.frames)])
-        again = _expected(again, closer, hints)
         if again and (again[0].turns or not found[0].turns):
             return Learnt(closer, (again[0], *found[1:]), sample)
     return Learnt(sample, tuple(found))
-
-
-def _expected(found: Sequence[Explanation], sample: Sample, hints: Hints) -> list[Explanation]:
-    """Return explanations; of a body that somebody says to turn less has to be shown."""
-    return [replace(one, sure=EXPECTED) if hints and obeys(one.fit, sample, hints) else one for one in found]
 
 
 def _rank(one: Learnt, hints: Hints) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anglecam.data.typing import Flags, Floats
-from anglecam.engine.competition import OFF_CENTRE
+from anglecam.engine.competition import OFF_CENTRE, SURE
 from anglecam.engine.hints import Hints, obeys
 from anglecam.engine.learn import Learnt
 
@@ -37,10 +37,8 @@ def why_nothing_turns(learnt: Learnt | None, first_frame: int) -> str:
     seen = f"something moves around {x:.0f},{y:.0f}"
     if learnt.explanations:
         best = learnt.explanations[0]
-        if best.lead < best.sure:
-            seen += (
-                f", but nothing shows that it turns: {best.lead:.1f} standard errors, of {best.sure:g} that it takes"
-            )
+        if best.lead < SURE:
+            seen += f", but nothing shows that it turns: {best.lead:.1f} standard errors, of {SURE:g} that it takes"
         elif best.fit.off_centre <= OFF_CENTRE:
             seen += ", but it turns by less than 1°, which a thing that stretches does as well"
         else:
