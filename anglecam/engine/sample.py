@@ -77,6 +77,11 @@ class Sample:
         return max(0.0, min(self._deviation(picture), self._most_noise) ** 2 - self.noise**2)
 
     @cached_property
+    def excesses(self) -> NDArray[np.float32]:
+        """(K,) the same of its pictures."""
+        return np.array([self.excess(picture) for picture in self.pictures], np.float32)
+
+    @cached_property
     def _most_noise(self) -> float:
         """Grey levels. What differs more is no noise: something else is before the camera."""
         return _NOISIER * float(np.quantile([self._deviation(picture) for picture in self.pictures], 0.75))

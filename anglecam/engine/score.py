@@ -113,11 +113,10 @@ def score(sample: Sample, name: str, poses: Sequence[Floats | None]) -> Score:
     count = len(sample.pictures)
     per_frame = np.empty(count)
     known = list(poses)
-    excess = [np.float32(sample.excess(picture)) for picture in sample.pictures]
     for half in range(2):
         target = learn_target(sample, known, np.arange(half, count, 2))
         for k in range(1 - half, count, 2):
             picture, variance = target.predict(known[k])
-            density = log_density(sample.pictures[k], picture, variance + excess[k])
+            density = log_density(sample.pictures[k], picture, variance + sample.excesses[k])
             per_frame[k] = float(density.sum(dtype=float))
     return Score(name, per_frame)

@@ -121,7 +121,7 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
     variance = variance * (often + 1.0) / np.maximum(often - 1.0, 1.0)
     variance = variance + sample.noise**2 + _FRACTION2 * _slope2(appearance)
     visibility = blank
-    excess = [np.float32(sample.excess(picture)) for picture in used]
+    excess = sample.excesses[use]
     for _ in range(_ROUNDS):
         behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
         gain = blank.copy()
