@@ -64,8 +64,8 @@ class Moving:
 def probability(lead: float) -> float:
     """Return the probability that an explanation predicts better than its best rival.
 
-    The mean over the frames of the difference of log densities is normal, with the standard error of a mean. Its lead
-    is that mean over the standard error, and the probability that the mean is positive is Φ(lead).
+    The share of what it would gain if it were right is normal, with the standard error of a ratio of sums. Its lead is
+    that share over the standard error, and the probability that the share is positive is Φ(lead).
     """
     return float(special.ndtr(lead))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from anglecam.data.typing import Flags, Floats
-from anglecam.engine.competition import OFF_CENTRE, SURE
+from anglecam.engine.competition import OFF_CENTRE, RIGHT, SURE
 from anglecam.engine.hints import Hints, obeys
 from anglecam.engine.learn import Learnt
 
@@ -39,6 +39,8 @@ def why_nothing_turns(learnt: Learnt | None, first_frame: int) -> str:
         best = learnt.explanations[0]
         if best.lead < SURE:
             seen += f", but nothing shows that it turns: {best.lead:.1f} standard errors, of {SURE:g} that it takes"
+        elif best.share < RIGHT:
+            seen += f", but a turn explains {best.share:.0%} of what it should, of {RIGHT:.0%} that it takes"
         elif best.fit.off_centre <= OFF_CENTRE:
             seen += ", but it turns by less than 1°, which a thing that stretches does as well"
         else:

@@ -1,14 +1,18 @@
 """Explanations of what moves compete: each learns on half of the sample and predicts the pixels of the other half.
 
-The currency is the log predictive density of held-out frames. Frames, not pixels, are the independent units: errors of
-an appearance or of a codec are shared by the pixels of a frame. The difference of two explanations therefore has the
-standard error of a mean over frames, and their ratio says how sure it is that one predicts better than the other.
+The currency is the log predictive density of held-out frames. Of two explanations, one gains in each frame something
+over the other, and it would gain a certain amount if the frame were exactly as it predicts. The share of what it would
+gain, over all frames, says how right it is; frames in which both predict the same say nothing, however many they are.
+Frames, not pixels, are the independent units: errors of an appearance or of a codec are shared by the pixels of a
+frame. The share has the standard error of a ratio of sums over frames (Cochran, Sampling Techniques, 1977), which says
+how sure it is that the one predicts better than the other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +23,8 @@ from anglecam.engine.sample import Sample
 from anglecam.engine.target import learn_target, turned
 
 NOTHING = "nothing moves"
+_MOST_VARIANCE = 256.0**2 / 2.0
+"""Grey levels²; no more has a pixel."""
 
 
 @dataclass(frozen=True)
@@ -86,16 +92,54 @@ class Score:
     per_frame: Floats = field(repr=False)
     """(K,) log density of each frame, learnt from frames that it is not among, nats."""
 
+    pictures: NDArray[np.float16] = field(repr=False)
+    """(K, h, w) what it predicts, grey levels; NaN where nothing is known of a frame."""
+    variances: NDArray[np.float16] = field(repr=False)
+    """(K, h, w) grey levels²."""
+
     @property
     def total(self) -> float:
         """Sum over the frames, nats."""
         return float(self.per_frame.sum())
 
+    @cached_property
+    def _if_right(self) -> Floats:
+        """(K,) log density of each frame if it were exactly as this explanation predicts."""
+        return self._of(self.pictures)
+
+    def _of(self, pictures: NDArray[np.float16]) -> Floats:
+        """Return the log density (K,) of other pictures (K, h, w)."""
+        return np.array(
+            [
+                float(
+                    log_density(*(one[k].astype(np.float32) for one in (pictures, self.pictures, self.variances))).sum()
+                )
+                for k in range(len(pictures))
+            ]
+        )
+
+    def over(self, other: Score) -> Lead:
+        """Return by how much this explanation predicts better than another one of the same frames."""
+        gained = self.per_frame - other.per_frame
+        expected = np.maximum(self._if_right - other._of(self.pictures), 0.0)
+        share = float(gained.sum()) / max(float(expected.sum()), 1e-9)
+        count = len(gained)
+        error = float(np.sqrt(((gained - share * expected) ** 2).sum() * count / (count - 1)))
+        return Lead(share, float(gained.sum()) / error if error > 0.0 else 0.0)
+
     def lead(self, other: Score) -> float:
-        """Return by how much this explanation predicts a frame better than another one, in standard errors."""
-        apart = self.per_frame - other.per_frame
-        error = float(apart.std(ddof=1)) / np.sqrt(len(apart))
-        return float(apart.mean()) / error if error > 0.0 else 0.0
+        """Return by how much this explanation predicts better than another one, in standard errors."""
+        return self.over(other).errors
+
+
+@dataclass(frozen=True)
+class Lead:
+    """By how much one explanation predicts better than another one."""
+
+    share: float
+    """Of what it would gain if it were right."""
+    errors: float
+    """The same in its standard errors."""
 
 
 def score(sample: Sample, name: str, poses: Sequence[Floats | None]) -> Score:
@@ -112,11 +156,14 @@ def score(sample: Sample, name: str, poses: Sequence[Floats | None]) -> Score:
     """
     count = len(sample.pictures)
     per_frame = np.empty(count)
+    pictures, variances = np.empty((2, *sample.pictures.shape), np.float16)
     known = list(poses)
     for half in range(2):
         target = learn_target(sample, known, np.arange(half, count, 2))
         for k in range(1 - half, count, 2):
             picture, variance = target.predict(known[k])
-            density = log_density(sample.pictures[k], picture, variance + sample.excesses[k])
-            per_frame[k] = float(density.sum(dtype=float))
-    return Score(name, per_frame)
+            variance = variance + sample.excesses[k]
+            per_frame[k] = float(log_density(sample.pictures[k], picture, variance).sum(dtype=float))
+            pictures[k] = np.where(np.isfinite(sample.pictures[k]), picture, np.nan)
+            variances[k] = np.minimum(variance, _MOST_VARIANCE)
+    return Score(name, per_frame, pictures, variances)
