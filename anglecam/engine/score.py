@@ -3,6 +3,7 @@
 The currency is the log predictive density of held-out frames. Of two explanations, one gains in each frame something
 over the other, and it would gain a certain amount if the frame were exactly as it predicts. The share of what it would
 gain, over all frames, says how right it is; frames in which both predict the same say nothing, however many they are.
+Only pixels count that the body covers in any frame: of two things that turn, each is right where it is.
 Frames, not pixels, are the independent units: errors of an appearance or of a codec are shared by the pixels of a
 frame. The share has the standard error of a ratio of sums over frames (Cochran, Sampling Techniques, 1977), which says
 how sure it is that the one predicts better than the other.
@@ -17,7 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from anglecam.data.typing import Floats
+from anglecam.data.typing import Flags, Floats
 from anglecam.engine.likelihood import log_density
 from anglecam.engine.sample import Sample
 from anglecam.engine.target import learn_target, turned
@@ -89,39 +90,40 @@ class Score:
     """How well an explanation predicts."""
 
     name: str
-    per_frame: Floats = field(repr=False)
-    """(K,) log density of each frame, learnt from frames that it is not among, nats."""
-
+    density: NDArray[np.float16] = field(repr=False)
+    """(K, h, w) log density of each pixel, learnt from frames that its own is not among, nats."""
     pictures: NDArray[np.float16] = field(repr=False)
     """(K, h, w) what it predicts, grey levels; NaN where nothing is known of a frame."""
     variances: NDArray[np.float16] = field(repr=False)
     """(K, h, w) grey levels²."""
+    covered: Flags = field(repr=False)
+    """(h, w) pixels that the body covers in any frame; all where there is none."""
 
-    @property
+    @cached_property
     def total(self) -> float:
-        """Sum over the frames, nats."""
-        return float(self.per_frame.sum())
+        """Sum over pixels and frames, nats."""
+        return float(self.density.sum(dtype=float))
 
     @cached_property
     def _if_right(self) -> Floats:
-        """(K,) log density of each frame if it were exactly as this explanation predicts."""
-        return self._of(self.pictures)
+        """(K,) log density of what is covered if each frame were exactly as this explanation predicts."""
+        return self._of(self)
 
-    def _of(self, pictures: NDArray[np.float16]) -> Floats:
-        """Return the log density (K,) of other pictures (K, h, w)."""
-        return np.array(
-            [
-                float(
-                    log_density(*(one[k].astype(np.float32) for one in (pictures, self.pictures, self.variances))).sum()
-                )
-                for k in range(len(pictures))
-            ]
-        )
+    def _of(self, other: Score) -> Floats:
+        """Return the log density (K,) of what another explanation predicts where its body is."""
+        count = len(other.pictures)
+        sums = np.empty(count)
+        for k in range(count):
+            picture, mean, variance = (
+                one[k].astype(np.float32) for one in (other.pictures, self.pictures, self.variances)
+            )
+            sums[k] = float(log_density(picture, mean, variance)[other.covered].sum(dtype=float))
+        return sums
 
     def over(self, other: Score) -> Lead:
         """Return by how much this explanation predicts better than another one of the same frames."""
-        gained = self.per_frame - other.per_frame
-        expected = np.maximum(self._if_right - other._of(self.pictures), 0.0)
+        gained = (self.density - other.density).sum(axis=(1, 2), where=self.covered, dtype=float)
+        expected = np.maximum(self._if_right - other._of(self), 0.0)
         share = float(gained.sum()) / max(float(expected.sum()), 1e-9)
         count = len(gained)
         error = float(np.sqrt(((gained - share * expected) ** 2).sum() * count / (count - 1)))
@@ -155,15 +157,19 @@ def score(sample: Sample, name: str, poses: Sequence[Floats | None]) -> Score:
         K maps from the coordinates of the body to the sample; all ``None``: nothing moves.
     """
     count = len(sample.pictures)
-    per_frame = np.empty(count)
-    pictures, variances = np.empty((2, *sample.pictures.shape), np.float16)
+    shape = sample.pictures.shape
+    density, pictures, variances = (np.empty(shape, np.float16) for _ in range(3))
+    covered = np.zeros(shape[1:], bool)
     known = list(poses)
     for half in range(2):
         target = learn_target(sample, known, np.arange(half, count, 2))
         for k in range(1 - half, count, 2):
-            picture, variance = target.predict(known[k])
+            pose = known[k]
+            picture, variance = target.predict(pose)
             variance = variance + sample.excesses[k]
-            per_frame[k] = float(log_density(sample.pictures[k], picture, variance).sum(dtype=float))
+            density[k] = log_density(sample.pictures[k], picture, variance)
             pictures[k] = np.where(np.isfinite(sample.pictures[k]), picture, np.nan)
             variances[k] = np.minimum(variance, _MOST_VARIANCE)
-    return Score(name, per_frame, pictures, variances)
+            if pose is not None:
+                covered |= target.covers(pose)
+    return Score(name, density, pictures, variances, covered if covered.any() else np.ones_like(covered))

@@ -82,9 +82,6 @@ def test_of_two_hinged_links_both_angles_are_measured(tmp_path):
     assert np.sqrt(((wander - np.median(wander, axis=0)) ** 2).mean()) < 0.5
 
 
-@pytest.mark.xfail(
-    reason="the stick's pivot is off by 14 px and its angle by 0.4°; what covers it in part is learnt with it"
-)
 def test_a_cart_beside_a_stick_translates(tmp_path):
     measured = _measured(tmp_path, _stick_and_cart)
     stick, cart = measured.bodies
