@@ -12,8 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import special
 
-from anglecam.data.typing import Floats
+from anglecam.data.typing import Flags, Floats
 
 _TURN = 2.0 * np.pi
 _FAST = np.pi / 3.0
@@ -24,6 +25,8 @@ _SAME = 6.0
 """Multiple of the resolution by which two steps are other ones."""
 _ROUNDS = 3
 """Of the way and of the usual change along it."""
+_SEEN = float(special.logit(0.95))
+"""Logarithm of the odds that a body is seen in a frame, before anything is known of it."""
 
 
 def steadiest_path(
@@ -43,7 +46,7 @@ def steadiest_path(
     Returns
     -------
     path : ndarray
-        (n,) index of the turn; -1 in a frame without any.
+        (n,) index of the turn; -1 in a frame without any, or where the body is more probably hidden.
     margin : ndarray
         (n,) nats by which the best way with another step to that frame, or from it, is less probable; infinite without
         another. A way that leads through the look-alikes of all its turns has the same steps.
@@ -62,8 +65,44 @@ def steadiest_path(
         way = np.array([a[k] for a, k in zip(angle, order, strict=True)])
         scale = max(resolution, _usual_change(way, time))
         longest = max(resolution, float(np.quantile(np.abs(_wrapped(np.diff(way))), _MOST)))
-    path[used], margin[used] = order, apart
+    chosen = np.array([g[k] for g, k in zip(gain, order, strict=True)])
+    hidden = _hidden(way, chosen, time, (scale, longest), resolution)
+    path[used], margin[used] = np.where(hidden, -1, order), np.where(hidden, np.inf, apart)
     return path, margin
+
+
+def _hidden(turn: Floats, gain: Floats, time: Floats, scales: tuple[float, float], resolution: float) -> Flags:
+    """Return (n,) frames in which the body is more probably hidden than where the way leads.
+
+    The way there and back again costs more than it gains: something else looks a little like the body.
+    """
+    seen = np.ones(len(turn), bool)
+    while seen.sum() > 4:
+        at = np.flatnonzero(seen)
+        jumps = np.flatnonzero(np.abs(_wrapped(np.diff(turn[at]))) > _SAME * resolution) + 1
+        runs = [run for run in np.split(np.arange(len(at)), jumps) if len(run) < len(at) - 2]
+        costs = [_cost_without(run, turn[at], gain[at], time[at], scales) for run in runs]
+        best = int(np.argmin(costs)) if costs else 0
+        if not costs or costs[best] >= 0.0:
+            break
+        seen[at[runs[best]]] = False
+    return ~seen
+
+
+def _cost_without(
+    run: NDArray[np.int64], turn: Floats, gain: Floats, time: Floats, scales: tuple[float, float]
+) -> float:
+    """Return how much more the way costs if the body is hidden in a run of frames; less than 0 if it is."""
+    around = np.arange(max(0, run[0] - 2), min(len(turn), run[-1] + 3))
+    without = np.setdiff1d(around, run)
+    motion = _motion_cost(turn[without], time[without], scales) - _motion_cost(turn[around], time[around], scales)
+    return motion + float((gain[run] + _SEEN).sum())
+
+
+def _motion_cost(turn: Floats, time: Floats, scales: tuple[float, float]) -> float:
+    step = _wrapped(np.diff(turn))[:, None, None]
+    triples = zip(step[:-1], step[1:], range(len(step) - 1), strict=True)
+    return float(sum(_change_cost(a, b, time[k : k + 3], *scales).sum() for a, b, k in triples))
 
 
 def _least_cost(

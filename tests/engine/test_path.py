@@ -38,3 +38,19 @@ def test_frames_without_a_pose_are_left_out():
     assert path[7] == -1
     assert np.isinf(margin[7])
     assert len({*path.tolist()} - {-1}) == 1
+
+
+def test_a_body_is_hidden_where_only_something_like_it_is_seen():
+    true = 0.02 * np.arange(40)
+    turns = [np.array([angle]) for angle in true]
+    gains = [np.array([30.0])] * 40
+    for k in (17, 18, 19):
+        turns[k], gains[k] = np.array([true[k] - 0.4]), np.array([3.0])
+    path, _ = steadiest_path(turns, gains, np.arange(40) / 30.0, 0.005)
+    np.testing.assert_array_equal(np.flatnonzero(path < 0), [17, 18, 19])
+
+
+def test_a_body_that_jumps_is_not_hidden():
+    true = np.where(np.arange(40) < 20, 0.0, 0.5)
+    path, _ = steadiest_path([np.array([a]) for a in true], [np.array([30.0])] * 40, np.arange(40) / 30.0, 0.005)
+    assert (path == 0).all()
