@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
-from anglecam.engine.proposals.common_centre import fit_centre, proposal_of, turn_about, up
+from anglecam.engine.proposals.common_centre import fit_centre, proposal_of, same_path, turn_about, up
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import Proposal
 
@@ -85,7 +85,7 @@ def proposals(sample: Sample) -> list[Proposal]:
         centre, arm = fit_centre(place, spin, centre, arm)
         turn = turn_about(centre, arm, place, spin)
         path = centre + arm * np.exp(1j * turn)
-        if any(_same(path, other) for other in paths):
+        if any(same_path(path, other, _TOLERANCE_PX) for other in paths):
             continue
         paths.append(path)
         found.append(
@@ -94,13 +94,6 @@ def proposals(sample: Sample) -> list[Proposal]:
         if len(found) == _MOST:
             break
     return found
-
-
-def _same(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> bool:
-    """Tell whether two paths (K,) are one."""
-    apart = np.abs(one - other)
-    known = np.isfinite(apart)
-    return bool(known.any() and np.median(apart[known]) < _TOLERANCE_PX)
 
 
 def _all_patches(sample: Sample) -> list[Patches]:

@@ -82,6 +82,13 @@ def centre_of_poses(place: Complexes, spin: Complexes) -> tuple[complex, complex
     return complex(centre), complex(arm)
 
 
+def same_path(one: Complexes, other: Complexes, tolerance_px: float) -> bool:
+    """Tell whether two paths (K,) are one: half of the frames in which both are known show them at one place."""
+    apart = np.abs(one - other)
+    known = np.isfinite(apart)
+    return bool(known.any() and np.median(apart[known]) < tolerance_px)
+
+
 def proposal_of(sample: Sample, name: str, centre: complex, turn: Floats) -> Proposal:
     """Return a proposal with its centre in the film and its turn from the median."""
     known = np.isfinite(turn)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Floats
 from anglecam.engine.hints import Hints
 from anglecam.engine.proposals import polar
-from anglecam.engine.proposals.common_centre import fit_centre, proposal_of, turn_about, up
+from anglecam.engine.proposals.common_centre import fit_centre, proposal_of, same_path, turn_about, up
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import Proposal
 
@@ -103,7 +103,7 @@ def _circles(sample: Sample, hints: Hints, k: int, middle: Floats, half: int) ->
         members = votes[n][1][votes[n][1] >= 0]
         path[frame[members]] = place[members]
         path[k] = start
-        if np.isfinite(path).sum() < 4 or any(_same(path, other) for other in paths):
+        if np.isfinite(path).sum() < 4 or any(same_path(path, other, _TOLERANCE_PX) for other in paths):
             continue
         paths.append(path)
         spin = np.zeros(len(path), complex)
@@ -149,9 +149,3 @@ def _vote(centre: complex, start: complex, found: _Places, count: int) -> tuple[
         if good[n] > 0.0:
             votes[found.frame[n]], members[found.frame[n]] = good[n], n
     return votes, members
-
-
-def _same(one: NDArray[np.complex128], other: NDArray[np.complex128]) -> bool:
-    apart = np.abs(one - other)
-    known = np.isfinite(apart)
-    return bool(known.any() and np.mean(apart[known] < _TOLERANCE_PX) > 0.8)
