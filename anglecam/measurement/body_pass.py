@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -34,6 +35,8 @@ from anglecam.vision.status import AMBIGUOUS, OCCLUDED, UNDECODABLE
 Find = Callable[[int, Grey], list[Turn]]
 _KEPT_BYTES = 200_000_000
 """Memory for the reduced pictures of a film, which may have to be looked through again."""
+_STEADIER = 3
+"""Rounds of learning a body again from a steadier motion, at most."""
 _SHIFTED_PX = 0.05
 """By which light, a codec and interpolation shift an edge, px: 0.02 to 0.08 in MJPG films."""
 _HINT_PX = 30.0
@@ -72,11 +75,13 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     if learnt is None or not learnt.turns:
         raise InputError(f"{film.path}: {why_nothing_turns(learnt, film.first_frame)}")
     search = search_for(learnt.sample, learnt.explanations[0].fit)
-    seen = follow(camera, search.sample, lambda _, picture: candidates(search, picture), progress)
-    again = steadier(search, seen.found, seen.time, seen.pictures)
-    if again is not None:
+    seen = follow(camera, search.sample, partial(_candidates, search), progress)
+    for _ in range(_STEADIER):
+        again = steadier(search, seen.found, seen.time, seen.pictures)
+        if again is None:
+            break
         search = again
-        seen = _again(seen, again) or follow(camera, again.sample, lambda _, p: candidates(again, p), progress)
+        seen = _again(seen, again) or follow(camera, again.sample, partial(_candidates, again), progress)
     track = chosen(seen.found, seen.time, search)
     jump = why_jump(track.turn, film.first_frame)
     if jump is not None:
@@ -84,6 +89,10 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     doubt = why_not_as_hinted(learnt, hints) or why_ambiguous(track.ambiguous, film.first_frame)
     body = rigid_motion(search, track, seen.decoded)
     return replace(_detections(film, rig, seen, body), doubt=doubt, learnt=learnt)
+
+
+def _candidates(search: Search, _: int, picture: Grey) -> list[Turn]:
+    return candidates(search, picture)
 
 
 def _hints(film: Film, rig: Rig) -> Hints:
