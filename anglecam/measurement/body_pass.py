@@ -29,7 +29,8 @@ from anglecam.video.film import Film
 from anglecam.video.picture import Picture
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.pivot.circle import Circle
-from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
+from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, CameraMove
+from anglecam.vision.stabilise.dominant_shift import CameraMotion
 from anglecam.vision.status import AMBIGUOUS, OCCLUDED, UNDECODABLE
 
 Find = Callable[[int, Grey], list[Turn]]
@@ -129,7 +130,7 @@ def stills_of(pictures: list[Picture], camera: HeldCamera) -> Stills:
     return Stills(images, maps, np.array(numbers))
 
 
-def _move(image: Image, picture: Picture, steady: BackgroundMotion | None) -> CameraMove | None:
+def _move(image: Image, picture: Picture, steady: CameraMotion | None) -> CameraMove | None:
     return None if steady is None else steady.at(image, picture.predicted)
 
 

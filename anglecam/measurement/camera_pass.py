@@ -7,7 +7,7 @@ transformed to the place of the first one, from which the clip is then measured.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 
 import av
@@ -22,10 +22,16 @@ from anglecam.progress import Progress, Stage, unseen, watched
 from anglecam.video.decode import Row
 from anglecam.video.film import Film, Sample
 from anglecam.video.picture import Picture
-from anglecam.vision.stabilise.background_motion import BackgroundMotion
+from anglecam.vision.stabilise.dominant_shift import (
+    CameraMotion,
+    ShiftingScenery,
+    learn_shift,
+    shift_of,
+)
 from anglecam.vision.stabilise.learn import learn_background
 from anglecam.vision.stabilise.plane import follow_plane, moves_in_the_hand, seen_from_first, stands_still
-from anglecam.vision.stabilise.zoom import camera_zoom
+from anglecam.vision.stabilise.scenery_edges import is_better, scenery_edges
+from anglecam.vision.stabilise.zoom import Zoom, camera_zoom
 
 _LEAST_KNOWN = 0.5
 """Least share of the sampled frames in which the motion of a camera that moves is known. In fewer, what was taken for
@@ -42,7 +48,7 @@ class HeldCamera:
 
     film: Film
     """The clip; where the camera does more than shift and roll, as a camera at rest would have filmed it."""
-    steady: BackgroundMotion | None = None
+    steady: CameraMotion | None = None
     """The scenery by which shift and roll are measured; ``None`` where the film is that of a camera at rest."""
     unknown: str | None = None
     """Message where the camera moves in a way that cannot be measured, so that a mark's path shows no pivot."""
@@ -127,15 +133,22 @@ def hold_camera(film: Film, progress: Progress = unseen) -> HeldCamera:
     progress(Stage("looking whether the camera moves"))
     shown = [f.image for f in film.sample(frames_to_keep(film)).frames if f.image is not None]
     images = [image for image in shown if image.std() > _BLANK] or shown
-    steady = learn_background(images)
+    steady: CameraMotion | None = learn_background(images)
     known = images if steady is None else [image for image in images if steady.at(image).known]
     zoom, why = camera_zoom(known), None
-    if zoom is not None:
-        why = f"the camera zooms or comes nearer, by {100.0 * (zoom - 1.0):.1f} %"
+    if zoom is None and steady is not None and len(known) >= _LEAST_KNOWN * len(images):
+        return HeldCamera(film, steady)
+    seen = images if zoom is None else known
+    edges = scenery_edges(seen)
+    shifting = None if edges is None else learn_shift(edges, seen)
+    if shifting is not None and not _shows_more(shifting, seen, zoom, film.size):
+        return HeldCamera(film, shifting)
+    if zoom is not None and (edges is None or is_better(edges.gain(seen, zoom.moves, [np.eye(3)] * len(seen)))):
+        why = f"the camera zooms or comes nearer, by {100.0 * (zoom.factor - 1.0):.1f} %"
     elif len(known) < _LEAST_KNOWN * len(images):
         why = f"the camera moves, and how can be seen in {len(known)} of {len(images)} sampled frames only"
-    elif steady is not None or len(images) < 2 or stands_still(images):
-        return HeldCamera(film, steady)
+    elif len(images) < 2 or (shifting is None and stands_still(images)):
+        return HeldCamera(film)
     frames = watched(film.frames(brightness=True), progress, "following the camera", film.count)
     moves = tuple(follow_plane(frame.image for frame in frames))
     followed = sum(move is not None for move in moves) >= _LEAST_FOLLOWED * len(moves)
@@ -147,6 +160,17 @@ def hold_camera(film: Film, progress: Progress = unseen) -> HeldCamera:
     own = {field.name: getattr(film, field.name) for field in fields(film) if field.init}
     grey = images[0].mean(axis=2, keepdims=True).astype(np.uint8)
     return HeldCamera(FilmAtRest(**own, moves=moves, first=images[0], first_grey=grey))
+
+
+def _shows_more(shifting: ShiftingScenery, images: Sequence[Image], zoom: Zoom | None, size: tuple[int, int]) -> bool:
+    """Return whether a camera that also rolls, zooms or comes nearer predicts the pictures better."""
+    shifts = [shift_of(one) for one in shifting.shifts_px]
+    if zoom is not None and is_better(shifting.edges.gain(images, zoom.moves, shifts)):
+        return True
+    moves = follow_plane(images)
+    if sum(move is not None for move in moves) < _LEAST_FOLLOWED * len(moves) or not moves_in_the_hand(moves, size):
+        return False
+    return is_better(shifting.edges.gain(images, moves, shifts))
 
 
 def as_seen_at_rest(rig: Rig, film: Film) -> Rig:

@@ -21,7 +21,8 @@ from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.mark.mark_search import MarkSearch
 from anglecam.vision.mark.segment import Region
 from anglecam.vision.registration.turn import TurnEstimate
-from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, BackgroundMotion, CameraMove
+from anglecam.vision.stabilise.background_motion import UNKNOWN_MOVE, CameraMove
+from anglecam.vision.stabilise.dominant_shift import CameraMotion
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Sought:
     """Colour and size."""
     body: BodyAhead | None = None
     """The body, where it was learnt beforehand."""
-    steady: BackgroundMotion | None = None
+    steady: CameraMotion | None = None
     """The scenery, where the camera shakes."""
 
 

@@ -36,7 +36,8 @@ from anglecam.vision.mark.segment import Region
 from anglecam.vision.mark.track import MarkTrack, follow_mark
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.pivot.marker import RoundMarker
-from anglecam.vision.stabilise.background_motion import BackgroundMotion, CameraMove
+from anglecam.vision.stabilise.background_motion import CameraMove
+from anglecam.vision.stabilise.dominant_shift import CameraMotion
 
 _CLEAR = 2.0
 """Ratio of the best score to the next best from which on the choice of the mark is clear."""
@@ -172,7 +173,7 @@ def detect_mark(
     )
 
 
-def _sampled(film: Film, rig: Rig, steady: BackgroundMotion | None, lens: Lens) -> tuple[Sample, Samples]:
+def _sampled(film: Film, rig: Rig, steady: CameraMotion | None, lens: Lens) -> tuple[Sample, Samples]:
     """Return evenly spaced frames, as read and as the mark is sought in them."""
     sample, pointed = film.sample(frames_to_keep(film)), rig.pointed_mark
     frames = [*([] if pointed is None else [frame_of_mark(film, pointed)]), *sample.frames]
@@ -192,7 +193,7 @@ def _body_ahead(film: Film, found: FoundMark, samples: Samples, rig: Rig, lens: 
 
 
 def _samples(
-    film: Film, frames: Sequence[Frame], pointed: RigMark | None, steady: BackgroundMotion | None, lens: Lens
+    film: Film, frames: Sequence[Frame], pointed: RigMark | None, steady: CameraMotion | None, lens: Lens
 ) -> Samples:
     """Return the frames in which the mark is sought: those in which the camera's motion is known."""
     pictures = [(frame.time, frame.image) for frame in frames if frame.image is not None]

@@ -8,6 +8,7 @@ few frames into the others, and a similarity (shift, roll and scale) is fitted t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
@@ -33,7 +34,17 @@ _EDGE_PX = 1.0
 acts along the lever, if the pivot is near the middle, more than across it."""
 
 
-def camera_zoom(images: Sequence[Image]) -> float | None:
+@dataclass(frozen=True)
+class Zoom:
+    """A zoom that windows show."""
+
+    factor: float
+    """The large scales divided by the small ones."""
+    moves: tuple[Floats | None, ...] = field(repr=False)
+    """For each picture the (3, 3) similarity from the first one, px; ``None`` where too few windows follow one."""
+
+
+def camera_zoom(images: Sequence[Image]) -> Zoom | None:
     """Return by which factor the scale of the picture varies.
 
     Parameters
@@ -43,9 +54,8 @@ def camera_zoom(images: Sequence[Image]) -> float | None:
 
     Returns
     -------
-    float or None
-        The large scales divided by the small ones; ``None`` where the camera does not zoom, or too little scenery is
-        seen to tell.
+    Zoom or None
+        ``None`` where the camera does not zoom, or too little scenery is seen to tell.
     """
     if len(images) < 2:
         return None
@@ -54,28 +64,30 @@ def camera_zoom(images: Sequence[Image]) -> float | None:
     centres, _ = find_windows(pictures[0], pixel_noise(pictures))
     if len(centres) < _MIN_WINDOWS:
         return None
-    scales = [_scale(centres, follow_windows(pictures[0], picture, centres)) for picture in pictures[1:]]
-    known = [scale for scale in scales if scale is not None]
+    found = [_similarity(centres, follow_windows(pictures[0], picture, centres)) for picture in pictures[1:]]
+    known = [(float(np.hypot(*move[:2, 0])), sigma) for move, sigma in found if move is not None]
     if not known or len(known) + 1 < _MIN_KNOWN * len(images):
         return None
     low, high = np.quantile([1.0, *(scale for scale, _ in known)], _INNER)
-    zoom = float(high / low)
+    factor = float(high / low)
     reach = float(np.hypot(*pictures[0].shape[:2])) / 2.0
     sigma = float(np.sqrt(2.0) * np.median([sigma for _, sigma in known]))
-    return zoom if zoom - 1.0 > max(_EDGE_PX / reach, _SIGNIFICANT * sigma) else None
+    if factor - 1.0 <= max(_EDGE_PX / reach, _SIGNIFICANT * sigma):
+        return None
+    return Zoom(factor, (np.eye(3), *(move for move, _ in found)))
 
 
-def _scale(centres: Floats, moved: Floats) -> tuple[float, float] | None:
-    """Return scale and its sigma of the similarity that most windows follow; ``None`` where fewer do."""
+def _similarity(centres: Floats, moved: Floats) -> tuple[Floats | None, float]:
+    """Return the similarity (3, 3) that most windows follow, ``None`` where fewer do, and the sigma of its scale."""
     cv2.setRNGSeed(0)
     matrix, follows = cv2.estimateAffinePartial2D(
         centres, centres + moved, method=cv2.RANSAC, ransacReprojThreshold=2.0 * TOLERANCE_PX, maxIters=500
     )
     if matrix is None or follows.mean() < _MIN_SHARE or follows.sum() < _MIN_WINDOWS:
-        return None
+        return None, float("nan")
     kept = follows.ravel().astype(bool)
     start, end = centres[kept], (centres + moved)[kept]
     off = end - (start @ matrix[:, :2].T + matrix[:, 2])
     freedom = max(2 * len(start) - 4, 1)
     spread = float(((start - start.mean(axis=0)) ** 2).sum())
-    return float(np.hypot(matrix[0, 0], matrix[1, 0])), float(np.sqrt((off**2).sum() / freedom / spread))
+    return np.vstack([matrix, [0.0, 0.0, 1.0]]), float(np.sqrt((off**2).sum() / freedom / spread))
