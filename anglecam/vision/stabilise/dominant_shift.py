@@ -17,7 +17,7 @@ import numpy as np
 
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.stabilise.background_motion import BackgroundMotion, CameraMove
-from anglecam.vision.stabilise.scenery_edges import Level, SceneryEdges, is_better, values_at
+from anglecam.vision.stabilise.scenery_edges import Level, SceneryEdges, values_at
 
 _TUKEY = 4.685
 """Standard deviations from which on a pixel has no weight (95 % efficient for normal errors)."""
@@ -109,8 +109,8 @@ def learn_shift(edges: SceneryEdges, images: Sequence[Image]) -> ShiftingScenery
     shifts_px = shifts / edges.to_reduced[0, 0]
     if np.sqrt(shifts_px.var(axis=0).sum()) < _STILL_PX:
         return None
-    gain = edges.gain(images, [shift_of(one) for one in shifts_px], [np.eye(3)] * len(images))
-    if not (is_better(gain) and is_better(edges.elsewhere(gain))):
+    moves, rest = [shift_of(one) for one in shifts_px], [np.eye(3)] * len(images)
+    if not edges.is_scenery_elsewhere(edges.gain(images, moves, rest), edges.gain_if_right(moves, rest)):
         return None
     weights = _weights(edges, follows)
     return ShiftingScenery(edges, weights, float(np.median([weights[-1] @ one for one in fits])), shifts_px)

@@ -37,6 +37,8 @@ _FOLLOWS, _ANY = 0.9, 0.1 / 100.0
 """Prior that a pixel shows what is predicted, and the density of anything else, 1/grey level."""
 _BODY = 0.2
 """Radius of a body that slides, as a share of the picture's longer side, at most."""
+_HALF = 0.5
+"""Share of what they would gain if a motion were right that pixels of the scenery gain at least."""
 _SIGNIFICANT = 3.0
 """Standard errors by which a motion has to predict the edges better than another (one in 700 by chance)."""
 
@@ -72,6 +74,8 @@ class SceneryEdges:
     """(3, 3) from the film to it."""
     levels: tuple[Level, ...] = field(repr=False)
     """The coarsest first."""
+    first: Image = field(repr=False)
+    """The first picture as the finest level sees it."""
 
     def evidence(self, image: Image, move: Floats) -> Floats:
         """Return the log-likelihood (n,) of a frame's edge pixels where the camera has moved.
@@ -84,12 +88,14 @@ class SceneryEdges:
             Homography from the first frame into this one, px.
         """
         level = self.levels[-1]
+        off = values_at(levelled(self._reduced(image), 1), self._moved(move), self.size) - level.values
+        return _evidence((off / level.sigma) ** 2, level.sigma)
+
+    def _moved(self, move: Floats) -> Floats:
+        """Return the places (n, 2) of the edge pixels after a motion of the camera."""
         small = self.to_reduced @ move @ np.linalg.inv(self.to_reduced)
         middle = np.array(self.size) / 2.0
-        places = cv2.perspectiveTransform((level.places + middle)[:, None], small)[:, 0] - middle
-        off = values_at(levelled(self._reduced(image), 1), places, self.size) - level.values
-        follows = np.exp(-0.5 * (off / level.sigma) ** 2) / (np.sqrt(2.0 * np.pi) * level.sigma)
-        return np.asarray(np.log(_FOLLOWS * np.where(np.isfinite(off), follows, 0.0) + _ANY))
+        return np.asarray(cv2.perspectiveTransform((self.levels[-1].places + middle)[:, None], small)[:, 0] - middle)
 
     def pyramid(self, image: Image) -> list[Image]:
         """Return a frame at all levels."""
@@ -115,16 +121,38 @@ class SceneryEdges:
         gains = [self.evidence(k, one) - self.evidence(k, other) for k, one, other in rest if one is not None]
         return np.array(gains).reshape(-1, len(self.levels[-1].values))
 
-    def elsewhere(self, gain: Floats) -> Floats:
-        """Return what pixels gain (pictures, m) that lie outside the disc in which they gain most.
+    def gain_if_right(self, moves: Sequence[Floats], others: Sequence[Floats]) -> Floats:
+        """Return what `gain` would be on average, (pictures, n) nats, if the pictures showed what the moves predict."""
+        level = self.levels[-1]
+        gains = []
+        for one, other in list(zip(moves, others, strict=True))[1:]:
+            off = values_at(self.first, self._moved(np.linalg.inv(one) @ other), self.size) - level.values
+            as_other = _evidence(1.0 + (off / level.sigma) ** 2, level.sigma)
+            gains.append(np.where(np.isfinite(off), _evidence(np.ones(len(off)), level.sigma) - as_other, 0.0))
+        return np.array(gains)
 
-        A body that slides before a plain wall may have all edges that shift. A camera moves the rest of the picture
-        too.
+    def is_scenery_elsewhere(self, gain: Floats, if_right: Floats) -> bool:
+        """Return whether pixels gain what they would if a motion were right, in more than one place.
+
+        Those that do in one half of the pictures have to in the other half: what swings follows a shift in some
+        pictures, scenery in all. They lie outside the disc in which they gain most: a body that slides before a plain
+        wall may have all edges that shift, and a camera moves the rest of the picture, too.
+
+        Parameters
+        ----------
+        gain, if_right : ndarray
+            (pictures, n) nats, from `gain` and `gain_if_right`.
         """
-        places, total = self.levels[-1].places, gain.sum(axis=0)
-        radius = _BODY * max(self.size)
+        halves = slice(0, None, 2), slice(1, None, 2)
+        over = [(gain - _HALF * if_right)[half] for half in halves]
+        places, radius = self.levels[-1].places, _BODY * max(self.size)
         near = [np.hypot(*(places - middle).T) < radius for middle in np.unique(places // radius, axis=0) * radius]
-        return gain[:, ~max(near, key=lambda one: float(total[one].sum()))]
+        held_out = []
+        for k in (0, 1):
+            chosen = over[1 - k].sum(axis=0) > 0.0
+            total = np.where(chosen, gain[halves[1 - k]].sum(axis=0), 0.0)
+            held_out.append(over[k][:, chosen & ~max(near, key=lambda one: float(total[one].sum()))].sum(axis=1))
+        return is_better(np.concatenate(held_out)[:, None])
 
     def _reduced(self, image: Image) -> Image:
         return reduced(brightness(image), _LONGEST_PX)
@@ -149,7 +177,13 @@ def scenery_edges(images: Sequence[Image]) -> SceneryEdges | None:
     levels = tuple(_level(picture, k, noise) for k in LEVELS)
     if min(len(level.values) for level in levels) < _LEAST_PIXELS:
         return None
-    return SceneryEdges(size, reduction(images[0].shape[:2], _LONGEST_PX), levels)
+    return SceneryEdges(size, reduction(images[0].shape[:2], _LONGEST_PX), levels, levelled(picture, 1))
+
+
+def _evidence(square: Floats, sigma: Floats) -> Floats:
+    """Return the log density of pixels by their squared standardised departure from what is predicted, or NaN."""
+    follows = np.exp(-0.5 * square) / (np.sqrt(2.0 * np.pi) * sigma)
+    return np.asarray(np.log(_FOLLOWS * np.where(np.isfinite(square), follows, 0.0) + _ANY))
 
 
 def _level(picture: Image, k: int, noise: float) -> Level:
