@@ -18,7 +18,6 @@ from anglecam.engine.refine import sensitivities
 from anglecam.engine.sample import FRAMES, Sample, Stills
 from anglecam.engine.target import Picture as Grey
 from anglecam.engine.tracking import Search, Track, candidates, chosen, search_for, steadier
-from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.detections import Detections, frame_of_mark
@@ -44,7 +43,7 @@ _HINT_PX = 30.0
 """Standard uncertainty of a hint at the pivot, which is by eye."""
 
 
-def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> Detections:
+def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> Detections | str:
     """Find what turns in a clip, and its turn in every frame.
 
     Parameters
@@ -58,13 +57,8 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
 
     Returns
     -------
-    Detections
-        Of a body.
-
-    Raises
-    ------
-    InputError
-        Where nothing is seen to turn: one line with what was seen, and what can be declared.
+    Detections or str
+        Of a body; where nothing is seen to turn, a line with what was seen, and what can be declared.
     """
     film = camera.film
     progress(Stage("looking for what turns"))
@@ -74,7 +68,7 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
         pictures = sorted([*pictures, _picture(film, hints.mark_frame)], key=lambda picture: picture.index)
     learnt = learn(stills_of(pictures, camera), hints)
     if learnt is None or not learnt.turns:
-        raise InputError(f"{film.path}: {why_nothing_turns(learnt, film.first_frame)}")
+        return why_nothing_turns(learnt, film.first_frame)
     search = search_for(learnt.sample, learnt.explanations[0].fit)
     seen = follow(camera, search.sample, partial(_candidates, search), progress)
     for _ in range(_STEADIER):
@@ -86,10 +80,10 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     track = chosen(seen.found, seen.time, search)
     jump = why_jump(track.turn, film.first_frame)
     if jump is not None:
-        raise InputError(f"{film.path}: {jump}")
+        return jump
     doubt = why_not_as_hinted(learnt, hints) or why_ambiguous(track.ambiguous, film.first_frame)
-    body = rigid_motion(search, track, seen.decoded)
-    return replace(_detections(film, rig, seen, body), doubt=doubt, learnt=learnt)
+    found = _detections(film, rig, seen, rigid_motion(search, track, seen.decoded))
+    return found if isinstance(found, str) else replace(found, doubt=doubt, learnt=learnt)
 
 
 def _candidates(search: Search, _: int, picture: Grey) -> list[Turn]:
@@ -248,7 +242,7 @@ def rigid_motion(search: Search, track: Track, decoded: list[bool], carrier_turn
     )
 
 
-def _detections(film: Film, rig: Rig, seen: Seen, body: RigidMotion) -> Detections:
+def _detections(film: Film, rig: Rig, seen: Seen, body: RigidMotion) -> Detections | str:
     sample = film.sample(FRAMES)
     images = [frame.image for frame in sample.frames if frame.image is not None]
     lens = lens_from_rig(rig, film.size, film.path)
@@ -260,7 +254,7 @@ def _detections(film: Film, rig: Rig, seen: Seen, body: RigidMotion) -> Detectio
     turned = Circle(body.pivot_px, radius, 0.0, covariance, np.ones(len(seen.time), bool))
     marker, pivot, disagreement = find_pivot(images, rig, turned, lens)
     if OK not in body.status or pivot is None:
-        raise InputError(f"{film.path}: none of {len(seen.time)} frames shows what turns in the sampled ones")
+        return f"none of {len(seen.time)} frames shows what turns in the sampled ones"
     return Detections(
         time=seen.time,
         status=body.status,

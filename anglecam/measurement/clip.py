@@ -32,10 +32,9 @@ from anglecam.measurement.clock_sync import DARK, note_on, offset_of, on_clip_cl
 from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.duplicates import duplicate_frames
 from anglecam.measurement.followed import Followed, follow_mark_or_body
-from anglecam.measurement.one_rigid_mark import why_not_rigid
 from anglecam.measurement.other_bodies import OtherBody, of_any_body, other_bodies
 from anglecam.measurement.series import series_of_angles, why_zero_is_elsewhere
-from anglecam.measurement.trust import why_elsewhere, why_few, why_still, why_unproven
+from anglecam.measurement.trust import why_few
 from anglecam.progress import Progress, Stage, unseen
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
@@ -64,10 +63,9 @@ class Measurement:
 
     interlaced: str | None = None
     """Message where frames show two instants, of which one is measured."""
-    few: str | None = None
-    """Message where less than the required share of the frames is measured."""
-    other_thing: str | None = None
-    """Message where the mark is seen in part, turns about another point than the hint's, or may be another thing."""
+    unsure: str | None = None
+    """Message where less than the required share of the frames is measured, or what is measured may be another
+    thing."""
 
     bodies: tuple[Body, ...] = ()
     """What is seen to move, the measured body first."""
@@ -94,7 +92,7 @@ class Measurement:
     @property
     def doubt(self) -> str | None:
         """Why the clip as a whole is no success although frames of it are measured; ``None`` where it is one."""
-        return self.truncated or self.few or self.other_thing
+        return self.truncated or self.unsure
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -180,16 +178,9 @@ def measure_clip(
     zero = why_zero_is_elsewhere(rig, command, followed.time[followed.ok])
     dark = changes and lamp is None and rig.sync.lamp is not None
     clock = DARK if dark else note_on(offset)
-    few = why_few(series.status, rig.least_measured)
-    of_others = (one.followed.detections.doubt for one in others if every_body and one.followed is not None)
-    other = followed.detections.doubt or why_still(followed.detections, followed.ok, rig)
-    other = other or next(filter(None, of_others), None)
-    if other is None and followed.angles.registered is None and wanted == 1:
-        other = (
-            why_elsewhere(followed.detections, rig)
-            or why_not_rigid(followed.detections, followed.ok)
-            or why_unproven(followed.detections, hand_held=isinstance(held, FilmAtRest))
-        )
+    followed_too = [one.followed for one in others if every_body and one.followed is not None]
+    doubts = (why_few(series.status, rig.least_measured), *(one.doubt for one in (followed, *followed_too)))
+    unsure = next(filter(None, doubts), None)
     interlaced = _interlaced(film)
     return Measurement(
         series,
@@ -200,8 +191,7 @@ def measure_clip(
         zero,
         clock,
         interlaced,
-        few,
-        other,
+        unsure,
         bodies,
         note,
     )

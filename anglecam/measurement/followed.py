@@ -21,13 +21,13 @@ from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles, coarse_angles, turns
 from anglecam.measurement.body_pass import detect_body
-from anglecam.measurement.camera_pass import HeldCamera
+from anglecam.measurement.camera_pass import FilmAtRest, HeldCamera
 from anglecam.measurement.carried_marks import carried_marks, smeared_marks, with_marks
 from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.fine_angles import fine_angles
 from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
-from anglecam.measurement.trust import why_no_rotation
+from anglecam.measurement.trust import why_doubtful, why_few, why_no_rotation
 from anglecam.progress import Progress, unseen
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
@@ -46,6 +46,8 @@ class Followed:
     """Of the measured frames."""
     why_coarse: str | None
     """Cause why the angle is not that of the whole body; ``None`` where it is."""
+    doubt: str | None
+    """Why the clip is no success although frames of it are measured; ``None`` where it is one."""
 
 
 def follow_mark_or_body(
@@ -55,7 +57,7 @@ def follow_mark_or_body(
     progress: Progress = unseen,
     known: FoundMark | None = None,
 ) -> Followed:
-    """Measure the angle of the mark or, where no colour is declared and no mark turns, of the body that turns.
+    """Measure the angle of the mark or, where no colour is declared and no mark surely turns, of the body that turns.
 
     Parameters
     ----------
@@ -83,12 +85,14 @@ def follow_mark_or_body(
     film = camera.film
     mark = detect_mark(film, rig, camera, progress, known)
     by_mark = mark if isinstance(mark, str) else _measured(film, rig, command, mark, progress)
-    if isinstance(by_mark, Followed):
-        return by_mark
     # nothing else is meant by a colour, nor in the other parts of a film
     final = known is not None or film.undecodable == len(film.times) or rig.mark_rgb is not None
-    cause = camera.unknown or (by_mark if final else None)
-    by_body = cause or _measured(film, rig, command, detect_body(camera, rig, progress), progress)
+    if isinstance(by_mark, Followed) and (by_mark.doubt is None or final or camera.unknown):
+        return by_mark
+    cause = camera.unknown or (by_mark if final else None) or detect_body(camera, rig, progress)
+    by_body = _measured(film, rig, command, cause, progress) if isinstance(cause, Detections) else cause
+    if isinstance(by_mark, Followed) and (isinstance(by_body, str) or by_body.doubt is not None):
+        return by_mark
     if isinstance(by_body, Followed):
         return by_body
     raise InputError(f"{film.path}: {by_body}")
@@ -124,7 +128,15 @@ def _measured(
             angles = coarse_angles(detections, ok, time, rig, command)
             filmed = detections.in_picture(in_all_frames(ok, angles.mark_px))[ok]
             angles = fine_angles(angles, registered, np.flatnonzero(ok), filmed, time[ok], rig, command)
-    return why_no_rotation(detections, ok, angles, rig) or Followed(detections, ok, time, angles, why_coarse)
+    cause = why_no_rotation(detections, ok, angles, rig)
+    if cause is not None:
+        return cause
+    hand_held, status = (
+        isinstance(film, FilmAtRest),
+        [OK if k else s for k, s in zip(ok, detections.status, strict=True)],
+    )
+    doubt = why_few(status, rig.least_measured) or why_doubtful(detections, ok, angles, rig, hand_held=hand_held)
+    return Followed(detections, ok, time, angles, why_coarse, doubt)
 
 
 def _rolls(detections: Detections) -> Floats:

@@ -177,7 +177,7 @@ def _measured(
     if carrier is not None:
         body = replace(body, sigma=np.hypot(body.sigma, _by_carrier(search, track.turn, carrier)))
     doubt = why_ambiguous(track.ambiguous, camera.film.first_frame)
-    detections = replace(_detections(first, body), doubt=doubt)
+    detections = _detections(first, body)
     ok = np.array([s == OK for s in body.status])
     if not ok.any():
         return _UNSEEN
@@ -186,7 +186,7 @@ def _measured(
     angles = coarse_angles(detections, ok, time, rig, command)
     sigma = np.full(n, np.nan)
     sigma[ok] = _about_centre(angles)
-    followed = Followed(detections, ok, time, angles, "it was found after another body was taken out")
+    followed = Followed(detections, ok, time, angles, "it was found after another body was taken out", doubt)
     return followed, _Known(replace(motion, turn=track.turn), sigma)
 
 

@@ -17,7 +17,7 @@ from anglecam.data.typing import Flags, Floats
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.detections import Detections
-from anglecam.measurement.one_rigid_mark import FLOOR_PX, MAX_OFF_CIRCLE, PIVOT_SIGMAS, why_not_one_mark
+from anglecam.measurement.one_rigid_mark import FLOOR_PX, MAX_OFF_CIRCLE, PIVOT_SIGMAS, why_not_one_mark, why_not_rigid
 from anglecam.measurement.pivot import HINT_PX
 from anglecam.measurement.what_is_seen import DECLARE_MARK, causes_seen, place_of
 from anglecam.vision.pivot.circle import Circle
@@ -132,6 +132,35 @@ def why_off_circle(detections: Detections, angles: Angles) -> str | None:
     return (
         f"what moves {place_of(detections)} does not turn about a fixed pivot: its distance from the centre varies by"
         f" {off:.2g} px RMS while it travels {travelled:.2g} px RMS; {DECLARE_MARK}"
+    )
+
+
+def why_doubtful(detections: Detections, ok: Flags, angles: Angles, rig: Rig, *, hand_held: bool) -> str | None:
+    """Return a message where nothing shows that what turns is what is meant, and one thing.
+
+    Parameters
+    ----------
+    detections : Detections
+        The coarse pass.
+    ok : ndarray
+        (frames,) the measured frames.
+    angles : Angles
+        Of these frames.
+    rig : Rig
+        What is declared.
+    hand_held : bool
+        Whether the camera is held in the hand.
+
+    Returns
+    -------
+    str or None
+        With the cause. That the whole body turns proves what its mark alone does not.
+    """
+    doubt = detections.doubt or why_still(detections, ok, rig)
+    if doubt is not None or angles.registered is not None:
+        return doubt
+    return (
+        why_elsewhere(detections, rig) or why_not_rigid(detections, ok) or why_unproven(detections, hand_held=hand_held)
     )
 
 

@@ -84,8 +84,8 @@ def check_clip(
         filmed_with = command_beside(path, declared)
         measured = measure_source(open_recording(path, part, filmed_with), progress=progress)
         assert isinstance(measured, Measurement)  # a film is no file of tracks
-        if measured.few or measured.other_thing:
-            raise InputError(f"{path}: {measured.few or measured.other_thing}")
+        if measured.unsure:
+            raise InputError(f"{path}: {measured.unsure}")
         progress(Stage("predicting what a session would show"))
         return _predict(measured, part, film, frames, filmed_with, command)
 

@@ -40,7 +40,7 @@ from anglecam.vision.registration.centre_equations import (
 from anglecam.vision.registration.tiles import TILE_SIDE_PX, Tiles
 from anglecam.vision.registration.turn import covered_views
 
-_MAX_ROUNDS = 16
+_MAX_ROUNDS = 32
 _SETTLED_PX = 0.002
 """Change of the centres of rotation below which the iteration ends, px."""
 _HIDDEN_ROUNDS = 3

@@ -197,8 +197,12 @@ def _absorbed_of_turns(data: Data, now: Round) -> float:
     """Return the share of an error of the angles, proportional to the angle, that the appearance absorbs."""
     stretch = _STRETCH * (now.state.turns - np.median(now.state.turns))
     stretched = replace(now.state, turns=now.state.turns + stretch)
-    after = one_round(data, stretched, now.appearance, now.hidden, now.excess, now.fits)
-    return float((after.state.turns - now.state.turns) @ stretch / max(float(stretch @ stretch), 1e-18))
+    # a body whose heights have not quite settled moves without the stretch, too
+    with_it, without = (
+        one_round(data, state, now.appearance, now.hidden, now.excess, now.fits).state
+        for state in (stretched, now.state)
+    )
+    return float((with_it.turns - without.turns) @ stretch / max(float(stretch @ stretch), 1e-18))
 
 
 def _absorbed_of_pivot(data: Data, now: Round) -> float:

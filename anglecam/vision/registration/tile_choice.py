@@ -26,6 +26,9 @@ _LOOSE = 6.0
 alike."""
 _MAX_LOOSE_SHARE = 0.1
 """Largest share of such pixels in a tile."""
+_QUIET = 0.1
+"""Quantile of the spread of what moves that counts as its noise: whatever glitters or is no part of the body has
+more."""
 _MIN_STEADIER = 1.5
 """Least ratio of squared spreads, as filmed over rotated back, of a tile that belongs to the body."""
 _NOISE_GRADIENT = 0.054
@@ -67,7 +70,12 @@ def choose_tiles(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floa
     height, width = frames[0].image.shape[:2]
     heights = _find_heights(frames, plane, pivot_px)
     mean, spread, whole = _stack(frames, plane, pivot_px, _by_pixel(heights, (height, width)))
-    spread_as_filmed = _spread_as_filmed(frames)
+    # Scenery does not rotate: it varies less as filmed than rotated back.
+    as_filmed, rotated_back = (
+        _by_tile((part**2).sum(axis=2)).sum(axis=(1, 3)) for part in (_spread_as_filmed(frames), spread)
+    )
+    moves = as_filmed > _MIN_STEADIER * rotated_back
+    noise = _noise_of_moving(spread, whole, moves, noise)
     noise_gradient = _NOISE_GRADIENT * (np.pi / 2.0) / len(frames) * noise**2  # the median's variance is π/2 the mean's
     weight = whole[..., None] / (noise**2 + spread**2)
     parts = map_in_threads(
@@ -76,13 +84,19 @@ def choose_tiles(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floa
     information, apparent = (np.concatenate(part) for part in zip(*parts, strict=True))
     loose = _by_tile(((spread.max(axis=2) > _LOOSE * noise) | ~whole).astype(np.float32))
     rigid = loose.mean(axis=(1, 3)) < _MAX_LOOSE_SHARE
-    # Scenery does not rotate: it varies less as filmed than rotated back.
-    as_filmed, rotated_back = (_by_tile((part**2).sum(axis=2)).sum(axis=(1, 3)) for part in (spread_as_filmed, spread))
     has_edges = information > _MIN_EDGES * apparent
-    worth = np.where(rigid & has_edges & (as_filmed > _MIN_STEADIER * rotated_back), information, 0.0)
+    worth = np.where(rigid & has_edges & moves, information, 0.0)
     best = [k for k in np.argsort(worth, axis=None)[::-1][:_MAX_TILES] if worth.flat[k] > 0]
     column_row = np.array([[k % worth.shape[1], k // worth.shape[1]] for k in best], dtype=float)
     return Tiles((TILE_SIDE_PX * column_row).reshape(-1, 2), heights.ravel()[best])
+
+
+def _noise_of_moving(spread: Image, whole: NDArray[np.bool_], moves: NDArray[np.bool_], noise: float) -> float:
+    """Return the noise of what moves, grey levels: a codec copies scenery at rest without noise, but not a body."""
+    moving = np.repeat(np.repeat(moves, TILE_SIDE_PX, axis=0), TILE_SIDE_PX, axis=1)
+    part = tuple(slice(n) for n in moving.shape)
+    seen = spread[part][moving & whole[part]]
+    return max(noise, float(np.quantile(seen, _QUIET))) if seen.size else noise
 
 
 def _find_heights(frames: Sequence[FrameView], plane: MotionPlane, pivot_px: Floats) -> Floats:
