@@ -39,6 +39,38 @@ def log_density(picture, mean, variance):  # type: ignore[no-untyped-def]
     return result
 
 
+@njit(
+    "void(float32[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float32, float32[:, ::1], "
+    "float32[:, ::1])",
+    cache=True,
+    nogil=True,
+    fastmath={"nsz", "arcp", "contract", "afn", "reassoc"},  # all but that no value is NaN
+    error_model="numpy",
+)
+def add_gain(gain, picture, body, body_variance, excess, background, background_variance):  # type: ignore[no-untyped-def]
+    """Add to ``gain`` (h, w) the log density of each pixel of a body over that of the background.
+
+    Parameters
+    ----------
+    gain, picture, body, body_variance : ndarray
+        (h, w) float32; grey levels, and grey levels². Where one is NaN nothing is added.
+    excess : float
+        By how much the variance of a pixel is larger in this picture than usual, grey levels².
+    background, background_variance : ndarray
+        (h, w) float32, the same of the background.
+    """
+    floor, half = np.float32(_OUTLIERS / 256.0 * sqrt(2.0 * pi) / (1.0 - _OUTLIERS)), np.float32(-0.5)
+    for i in range(gain.shape[0]):
+        for j in range(gain.shape[1]):
+            off, off_behind = picture[i, j] - body[i, j], picture[i, j] - background[i, j]
+            if off * off + off_behind * off_behind >= 0.0:
+                sharp = np.float32(1.0) / (body_variance[i, j] + excess)
+                behind = np.float32(1.0) / (background_variance[i, j] + excess)
+                as_body = sqrt(sharp) * exp(half * off * off * sharp) + floor
+                as_background = sqrt(behind) * exp(half * off_behind * off_behind * behind) + floor
+                gain[i, j] += log(as_body / as_background)
+
+
 @njit(inline="always")
 def _between(picture, x, y):  # type: ignore[no-untyped-def]
     """Interpolate linearly; the place lies inside."""

@@ -13,10 +13,11 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
-from anglecam.engine.likelihood import log_density
+from anglecam.engine.likelihood import add_gain
 from anglecam.engine.sample import Sample
 
 Picture = NDArray[np.float32]
@@ -101,36 +102,37 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
     """
     height, width = sample.pictures.shape[1:]
     pad = max(height, width) // 3
-    size = (width + 2 * pad, height + 2 * pad)
     used = sample.pictures[use]
     background, background_variance = _typical(used)
     known = [j for j, k in enumerate(use) if poses[k] is not None]
-    blank = np.zeros(size[::-1], np.float32)
+    blank = np.zeros((height + 2 * pad, width + 2 * pad), np.float32)
     if len(known) < 2:
         behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
         return Target(blank, blank, blank, background, behind, pad)
     maps = [_onto_picture(pose, pad) for j in known if (pose := poses[use[j]]) is not None]
+    box = _shown(maps, (height, width), blank.shape)
+    maps = [np.column_stack([m[:, :2], m @ [box[1].start, box[0].start, 1.0]]) for m in maps]
+    part = blank[box]
+    size = part.shape[::-1]
     back = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     held = np.stack(
         [cv2.warpAffine(used[j], m, size, flags=back, borderValue=np.nan) for j, m in zip(known, maps, strict=True)]
     )
-    appearance, variance = _typical(held.astype(np.float32))
+    appearance, variance = _typical(held)
     often = np.isfinite(held).sum(axis=0).astype(np.float32)
     # a mean and a variance from n values predict another one with the variance (n + 1)/(n − 1); from 3 they do not
     appearance = np.where(often > 3, appearance, np.nan)
     variance = variance * (often + 1.0) / np.maximum(often - 1.0, 1.0)
     variance = variance + sample.noise**2 + _FRACTION2 * _slope2(appearance)
-    visibility = blank
+    visibility = part
     excess = sample.excesses[use]
     for _ in range(_ROUNDS):
         behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
-        gain = blank.copy()
+        gain = np.zeros_like(part)
         for frame, j, m in zip(held, known, maps, strict=True):
             # interpolation averages the noise of a frame, so that both are compared with the interpolated one
             here, spread = (cv2.warpAffine(one, m, size, flags=back) for one in (background, behind))
-            as_body = log_density(frame, appearance, variance + excess[j])
-            as_background = log_density(frame, here, spread + excess[j])
-            gain += np.where(np.isfinite(frame), as_body - as_background, 0.0)
+            add_gain(gain, frame, appearance, variance, excess[j], here, spread)
         # a pixel of the body has two parameters, mean and variance (Schwarz, Annals of Statistics 6, 1978)
         seen = np.isfinite(appearance) & (cv2.GaussianBlur(gain, (0, 0), 1.0) > np.log(len(known)))
         visibility = seen.astype(np.float32)
@@ -138,29 +140,63 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
         for j, m in zip(known, maps, strict=True):
             cover[j] = cv2.warpAffine(visibility, m, (width, height), flags=cv2.INTER_LINEAR)
         covered = (cover > 0.0).any(axis=0)
-        part = np.where(cover[:, covered] > 0.0, np.nan, used[:, covered])
+        bare = np.where(cover[:, covered] > 0.0, np.nan, used[:, covered])
         background, background_variance = background.copy(), background_variance.copy()
         background[covered], background_variance[covered] = _typical(
-            np.where(np.isfinite(part).sum(axis=0) > 1, part, used[:, covered])
+            np.where(np.isfinite(bare).sum(axis=0) > 1, bare, used[:, covered])
         )
     behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
-    return Target(np.nan_to_num(appearance), visibility, np.nan_to_num(variance), background, behind, pad)
+    around = [(one.start, n - one.stop) for one, n in zip(box, blank.shape, strict=True)]
+    seen, v, spread = (np.pad(np.nan_to_num(one), around) for one in (appearance, visibility, variance))
+    return Target(seen, v, spread, background, behind, pad)
+
+
+def _shown(maps: list[Floats], shape: tuple[int, ...], padded: tuple[int, ...]) -> tuple[slice, slice]:
+    """Return rows and columns of the padded coordinates of the body that pictures of a shape show in any pose."""
+    height, width = shape
+    corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
+    places = np.concatenate([(corners - m[:, 2]) @ np.linalg.inv(m[:, :2]).T for m in maps])
+    low = np.maximum(places.min(axis=0).astype(int) - 1, 0)
+    high = np.minimum(places.max(axis=0).astype(int) + 2, padded[::-1])
+    return slice(low[1], max(high[1], low[1] + 1)), slice(low[0], max(high[0], low[0] + 1))
 
 
 def _typical(pictures: Picture) -> tuple[Picture, Picture]:
     """Return the median of (m, …) pictures and the robust variance about it, where NaN is unknown; NaN for none."""
-    stack = np.ascontiguousarray(np.moveaxis(pictures, 0, -1))
-    median = _median(stack)
-    return median, np.asarray(_MAD2 * _median(np.abs(stack - median[..., None])) ** 2)
+    columns = np.ascontiguousarray(pictures.reshape(len(pictures), -1).T)
+    columns.sort(axis=-1)  # NaN comes last
+    median, variance = _of_ordered(columns)
+    return median.reshape(pictures.shape[1:]), variance.reshape(pictures.shape[1:])
 
 
-def _median(stack: Picture) -> Picture:
-    """Return the median over the last axis; NumPy sorts NaN to the end."""
-    ordered = np.sort(stack, axis=-1)
-    known = np.isfinite(ordered).sum(axis=-1, keepdims=True)
-    low, high = np.maximum(known - 1, 0) // 2, np.minimum(known // 2, stack.shape[-1] - 1)
-    middle = np.take_along_axis(ordered, low, -1) + np.take_along_axis(ordered, high, -1)
-    return np.asarray(np.where(known > 0, 0.5 * middle, np.nan)[..., 0], dtype=np.float32)
+@njit("UniTuple(float32[::1], 2)(float32[:, ::1])", cache=True, nogil=True)
+def _of_ordered(ordered):  # type: ignore[no-untyped-def]
+    """Return medians (n,) of ordered values (n, m), and the variance by the median of the distances from them.
+
+    On either side of the median the values are in the order of their distance; so the nearest half is found by going
+    outwards.
+    """
+    median, variance = np.full(len(ordered), np.nan, np.float32), np.full(len(ordered), np.nan, np.float32)
+    for i in range(len(ordered)):
+        count = ordered.shape[1]
+        while count > 0 and np.isnan(ordered[i, count - 1]):
+            count -= 1
+        if count == 0:
+            continue
+        middle = np.float32(0.5) * (ordered[i, (count - 1) // 2] + ordered[i, count // 2])
+        above = count // 2
+        below, far, before = above - 1, np.float32(0.0), np.float32(0.0)
+        for _ in range(count // 2 + 1):
+            before = far
+            down = middle - ordered[i, below] if below >= 0 else np.float32(np.inf)
+            up = ordered[i, above] - middle if above < count else np.float32(np.inf)
+            if down < up:
+                far, below = down, below - 1
+            else:
+                far, above = up, above + 1
+        deviation = far if count % 2 else np.float32(0.5) * (before + far)
+        median[i], variance[i] = middle, np.float32(_MAD2) * deviation * deviation
+    return median, variance
 
 
 def _slope2(picture: Picture) -> Picture:
