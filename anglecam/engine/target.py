@@ -118,7 +118,7 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
     held = np.stack(
         [cv2.warpAffine(used[j], m, size, flags=back, borderValue=np.nan) for j, m in zip(known, maps, strict=True)]
     )
-    appearance, variance = _typical(held)
+    appearance, variance = _typical(np.asarray(held, np.float32))
     often = np.isfinite(held).sum(axis=0).astype(np.float32)
     # a mean and a variance from n values predict another one with the variance (n + 1)/(n − 1); from 3 they do not
     appearance = np.where(often > 3, appearance, np.nan)
@@ -147,8 +147,10 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
         )
     behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
     around = [(one.start, n - one.stop) for one, n in zip(box, blank.shape, strict=True)]
-    seen, v, spread = (np.pad(np.nan_to_num(one), around) for one in (appearance, visibility, variance))
-    return Target(seen, v, spread, background, behind, pad)
+    seen_as, v, spread_of = (
+        np.asarray(np.pad(np.nan_to_num(one), around), np.float32) for one in (appearance, visibility, variance)
+    )
+    return Target(seen_as, v, spread_of, background, behind, pad)
 
 
 def _shown(maps: list[Floats], shape: tuple[int, ...], padded: tuple[int, ...]) -> tuple[slice, slice]:
