@@ -27,7 +27,7 @@ from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.fine_angles import fine_angles
 from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
-from anglecam.measurement.trust import why_doubtful, why_few, why_no_rotation
+from anglecam.measurement.trust import why_doubtful, why_few, why_no_rotation, why_not_as_declared
 from anglecam.progress import Progress, unseen
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
@@ -87,8 +87,10 @@ def follow_mark_or_body(
     by_mark = mark if isinstance(mark, str) else _measured(film, rig, command, mark, progress)
     # nothing else is meant by a colour, nor in the other parts of a film
     final = known is not None or film.undecodable == len(film.times) or rig.mark_rgb is not None
-    if isinstance(by_mark, Followed) and (by_mark.doubt is None or final or camera.unknown):
-        return by_mark
+    if isinstance(by_mark, Followed):
+        contradicted = why_not_as_declared(by_mark.detections, by_mark.ok, by_mark.angles, rig) is not None
+        if by_mark.doubt is None or contradicted or final or camera.unknown:
+            return by_mark
     cause = camera.unknown or (by_mark if final else None) or detect_body(camera, rig, progress)
     by_body = _measured(film, rig, command, cause, progress) if isinstance(cause, Detections) else cause
     if isinstance(by_mark, Followed) and (isinstance(by_body, str) or by_body.doubt is not None):

@@ -156,12 +156,33 @@ def why_doubtful(detections: Detections, ok: Flags, angles: Angles, rig: Rig, *,
     str or None
         With the cause. That the whole body turns proves what its mark alone does not.
     """
-    doubt = detections.doubt or why_still(detections, ok, rig)
+    doubt = detections.doubt or why_not_as_declared(detections, ok, angles, rig)
     if doubt is not None or angles.registered is not None:
         return doubt
-    return (
-        why_elsewhere(detections, rig) or why_not_rigid(detections, ok) or why_unproven(detections, hand_held=hand_held)
-    )
+    return why_not_rigid(detections, ok) or why_unproven(detections, hand_held=hand_held)
+
+
+def why_not_as_declared(detections: Detections, ok: Flags, angles: Angles, rig: Rig) -> str | None:
+    """Return a message where the mark stands still that the rig declares, or turns about another point.
+
+    Parameters
+    ----------
+    detections : Detections
+        The coarse pass.
+    ok : ndarray
+        (frames,) the measured frames.
+    angles : Angles
+        Of these frames; a whole body shows its pivot itself.
+    rig : Rig
+        What is declared.
+
+    Returns
+    -------
+    str or None
+        With what was seen.
+    """
+    still = why_still(detections, ok, rig)
+    return still if still is not None or angles.registered is not None else why_elsewhere(detections, rig)
 
 
 def why_elsewhere(detections: Detections, rig: Rig) -> str | None:

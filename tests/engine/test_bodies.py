@@ -174,3 +174,16 @@ def test_a_hint_at_another_place_costs_a_doubt_and_no_measurement(tmp_path):
     assert measured.doubt is not None
     assert "is not what is declared (pivot 20,220)" in measured.doubt
     assert np.sqrt((_error(measured, JUMPS) ** 2).mean()) < 0.3
+
+
+def test_a_body_is_measured_whose_mark_is_seen_in_some_frames_only(tmp_path):
+    """As lips that a codec paints red in some poses and brown in others."""
+
+    def draw(scene, angle):
+        things.stick(GREY, 16.0)(scene, angle)
+        if angle > np.radians(8.0):
+            things.disc(scene, things.hanging((160.0, 30.0), 140.0, angle), 7.0, (200, 30, 40))
+
+    measured = _measured(tmp_path, draw, SWING, rig=Rig(least_measured=0.9))
+    assert measured.doubt is None
+    assert np.sqrt(np.mean(_error(measured, SWING) ** 2)) < 0.1

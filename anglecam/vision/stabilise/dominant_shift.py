@@ -110,7 +110,7 @@ def learn_shift(edges: SceneryEdges, images: Sequence[Image]) -> ShiftingScenery
     if np.sqrt(shifts_px.var(axis=0).sum()) < _STILL_PX:
         return None
     moves, rest = [shift_of(one) for one in shifts_px], [np.eye(3)] * len(images)
-    if not edges.is_scenery_elsewhere(edges.gain(images, moves, rest), edges.gain_if_right(moves, rest)):
+    if not edges.is_scenery(edges.gain(images, moves, rest), edges.gain_if_right(moves, rest)):
         return None
     weights = _weights(edges, follows)
     return ShiftingScenery(edges, weights, float(np.median([weights[-1] @ one for one in fits])), shifts_px)

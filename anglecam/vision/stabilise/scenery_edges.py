@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from anglecam.data.typing import Floats, Image
+from anglecam.data.typing import Flags, Floats, Image
 from anglecam.vision.image.noise import pixel_noise
 from anglecam.vision.image.reduction import reduced, reduction
 from anglecam.vision.stabilise.tile_cuts import brightness
@@ -131,12 +131,13 @@ class SceneryEdges:
             gains.append(np.where(np.isfinite(off), _evidence(np.ones(len(off)), level.sigma) - as_other, 0.0))
         return np.array(gains)
 
-    def is_scenery_elsewhere(self, gain: Floats, if_right: Floats) -> bool:
-        """Return whether pixels gain what they would if a motion were right, in more than one place.
+    def is_scenery(self, gain: Floats, if_right: Floats) -> bool:
+        """Return whether a motion of the camera predicts the edges better, and scenery in more than one place.
 
-        Those that do in one half of the pictures have to in the other half: what swings follows a shift in some
-        pictures, scenery in all. They lie outside the disc in which they gain most: a body that slides before a plain
-        wall may have all edges that shift, and a camera moves the rest of the picture, too.
+        A body that slides before a plain wall may have all edges that shift; a camera moves the rest of the picture,
+        too. So the edges outside the disc that gains most have to gain. What swings follows a shift in some pictures,
+        scenery in all: edges that gain half of what they would if the motion were right in one half of the pictures
+        have to in the other half.
 
         Parameters
         ----------
@@ -145,14 +146,19 @@ class SceneryEdges:
         """
         halves = slice(0, None, 2), slice(1, None, 2)
         over = [(gain - _HALF * if_right)[half] for half in halves]
-        places, radius = self.levels[-1].places, _BODY * max(self.size)
-        near = [np.hypot(*(places - middle).T) < radius for middle in np.unique(places // radius, axis=0) * radius]
         held_out = []
         for k in (0, 1):
-            chosen = over[1 - k].sum(axis=0) > 0.0
-            total = np.where(chosen, gain[halves[1 - k]].sum(axis=0), 0.0)
-            held_out.append(over[k][:, chosen & ~max(near, key=lambda one: float(total[one].sum()))].sum(axis=1))
-        return is_better(np.concatenate(held_out)[:, None])
+            follows = over[1 - k].sum(axis=0) > 0.0
+            beyond = self._beyond_the_most(np.where(follows, gain[halves[1 - k]].sum(axis=0), 0.0))
+            held_out.append(over[k][:, follows & beyond].sum(axis=1))
+        elsewhere = gain[:, self._beyond_the_most(gain.sum(axis=0))]
+        return is_better(gain) and is_better(elsewhere) and is_better(np.concatenate(held_out)[:, None])
+
+    def _beyond_the_most(self, total: Floats) -> Flags:
+        """Return which edge pixels (n,) lie outside the disc of a body's size that gains most."""
+        places, radius = self.levels[-1].places, _BODY * max(self.size)
+        near = [np.hypot(*(places - middle).T) < radius for middle in np.unique(places // radius, axis=0) * radius]
+        return ~max(near, key=lambda one: float(total[one].sum()))
 
     def _reduced(self, image: Image) -> Image:
         return reduced(brightness(image), _LONGEST_PX)
