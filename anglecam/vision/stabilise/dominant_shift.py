@@ -26,7 +26,7 @@ _STEPS, _SETTLED_PX = 12, 0.01
 _ROUNDS = 3
 """Rounds of shifts and of weights by how often a pixel follows."""
 _STARTS, _APART_PX = 3, 1.0
-"""Shifts from which the coarsest level is climbed, at most, and their least distance, px."""
+"""Shifts from which the coarsest level is climbed, at most, and the distance at which two are one, px."""
 _SPREAD_PX = 0.6
 """Standard deviation, in pixels of a level, by which those weights are spread to its pixels."""
 _PART_PX = 32
@@ -144,17 +144,16 @@ def _index(edges: SceneryEdges, level: Level) -> tuple[np.ndarray, np.ndarray]:
 def _shift(edges: SceneryEdges, pyramid: list[Image], starts: Floats, weights: list[Floats]) -> tuple[Floats, Floats]:
     """Return the shift (2,), px of the reduced picture, and how well each pixel of the finest level follows it (n,)."""
     coarsest, weight = edges.levels[0], weights[0]
+    places = np.unique(np.round(starts / _APART_PX), axis=0, return_index=True)[1]
     fits = [
-        weight @ _fits(values_at(pyramid[0], coarsest.places + one, edges.size), coarsest, weight)[1] for one in starts
+        weight @ _fits(values_at(pyramid[0], coarsest.places + starts[k], edges.size), coarsest, weight)[1]
+        for k in places
     ]
-    tried: list[Floats] = []
-    for k in np.argsort(-np.array(fits), kind="stable"):
-        if len(tried) < _STARTS and all(np.hypot(*(starts[k] - one)) > _APART_PX for one in tried):
-            tried.append(starts[k])
+    tried = [starts[places[k]] for k in np.argsort(-np.array(fits), kind="stable")[:_STARTS]]
     for level, picture, weight in zip(edges.levels, pyramid, weights, strict=True):
         found = [_climb(picture, level, weight, start, edges.size) for start in tried]
         found.sort(key=lambda one: -float(weight @ one[1]))
-        tried = [shift for shift, _ in found]
+        tried = [shift for shift, _ in found[: (len(found) + 1) // 2]]  # the finest level is the dearest
     return found[0]
 
 
@@ -170,7 +169,7 @@ def _covariance(picture: Image, edges: SceneryEdges, weight: Floats, shift: Floa
     bread = np.linalg.inv(each.T @ level.slopes * contrast + 1e-9 * np.eye(2))
     _, part = np.unique((level.places // _PART_PX).astype(int), axis=0, return_inverse=True)
     scores = np.zeros((part.max() + 1, 2))
-    np.add.at(scores, part.ravel(), each * np.nan_to_num(seen - contrast * level.values)[:, None])
+    np.add.at(scores, part.ravel(), each * _known(seen - contrast * level.values)[:, None])
     parts = int(np.count_nonzero(scores.any(axis=1)))
     contradiction = bread @ scores.T @ scores @ bread * (parts / max(parts - 1, 1))
     return np.asarray(contradiction + _INTERPOLATION_PX**2 * np.eye(2))
@@ -183,7 +182,7 @@ def _climb(picture: Image, level: Level, weight: Floats, shift: Floats, size: tu
         contrast, fits = _fits(seen, level, weight)
         each = (weight * fits / level.sigma**2)[:, None] * level.slopes
         normal = each.T @ level.slopes + 1e-9 * np.eye(2)
-        step = -np.linalg.solve(normal, each.T @ np.nan_to_num(seen - contrast * level.values)) / contrast
+        step = -np.linalg.solve(normal, each.T @ _known(seen - contrast * level.values)) / contrast
         shift = shift + step
         if np.hypot(*step) < _SETTLED_PX:
             break
@@ -194,8 +193,13 @@ def _fits(seen: Floats, level: Level, weight: Floats) -> tuple[float, Floats]:
     """Return the contrast relative to the first picture, and Tukey's weights (n,) with it."""
     contrast = 1.0
     for _ in range(2):
-        off = (seen - contrast * level.values) / (_TUKEY * level.sigma)
-        fits = np.nan_to_num(np.maximum(0.0, 1.0 - off**2)) ** 2
+        off2 = ((seen - contrast * level.values) / (_TUKEY * level.sigma)) ** 2
+        fits = np.where(off2 < 1.0, 1.0 - off2, 0.0) ** 2  # of what is unknown, too
         both = weight * fits * level.values
-        contrast = float(np.clip(both @ np.nan_to_num(seen) / max(both @ level.values, 1e-9), 0.5, 2.0))
+        contrast = float(np.clip(both @ _known(seen) / max(both @ level.values, 1e-9), 0.5, 2.0))
     return contrast, fits
+
+
+def _known(values: Floats) -> Floats:
+    """Return values with 0 for those that are unknown."""
+    return np.where(np.isnan(values), 0.0, values)
