@@ -53,22 +53,29 @@ def add_gain(gain, picture, body, body_variance, excess, background, background_
     Parameters
     ----------
     gain, picture, body, body_variance : ndarray
-        (h, w) float32; grey levels, and grey levels². Where one is NaN nothing is added.
+        (h, w) float32; grey levels, and grey levels². Where the picture is NaN nothing is added. Where a mean is, any
+        grey level is as probable.
     excess : float
         By how much the variance of a pixel is larger in this picture than usual, grey levels².
     background, background_variance : ndarray
         (h, w) float32, the same of the background.
     """
-    floor, half = np.float32(_OUTLIERS / 256.0 * sqrt(2.0 * pi) / (1.0 - _OUTLIERS)), np.float32(-0.5)
+    scale = (1.0 - _OUTLIERS) / sqrt(2.0 * pi)
+    floor, unknown, half = np.float32(_OUTLIERS / 256.0 / scale), np.float32(1.0 / 256.0 / scale), np.float32(-0.5)
     for i in range(gain.shape[0]):
         for j in range(gain.shape[1]):
-            off, off_behind = picture[i, j] - body[i, j], picture[i, j] - background[i, j]
-            if off * off + off_behind * off_behind >= 0.0:
+            seen = picture[i, j]
+            if not seen * seen >= 0.0:
+                continue
+            off, off_behind = seen - body[i, j], seen - background[i, j]
+            as_body, as_background = unknown, unknown
+            if off * off >= 0.0:
                 sharp = np.float32(1.0) / (body_variance[i, j] + excess)
-                behind = np.float32(1.0) / (background_variance[i, j] + excess)
                 as_body = sqrt(sharp) * exp(half * off * off * sharp) + floor
-                as_background = sqrt(behind) * exp(half * off_behind * off_behind * behind) + floor
-                gain[i, j] += log(as_body / as_background)
+            if off_behind * off_behind >= 0.0:
+                sharp = np.float32(1.0) / (background_variance[i, j] + excess)
+                as_background = sqrt(sharp) * exp(half * off_behind * off_behind * sharp) + floor
+            gain[i, j] += log(as_body / as_background)
 
 
 @njit(inline="always")

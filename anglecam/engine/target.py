@@ -24,6 +24,8 @@ Picture = NDArray[np.float32]
 _ROUNDS = 2
 """Of visibility and background in turn."""
 _MAD2 = 1.4826**2
+_BORDER = 8
+"""Pixels around what pictures show, beyond the reach of smoothing."""
 _FRACTION2 = 1.0 / 12.0
 """Variance, px², of a place that is rounded to whole pixels."""
 
@@ -158,9 +160,10 @@ def _shown(maps: list[Floats], shape: tuple[int, ...], padded: tuple[int, ...]) 
     height, width = shape
     corners = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
     places = np.concatenate([(corners - m[:, 2]) @ np.linalg.inv(m[:, :2]).T for m in maps])
-    low = np.maximum(places.min(axis=0).astype(int) - 1, 0)
-    high = np.minimum(places.max(axis=0).astype(int) + 2, padded[::-1])
-    return slice(low[1], max(high[1], low[1] + 1)), slice(low[0], max(high[0], low[0] + 1))
+    most = np.array(padded[::-1])
+    low = np.clip(places.min(axis=0).astype(int) - _BORDER, 0, most - 1)
+    high = np.clip(places.max(axis=0).astype(int) + _BORDER, low + 1, most)
+    return slice(low[1], high[1]), slice(low[0], high[0])
 
 
 def _typical(pictures: Picture) -> tuple[Picture, Picture]:
