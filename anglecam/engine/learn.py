@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,8 +46,8 @@ class Learnt:
         return self.explanations[0].lead if self.explanations else -np.inf
 
 
-def learn(stills: Stills, hints: Hints = NO_HINTS) -> Learnt | None:
-    """Find the body that turns in a film.
+def looks(stills: Stills, hints: Hints = NO_HINTS) -> Iterator[Learnt]:
+    """Look for the body that turns in a film: at all that changes, then closer at parts of it.
 
     Parameters
     ----------
@@ -56,24 +56,21 @@ def learn(stills: Stills, hints: Hints = NO_HINTS) -> Learnt | None:
     hints : Hints
         What is declared.
 
-    Returns
-    -------
-    Learnt or None
-        ``None`` where nothing moves.
+    Yields
+    ------
+    Learnt
+        Of each look; none where nothing moves.
     """
-    looked: list[Learnt] = []
-    with one_opencv_thread(), threadpool_limits(1, "blas"):  # matrices this small take longer with more
-        for sample in sample_stills(stills):
-            looked.append(_explained(sample, stills, hints))
-            if _rank(looked[-1], hints) == 0:
-                break
-    return min(looked, key=lambda one: (_rank(one, hints), -one.lead), default=None)
+    for sample in sample_stills(stills):
+        with one_opencv_thread(), threadpool_limits(1, "blas"):  # matrices this small take longer with more
+            learnt = _explained(sample, stills, hints)
+        yield learnt
 
 
 def _explained(sample: Sample, stills: Stills, hints: Hints) -> Learnt:
     proposals = [one for find in FINDERS for one in find(sample)]
     fits = compete(sample, proposals, declared.proposals(sample, hints))
-    found = sorted(fits, key=lambda one: _rank(Learnt(sample, (one,)), hints))
+    found = sorted(fits, key=lambda one: rank(Learnt(sample, (one,)), hints))
     if not found:
         return Learnt(sample, ())
     closer = sample_part(stills, swept(sample, found[0].fit))
@@ -84,7 +81,7 @@ def _explained(sample: Sample, stills: Stills, hints: Hints) -> Learnt:
     return Learnt(sample, tuple(found))
 
 
-def _rank(one: Learnt, hints: Hints) -> int:
+def rank(one: Learnt, hints: Hints) -> int:
     """Return 0 for a body that turns and obeys the hints, 1 for one that turns otherwise, 2 for none.
 
     A hint does not hide what turns: where nothing turns as it says, a message says what does.

@@ -12,7 +12,8 @@ from anglecam.camera.lens import lens_from_rig
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.engine.body import Turn
-from anglecam.engine.learn import Hints, learn
+from anglecam.engine.hints import Hints
+from anglecam.engine.learn import Learnt, looks, rank
 from anglecam.engine.reasons import why_ambiguous, why_jump, why_not_as_hinted, why_nothing_turns
 from anglecam.engine.refine import sensitivities
 from anglecam.engine.sample import FRAMES, Sample, Stills
@@ -66,9 +67,26 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     pictures = film.stills(FRAMES)
     if hints.mark_px is not None and all(picture.index != hints.mark_frame for picture in pictures):
         pictures = sorted([*pictures, _picture(film, hints.mark_frame)], key=lambda picture: picture.index)
-    learnt = learn(stills_of(pictures, camera), hints)
-    if learnt is None or not learnt.turns:
-        return why_nothing_turns(learnt, film.first_frame)
+    looked: list[Learnt] = []
+    refused: list[Detections | str] = []
+    for learnt in looks(stills_of(pictures, camera), hints):
+        looked.append(learnt)
+        if rank(learnt, hints) == 0:
+            found = _followed(camera, rig, hints, learnt, progress)
+            if isinstance(found, Detections) and found.doubt is None:
+                return found
+            refused.append(found)
+    if refused:  # a doubt says more than a body that cannot be followed
+        return min(refused, key=lambda one: isinstance(one, str))
+    best = min(looked, key=lambda one: (rank(one, hints), -one.lead), default=None)
+    if best is None or not best.turns:
+        return why_nothing_turns(best, film.first_frame)
+    return _followed(camera, rig, hints, best, progress)
+
+
+def _followed(camera: HeldCamera, rig: Rig, hints: Hints, learnt: Learnt, progress: Progress) -> Detections | str:
+    """Follow a body that was learnt through all frames; return why it cannot be followed otherwise."""
+    film = camera.film
     search = search_for(learnt.sample, learnt.explanations[0].fit)
     seen = follow(camera, search.sample, partial(_candidates, search), progress)
     for _ in range(_STEADIER):
