@@ -68,16 +68,16 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     if hints.mark_px is not None and all(picture.index != hints.mark_frame for picture in pictures):
         pictures = sorted([*pictures, _picture(film, hints.mark_frame)], key=lambda picture: picture.index)
     looked: list[Learnt] = []
-    refused: list[Detections | str] = []
+    doubtful: Detections | None = None
     for learnt in looks(stills_of(pictures, camera), hints):
         looked.append(learnt)
         if rank(learnt, hints) == 0:
             found = _followed(camera, rig, hints, learnt, progress)
-            if isinstance(found, Detections) and found.doubt is None:
-                return found
-            refused.append(found)
-    if refused:  # a doubt says more than a body that cannot be followed
-        return min(refused, key=lambda one: isinstance(one, str))
+            if isinstance(found, str) or found.doubt is None:
+                return found  # of like parts that change places none is surer from nearer by
+            doubtful = doubtful or found
+    if doubtful is not None:
+        return doubtful
     best = min(looked, key=lambda one: (rank(one, hints), -one.lead), default=None)
     if best is None or not best.turns:
         return why_nothing_turns(best, film.first_frame)
