@@ -74,7 +74,7 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
         if rank(learnt, hints) == 0:
             found = _followed(camera, rig, hints, learnt, progress)
             if isinstance(found, str) or found.doubt is None:
-                return found  # of like parts that change places none is surer from nearer by
+                return found  # a closer look does not tell like parts apart
             doubtful = doubtful or found
     if doubtful is not None:
         return doubtful
