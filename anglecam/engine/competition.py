@@ -16,6 +16,7 @@ from anglecam.data.typing import Floats
 from anglecam.engine.refine import Fit, refine
 from anglecam.engine.sample import Sample, noise_of
 from anglecam.engine.score import NOTHING, Proposal, Score, score
+from anglecam.engine.sliding import slide_of
 from anglecam.engine.target import turned
 
 _FINALISTS = 4
@@ -72,7 +73,7 @@ def compete(sample: Sample, proposals: Sequence[Proposal], declared: Sequence[Pr
     finalists = _unlike(sample, _in_order(small, declared, still), [], _FINALISTS // 2)
     finalists += _unlike(sample, _in_order(small, proposals, still), finalists, _FINALISTS)
     fits = [fit for proposal in finalists if (fit := refine(sample, proposal)) is not None]
-    rivals = [score(sample, NOTHING, [None] * len(sample.pictures)), *(_sliding(sample, fit) for fit in fits)]
+    rivals = [score(sample, NOTHING, [None] * len(sample.pictures)), *(slide_of(sample, fit).score for fit in fits)]
     found = [_compared(fit, score(sample, fit.proposal.name, fit.proposal.poses(sample)), rivals) for fit in fits]
     return sorted(found, key=lambda one: (not one.turns, -one.score.total if one.turns else -one.lead))
 
@@ -138,20 +139,3 @@ def _alike(sample: Sample, one: Proposal, other: Proposal) -> bool:
     placed = corners @ first[:, :, :2].swapaxes(1, 2) + first[:, None, :, 2]
     moved = (corners @ back[:, :2].T + back[:, 2]) @ second[:, :, :2].swapaxes(1, 2) + second[:, None, :, 2]
     return float(np.median(np.hypot(*np.moveaxis(placed - moved, -1, 0)))) < _APART_PX
-
-
-def _sliding(sample: Sample, fit: Fit) -> Score:
-    return score(sample, "slides", sliding_poses(sample, fit))
-
-
-def sliding_poses(sample: Sample, fit: Fit) -> list[Floats | None]:
-    """Return the (2, 3) poses of a body whose middle moves on a straight line, as far as it does, unturned."""
-    poses = fit.proposal.poses(sample)
-    rows, columns = np.nonzero(fit.target.visibility)
-    middle = np.array([columns.mean(), rows.mean()]) - fit.target.pad
-    shifts = np.array([np.full(2, np.nan) if p is None else p[:, :2] @ middle + p[:, 2] - middle for p in poses])
-    known = np.isfinite(shifts[:, 0])
-    mean = shifts[known].mean(axis=0)
-    axis = np.linalg.svd(shifts[known] - mean)[2][0]
-    straight = mean + ((shifts - mean) @ axis)[:, None] * axis
-    return [turned(middle, 0.0, one) if np.isfinite(one).all() else None for one in straight]

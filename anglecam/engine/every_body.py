@@ -20,11 +20,12 @@ from scipy import special
 from threadpoolctl import threadpool_limits
 
 from anglecam.data.typing import Floats
-from anglecam.engine.competition import LEAST_TURN, SURE, Explanation, compete, sliding_poses
+from anglecam.engine.competition import LEAST_TURN, SURE, Explanation, compete
 from anglecam.engine.learn import CLOSER, FINDERS, Learnt, swept
 from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample, Stills, changed_boxes, sample_part
 from anglecam.engine.score import NOTHING, Proposal, Score, score
+from anglecam.engine.sliding import slide_of
 from anglecam.engine.target import Picture, Target, learn_target
 from anglecam.threads import one_opencv_thread
 
@@ -243,11 +244,10 @@ def _surest(rest: Rest, found: Sequence[Explanation], known: Sequence[Proposal])
             if joint is None or turns_relative(known[joint], proposal):
                 return Moving(proposal, masked, one.fit, lead, "turns", joint, rest.targets)
     for one in sorted(found, key=lambda one: -one.score.total):
-        poses = sliding_poses(masked, one.fit)
-        slides = score(masked, "slides", poses)
-        lead = min(slides.lead(rival) for rival in rivals)
-        if lead >= SURE and one.score.lead(slides) < SURE:
-            motion = _as_translation(masked, poses)
+        slide = slide_of(masked, one.fit)
+        lead = min(slide.score.lead(rival) for rival in rivals)
+        if lead >= SURE and one.score.lead(slide.score) < SURE:
+            motion = _as_translation(masked, slide.poses)
             return Moving(motion, masked, one.fit, lead, "translates", before=rest.targets)
         lead = min(one.score.lead(rival) for rival in rivals)
         if lead >= SURE:

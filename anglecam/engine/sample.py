@@ -221,8 +221,12 @@ def in_light(picture: NDArray[np.float32], median: NDArray[np.float32]) -> NDArr
         weighted = terms.T * weight
         factor = np.linalg.solve(weighted @ terms + prior, weighted @ ratio)
     y, x = np.indices((height, width)).reshape(2, -1)
-    light = np.exp(_quadratic(x / width, y / height) @ factor)
-    return np.asarray(picture / light.reshape(height, width), np.float32)
+    light = np.exp(_quadratic(x / width, y / height) @ factor).reshape(height, width)
+    steady = picture / light
+    # white is at least as bright as it shows, and black at least as dark
+    steady = np.where(picture >= _BRIGHT, np.maximum(steady, median), steady)
+    steady = np.where(picture <= _DARK, np.minimum(steady, median), steady)
+    return np.asarray(steady, np.float32)
 
 
 def _quadratic(x: Floats, y: Floats) -> Floats:

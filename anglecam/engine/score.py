@@ -96,8 +96,8 @@ class Score:
     """(K, h, w) what it predicts, grey levels; NaN where nothing is known of a frame."""
     variances: NDArray[np.float16] = field(repr=False)
     """(K, h, w) grey levels²."""
-    covered: Flags = field(repr=False)
-    """(h, w) pixels that the body covers in any frame; all where there is none."""
+    covers: Flags = field(repr=False)
+    """(K, h, w) pixels that the body covers in each frame."""
 
     @cached_property
     def total(self) -> float:
@@ -105,25 +105,29 @@ class Score:
         return float(self.density.sum(dtype=float))
 
     @cached_property
-    def _if_right(self) -> Floats:
-        """(K,) log density of what is covered if each frame were exactly as this explanation predicts."""
-        return self._of(self)
+    def covered(self) -> Flags:
+        """(h, w) pixels that the body covers in any frame; all where there is none."""
+        any_frame = self.covers.any(axis=0)
+        return any_frame if any_frame.any() else ~any_frame
 
-    def _of(self, other: Score) -> Floats:
-        """Return the log density (K,) of what another explanation predicts where its body is."""
-        count = len(other.pictures)
-        sums = np.empty(count)
-        for k in range(count):
+    def _of(self, other: Score, where: Flags) -> Floats:
+        """Return the log density (K,) of what another explanation predicts, of some pixels (K, h, w)."""
+        sums = np.empty(len(where))
+        for k, counts in enumerate(where):
             picture, mean, variance = (
                 one[k].astype(np.float32) for one in (other.pictures, self.pictures, self.variances)
             )
-            sums[k] = float(log_density(picture, mean, variance)[other.covered].sum(dtype=float))
+            sums[k] = float(log_density(picture, mean, variance)[counts].sum(dtype=float))
         return sums
 
     def over(self, other: Score) -> Lead:
-        """Return by how much this explanation predicts better than another one of the same frames."""
-        gained = (self.density - other.density).sum(axis=(1, 2), where=self.covered, dtype=float)
-        expected = np.maximum(self._if_right - other._of(self), 0.0)
+        """Return by how much this explanation predicts better than another one of the same frames.
+
+        What the other one's body covers and this one's does not is left to the other one: a hand may be there as well.
+        """
+        where = self.covered & (self.covers | ~other.covers)
+        gained = (self.density - other.density).sum(axis=(1, 2), where=where, dtype=float)
+        expected = np.maximum(self._of(self, where) - other._of(self, where), 0.0)
         share = float(gained.sum()) / max(float(expected.sum()), 1e-9)
         count = len(gained)
         error = float(np.sqrt(((gained - share * expected) ** 2).sum() * count / (count - 1)))
@@ -159,7 +163,7 @@ def score(sample: Sample, name: str, poses: Sequence[Floats | None]) -> Score:
     count = len(sample.pictures)
     shape = sample.pictures.shape
     density, pictures, variances = (np.empty(shape, np.float16) for _ in range(3))
-    covered = np.zeros(shape[1:], bool)
+    covers = np.zeros(shape, bool)
     known = list(poses)
     for half in range(2):
         target = learn_target(sample, known, np.arange(half, count, 2))
@@ -171,5 +175,5 @@ def score(sample: Sample, name: str, poses: Sequence[Floats | None]) -> Score:
             pictures[k] = np.where(np.isfinite(sample.pictures[k]), picture, np.nan)
             variances[k] = np.minimum(variance, _MOST_VARIANCE)
             if pose is not None:
-                covered |= target.covers(pose)
-    return Score(name, density, pictures, variances, covered if covered.any() else np.ones_like(covered))
+                covers[k] = target.covers(pose)
+    return Score(name, density, pictures, variances, covers)

@@ -12,6 +12,7 @@ from anglecam.camera.lens import lens_from_rig
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.engine.body import Turn
+from anglecam.engine.frame_choice import spread_over_motion
 from anglecam.engine.hints import Hints
 from anglecam.engine.learn import Learnt, looks, rank
 from anglecam.engine.reasons import why_ambiguous, why_jump, why_not_as_hinted, why_nothing_turns
@@ -34,6 +35,8 @@ from anglecam.vision.stabilise.dominant_shift import CameraMotion
 from anglecam.vision.status import AMBIGUOUS, OCCLUDED, UNDECODABLE
 
 Find = Callable[[int, Grey], list[Turn]]
+_LOOKED_AT = 4
+"""Times the pictures of a sample, from which it is chosen."""
 _KEPT_BYTES = 200_000_000
 """Memory for the reduced pictures of a film, which may have to be looked through again."""
 _STEADIER = 3
@@ -64,7 +67,7 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     film = camera.film
     progress(Stage("looking for what turns"))
     hints = _hints(film, rig)
-    pictures = film.stills(FRAMES)
+    pictures = moving_stills(film)
     if hints.mark_px is not None and all(picture.index != hints.mark_frame for picture in pictures):
         pictures = sorted([*pictures, _picture(film, hints.mark_frame)], key=lambda picture: picture.index)
     looked: list[Learnt] = []
@@ -106,6 +109,13 @@ def _followed(camera: HeldCamera, rig: Rig, hints: Hints, learnt: Learnt, progre
 
 def _candidates(search: Search, _: int, picture: Grey) -> list[Turn]:
     return candidates(search, picture)
+
+
+def moving_stills(film: Film) -> list[Picture]:
+    """Return pictures of a film, spread over those in which something moves."""
+    shown = [(p, image) for p in film.stills(_LOOKED_AT * FRAMES) if (image := p.brightness) is not None]
+    chosen = spread_over_motion([image for _, image in shown], FRAMES) if shown else []
+    return [shown[k][0] for k in chosen]
 
 
 def _hints(film: Film, rig: Rig) -> Hints:

@@ -19,13 +19,12 @@ from anglecam.engine.body import Turn
 from anglecam.engine.every_body import MOST, Moving, further_bodies, without
 from anglecam.engine.reasons import why_ambiguous, why_jump
 from anglecam.engine.refine import sensitivities
-from anglecam.engine.sample import FRAMES
 from anglecam.engine.score import Proposal, carried_by
 from anglecam.engine.target import Picture
 from anglecam.engine.tracking import Search, candidates, chosen, search_for
 from anglecam.io.rig import Rig, RigPivot
 from anglecam.measurement.angles import Angles, coarse_angles
-from anglecam.measurement.body_pass import follow, rigid_motion, stills_of
+from anglecam.measurement.body_pass import follow, moving_stills, rigid_motion, stills_of
 from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.followed import Followed
@@ -91,7 +90,7 @@ def other_bodies(
         In the order in which they were found, which is that of how surely.
     """
     rig = of_any_body(rig)
-    stills = stills_of(camera.film.stills(FRAMES), camera)
+    stills = stills_of(moving_stills(camera.film), camera)
     measured = _of_first(first, rig)
     known: list[_Known | None] = [measured]
     progress(Stage("looking for what else moves"))

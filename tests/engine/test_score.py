@@ -59,6 +59,17 @@ def test_a_small_error_of_the_turn_costs_likelihood(swing):
     assert true.lead(wrong) > 3.0
 
 
+def test_a_hand_that_covers_the_way_of_a_body_is_no_rival_of_it():
+    turn = np.concatenate([np.full(12, 0.35), TURN])
+    pictures = [_bar(t, seed) for seed, t in enumerate(turn)]
+    for picture in pictures[:12]:
+        cv2.circle(picture, (60, 66), 9, 235.0, -1)
+    held = sample_of(np.stack(pictures), np.arange(36), 1.0, np.zeros(2))
+    true = score(held, "true", Proposal("true", CENTRE, turn).poses(held))
+    hand = score(held, "hand", [np.eye(2, 3) if k < 12 else None for k in range(36)])
+    assert true.lead(hand) > 10.0
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_where_nothing_moves_a_turn_is_no_better(seed):
     pictures = np.stack([_bar(0.0, 100 * seed + k) for k in range(24)])

@@ -1,0 +1,49 @@
+"""The frames by which explanations are compared: evenly spread over those in which something has moved.
+
+Frames at rest show the same pose again. To predict one of them from another is no proof of a motion, and behind a body
+that rests for half of the film no background is seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from anglecam.data.typing import Image
+from anglecam.engine.sample import noise_of
+
+_LONGEST_PX = 160
+"""Longer side of the reduced frames that are compared."""
+_MOVED = 6.0
+"""Standard deviations of a difference by which a smoothed pixel has to differ from that of the last frame that counts,
+so that something has moved: of 10⁴ pixels in 200 frames none does by chance."""
+
+
+def spread_over_motion(images: Sequence[Image], most: int) -> NDArray[np.int64]:
+    """Choose frames in which something has moved since the last one that counts.
+
+    Parameters
+    ----------
+    images : sequence of ndarray
+        (h, w) or (h, w, 1) brightness of n frames, in order.
+    most : int
+        Number of frames to choose, at most.
+
+    Returns
+    -------
+    ndarray
+        Their indices, ascending.
+    """
+    scale = min(1.0, _LONGEST_PX / max(images[0].shape[:2]))
+    reduced = [cv2.resize(one, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) for one in images]
+    pictures = np.stack([cv2.GaussianBlur(one.astype(np.float32), (0, 0), 1.0) for one in reduced])
+    least = _MOVED * np.sqrt(2.0) * noise_of(pictures)
+    moved, last = [0], pictures[0]
+    for k, picture in enumerate(pictures[1:], 1):
+        if float(np.abs(picture - last).max()) > least:
+            moved.append(k)
+            last = picture
+    return np.array(moved)[np.linspace(0, len(moved) - 1, min(most, len(moved))).round().astype(int)]
