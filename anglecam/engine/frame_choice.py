@@ -28,13 +28,20 @@ _STEADY = 0.1
 Where they change all pairs, no frame counts as one at rest."""
 
 
-def spread_over_motion(images: Sequence[Image], most: int) -> NDArray[np.int64]:
+def thumbnail(image: Image) -> NDArray[np.float32]:
+    """Return a frame's brightness, (h, w) or (h, w, 1), reduced and smoothed as it is compared."""
+    scale = min(1.0, _LONGEST_PX / max(image.shape[:2]))
+    reduced = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.GaussianBlur(reduced.astype(np.float32), (0, 0), 1.0))
+
+
+def spread_over_motion(thumbnails: Sequence[NDArray[np.float32]], most: int) -> NDArray[np.int64]:
     """Choose frames in which something has moved since the last one that counts.
 
     Parameters
     ----------
-    images : sequence of ndarray
-        (h, w) or (h, w, 1) brightness of n frames, in order.
+    thumbnails : sequence of ndarray
+        Of n frames, in order; one at least.
     most : int
         Number of frames to choose, at most.
 
@@ -43,9 +50,7 @@ def spread_over_motion(images: Sequence[Image], most: int) -> NDArray[np.int64]:
     ndarray
         Their indices, ascending.
     """
-    scale = min(1.0, _LONGEST_PX / max(images[0].shape[:2]))
-    reduced = [cv2.resize(one, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) for one in images]
-    pictures = np.stack([cv2.GaussianBlur(one.astype(np.float32), (0, 0), 1.0) for one in reduced])
+    pictures = np.stack(thumbnails)
     level = np.maximum(1.0, np.median(pictures, axis=(1, 2), keepdims=True))
     pictures *= np.median(level) / level  # the light of a frame is no motion
     least = _MOVED * np.sqrt(2.0) * _noise(pictures)

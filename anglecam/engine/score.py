@@ -107,8 +107,8 @@ class Score:
     @cached_property
     def covered(self) -> Flags:
         """(h, w) pixels that the body covers in any frame; all where there is none."""
-        any_frame = self.covers.any(axis=0)
-        return any_frame if any_frame.any() else ~any_frame
+        covered = np.asarray(self.covers.any(axis=0))
+        return covered if covered.any() else np.ones_like(covered)
 
     def _of(self, other: Score, where: Flags) -> Floats:
         """Return the log density (K,) of what another explanation predicts, of some pixels (K, h, w)."""

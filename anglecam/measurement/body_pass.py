@@ -12,7 +12,7 @@ from anglecam.camera.lens import lens_from_rig
 from anglecam.data.series import OK
 from anglecam.data.typing import Floats, Image
 from anglecam.engine.body import Turn
-from anglecam.engine.frame_choice import spread_over_motion
+from anglecam.engine.frame_choice import spread_over_motion, thumbnail
 from anglecam.engine.hints import Hints
 from anglecam.engine.learn import Learnt, looks, rank
 from anglecam.engine.reasons import why_ambiguous, why_jump, why_not_as_hinted, why_nothing_turns
@@ -113,9 +113,14 @@ def _candidates(search: Search, _: int, picture: Grey) -> list[Turn]:
 
 def moving_stills(film: Film) -> list[Picture]:
     """Return pictures of a film, spread over those in which something moves."""
-    shown = [(p, image) for p in film.stills(_LOOKED_AT * FRAMES) if (image := p.brightness) is not None]
-    chosen = spread_over_motion([image for _, image in shown], FRAMES) if shown else []
-    return [shown[k][0] for k in chosen]
+    shown = [
+        (picture, thumbnail(image))
+        for picture in film.stills(_LOOKED_AT * FRAMES)
+        if (image := picture.brightness) is not None
+    ]
+    if not shown:
+        return []
+    return [shown[k][0] for k in spread_over_motion([small for _, small in shown], FRAMES)]
 
 
 def _hints(film: Film, rig: Rig) -> Hints:

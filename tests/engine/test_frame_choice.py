@@ -5,18 +5,19 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from anglecam.engine.frame_choice import spread_over_motion
+from anglecam.engine.frame_choice import spread_over_motion, thumbnail
 
 
 def _film(turns: np.ndarray) -> list[np.ndarray]:
-    """Draw a bar that turns, 160 × 120, with noise of two grey levels."""
+    """Return thumbnails of a bar that turns, 160 × 120, with noise of two grey levels."""
     rng = np.random.default_rng(0)
     pictures = []
     for turn in turns:
         picture = np.full((120, 160), 150.0)
         end = np.array([80.0, 60.0]) + 45.0 * np.array([np.cos(turn), np.sin(turn)])
         cv2.line(picture, (80, 60), tuple(end.round().astype(int).tolist()), 60.0, 5, cv2.LINE_AA)
-        pictures.append(np.clip(picture + rng.normal(0.0, 2.0, picture.shape), 0, 255).astype(np.uint8))
+        noisy = np.clip(picture + rng.normal(0.0, 2.0, picture.shape), 0, 255).astype(np.uint8)
+        pictures.append(thumbnail(noisy))
     return pictures
 
 
