@@ -1,6 +1,6 @@
 """Measures films of simple mechanisms, with a phone's faults and without a hint, and whether each angle is right.
 
-    .venv/bin/python -m benchmarks.drawn_films --first 0 --seeds 40 [--kind X] [--json FILE]
+    .venv/bin/python -m benchmarks.drawn_films --first 0 --seeds 40 [--kind X] [--hinted] [--json FILE]
 
 `benchmarks.drawn` draws them with OpenCV; kind and seed alone decide a film. Without ``--kind`` the kinds take turns, a
 seed each. Every film has a row, and the last table counts: right; right in fewer than nine tenths of the frames;
@@ -27,6 +27,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="first seed")
     parser.add_argument("--seeds", type=int, default=len(KINDS), help="how many")
     parser.add_argument("--kind", choices=KINDS, help="of all films; by default the kinds take turns")
+    parser.add_argument("--hinted", action="store_true", help="with one true hint each, off by 10 px")
     parser.add_argument("--json", type=Path, help="also write the outcomes to this file, a line each")
     arguments = parser.parse_args()
     print(f"anglecam {version('anglecam')}, {date.today():%d %B %Y}\n")
@@ -34,7 +35,7 @@ def main() -> None:
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     outcomes = []
     for seed in range(arguments.first, arguments.first + arguments.seeds):
-        outcomes.append(run(arguments.kind or list(KINDS)[seed % len(KINDS)], seed))
+        outcomes.append(run(arguments.kind or list(KINDS)[seed % len(KINDS)], seed, hinted=arguments.hinted))
         print(_row(outcomes[-1]), flush=True)
         if arguments.json:
             with arguments.json.open("a") as file:

@@ -61,6 +61,8 @@ class Drawn:
     """Of every moving part (n,), counter-clockwise as seen, at the middle of the middle row's exposure."""
     pivot_px: np.ndarray
     """(2,) in the first frame of a camera at rest."""
+    grip_px: np.ndarray
+    """(2,) where a hand would take it, in the same frame."""
 
 
 def draw(kind: str, seed: int, folder: Path) -> Drawn:
@@ -122,7 +124,8 @@ def draw(kind: str, seed: int, folder: Path) -> Drawn:
         container.mux(stream.encode())
     poses = [mechanism.pose(own_time(float(t), faults.released_s)) for t in times]
     angles = {part: np.array([pose[part] for pose in poses]) for part in poses[0]}
-    return Drawn(path.stem, path, faults, codec, (width, height), times, angles, np.asarray(mechanism.pivot))
+    pivot, grip = np.asarray(mechanism.pivot), np.asarray(mechanism.grip(poses[0]))
+    return Drawn(path.stem, path, faults, codec, (width, height), times, angles, pivot, grip)
 
 
 def _options(codec: str, rng: np.random.Generator, faults: Faults) -> dict[str, str]:

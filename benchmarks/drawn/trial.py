@@ -16,6 +16,7 @@ import numpy as np
 
 from anglecam.data.series import AngleSeries
 from anglecam.errors import AnglecamError
+from anglecam.io.rig import Rig
 from anglecam.workflow.clip import measure_source, open_source
 from benchmarks.drawn.film import Drawn, draw
 
@@ -29,6 +30,8 @@ WORTHLESS = 0.1
 """Share of the true motion, RMS, from which on an error is too large to be useful, even with an honest sigma."""
 MOST = 0.9
 """Share of the frames that has to be measured; a film with fewer is right in fewer frames."""
+HINT_OFF_PX = 10.0
+"""Error of a hint."""
 CLOCK_S = 0.002
 """Largest error of a time stamp that rounding explains, s."""
 VERDICTS = ("right", "fewer frames", "vague", "refused", "sigma small", "wrong", "internal error")
@@ -62,19 +65,30 @@ class Outcome:
     """RMS error as a share of the true motion."""
 
 
-def run(kind: str, seed: int) -> Outcome:
-    """Draw a film, measure it, and judge the result."""
+def run(kind: str, seed: int, *, hinted: bool = False) -> Outcome:
+    """Draw a film, measure it, with a hint or without, and judge the result."""
     with tempfile.TemporaryDirectory() as folder:
         began = time.monotonic()
         film = draw(kind, seed, Path(folder))
-        return judged(film, time.monotonic() - began)
+        return judged(film, hint(film, seed) if hinted else Rig(), time.monotonic() - began)
 
 
-def judged(film: Drawn, draw_s: float = 0.0) -> Outcome:
+def hint(film: Drawn, seed: int) -> Rig:
+    """Return a true hint, at the mark or at the pivot by chance, that is off by `HINT_OFF_PX` in any direction."""
+    rng = np.random.default_rng([seed, 1])
+    direction = rng.uniform(0.0, 2.0 * np.pi)
+    off = HINT_OFF_PX * np.array([np.cos(direction), np.sin(direction)])
+    if rng.random() < 0.5:
+        return Rig.model_validate({"pivot": {"near": np.round(film.pivot_px + off, 1).tolist()}})
+    at = np.clip(film.grip_px + off, 0, np.array(film.size) - 1)
+    return Rig.model_validate({"mouth": {"at": np.round(at, 1).tolist(), "frame": 0}})
+
+
+def judged(film: Drawn, rig: Rig | None = None, draw_s: float = 0.0) -> Outcome:
     """Measure a film and judge the result."""
     began = time.monotonic()
     try:
-        measured = measure_source(open_source(film.path))
+        measured = measure_source(open_source(film.path, rig))
     except AnglecamError as problem:
         line = str(problem).replace(f"{film.path}: ", "")
         verdict = "internal error" if "internal error" in line else "refused"
