@@ -120,20 +120,13 @@ class Score:
             sums[k] = float(log_density(picture, mean, variance)[counts].sum(dtype=float))
         return sums
 
-    def _gained(self, other: Score, where: Flags) -> Floats:
-        """Return by how much (K,) this explanation predicts some pixels (K, h, w) better, nats."""
-        return np.asarray((self.density - other.density).sum(axis=(1, 2), where=where, dtype=float))
-
     def over(self, other: Score) -> Lead:
         """Return by how much this explanation predicts better than another one of the same frames.
 
         What the other one's body covers and this one's does not is left to the other one: a hand may be there as well.
-        So is what both cover, if that predicts better: the hand may be before the body.
         """
-        before, behind = (self.covered & where for where in (self.covers | ~other.covers, ~other.covers))
-        where, gained = max(
-            ((one, self._gained(other, one)) for one in (before, behind)), key=lambda one: float(one[1].sum())
-        )
+        where = self.covered & (self.covers | ~other.covers)
+        gained = (self.density - other.density).sum(axis=(1, 2), where=where, dtype=float)
         expected = np.maximum(self._of(self, where) - other._of(self, where), 0.0)
         share = float(gained.sum()) / max(float(expected.sum()), 1e-9)
         count = len(gained)
