@@ -29,7 +29,7 @@ from anglecam.engine.path import steadiest_path
 from anglecam.engine.refine import Fit, refine
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import NOTHING, carried_by, score
-from anglecam.engine.target import Picture
+from anglecam.engine.target import Picture, learn_target
 
 _STEP_PX = 2.0
 """Of the search for a turn."""
@@ -44,6 +44,8 @@ _APART_PX = 6.0
 """Least distance of poses that count as two."""
 _LIKE, _BESIDE_PX = 0.7, 25.0
 """Share of the better pose's gain from which on a pose so near to it may be a look-alike, as of a gear's next tooth."""
+_FEWEST_ALIKE = 4
+"""Poses that were found at the same turn from the right one, from which on that turn has odds of its own."""
 _FEWEST = 8
 """Frames of the sample from which a body is learnt again."""
 _JUMP = 20.0
@@ -80,7 +82,10 @@ class Search:
     turns: Floats
     """(m,) rad."""
     temper: float
-    """Independent pixels for which one counts: neighbours are off together."""
+    """Nats of gain for one of log odds between two poses: neighbouring pixels are off together."""
+    wrong: Floats
+    """(n, 2) of poses that were found beside the right ones: turn from the right one, rad, and by how much it gained
+    less, nats."""
 
 
 def search_for(sample: Sample, fit: Fit) -> Search:
@@ -91,27 +96,74 @@ def search_for(sample: Sample, fit: Fit) -> Search:
     arm = body.arm(centre)
     few = body.thinned(max(1, len(body.places) // _FEW_PIXELS))
     turns = turns_to_try(body, centre, sample.median.shape, fit.proposal.turn[fit.seen])
-    search = Search(sample, fit, body, few, centre, arm, turns, max(1.0, fit.ratio))
-    return replace(search, temper=max(search.temper, _temper(search)))
+    search = Search(sample, fit, body, few, centre, arm, turns, max(1.0, fit.ratio), np.empty((0, 2)))
+    wrong, right = _held_out_poses(search)
+    return replace(search, temper=max(search.temper, _nats_per_odds(right)), wrong=wrong)
 
 
-def _temper(search: Search) -> float:
-    """Return by what the gains of two poses are divided, so that their difference is their log odds.
+def _held_out_poses(search: Search) -> tuple[Floats, Floats]:
+    """Return what right and wrong poses gain in the frames of the sample, by the body as the other half shows it.
 
-    The difference between the right pose and the best of the wrong ones has a mean and a variance over the frames of
-    the sample. Of two normal distributions with these means of either sign, the log odds of a difference d are
-    2·mean·d/variance.
+    Returns
+    -------
+    wrong : ndarray
+        (n, 2) turn from the right pose, rad, and by how much it gained less, nats.
+    right : ndarray
+        (frames,) nats that the right pose gained.
     """
-    ahead = []
-    shifts = carried_by(search.fit.proposal.carriers(search.sample), search.centre)
-    for k in np.flatnonzero(search.fit.seen):
-        found = candidates(search, search.sample.pictures[k], shifts[k])
-        right = search.fit.proposal.turn[k]
-        wrong = [one.gain for one in found if abs(_wrapped(one.turn - right)) * search.arm > _APART_PX]
-        ahead.append(search.fit.gain[k] - max(wrong, default=0.0))
+    sample, proposal = search.sample, search.fit.proposal
+    shifts = carried_by(proposal.carriers(sample), search.centre)
+    count, poses = len(sample.pictures), proposal.poses(sample)
+    wrong, gained = list[tuple[float, float]](), list[float]()
+    for half in range(2):
+        target = learn_target(sample, poses, np.arange(half, count, 2))
+        body = body_of(target)
+        if body is None:
+            continue
+        few = body.thinned(max(1, len(body.places) // _FEW_PIXELS))
+        learnt = replace(search, fit=replace(search.fit, target=target), body=body, few=few)
+        for k in (k for k in range(1 - half, count, 2) if search.fit.seen[k]):
+            right = proposal.turn[k]
+            frame = frame_of(sample, target, sample.pictures[k])
+            gain = float(gains_about(frame, body, search.centre, np.array([right]), shifts[k]).sum())
+            found = [
+                (_wrapped(one.turn - right), one.gain) for one in candidates(learnt, sample.pictures[k], shifts[k])
+            ]
+            wrong += [(turn, gain - other) for turn, other in found if abs(turn) * search.arm > _APART_PX]
+            gained.append(gain)
+    return np.array(wrong).reshape(-1, 2), np.array(gained)
+
+
+def _nats_per_odds(ahead: Floats) -> float:
+    """Return by what the difference between the gains of two poses is divided to be their log odds.
+
+    The difference between the right pose and the other one has a mean and a variance over frames (n,). Of two normal
+    distributions with these means of either sign, the log odds of a difference d are 2·mean·d/variance.
+    """
+    if len(ahead) == 0:
+        return 1.0
     mean = float(np.median(ahead))
     variance = float(stats.median_abs_deviation(ahead, scale="normal")) ** 2
-    return variance / (2.0 * mean) if mean > 0.0 else variance
+    return variance / (2.0 * mean) if mean > 0.0 else np.inf
+
+
+def log_odds(search: Search, found: Sequence[Turn]) -> Floats:
+    """Return the log odds (m,) of the poses that were found in a frame, over that nothing is there.
+
+    How much a difference of gain says depends on the turn between two poses: of a gear's teeth none is the right one.
+    """
+    if not found:
+        return np.empty(0)
+    best = max(found, key=lambda one: one.gain)
+    near = _APART_PX / search.arm
+    odds = np.empty(len(found))
+    for i, one in enumerate(found):
+        alike = np.abs(np.angle(np.exp(1j * (search.wrong[:, 0] - one.turn + best.turn)))) < near
+        nats = search.temper
+        if alike.sum() >= _FEWEST_ALIKE:
+            nats = max(1.0, search.fit.ratio, _nats_per_odds(search.wrong[alike, 1]))
+        odds[i] = best.gain / search.temper - (best.gain - one.gain) / nats
+    return odds
 
 
 def candidates(search: Search, picture: Picture, shift: Floats = STANDS) -> list[Turn]:
@@ -177,7 +229,7 @@ def steadier(
     Search or None
         ``None`` where the motion is steady as it is, or no other one explains the sample.
     """
-    steadiest = _as_well(search, chosen(found, times, replace(search, temper=np.inf)).turn)
+    steadiest = _as_well(search, chosen(found, times, replace(search, temper=np.inf, wrong=np.empty((0, 2)))).turn)
     if steadiest is not None:
         return steadiest
     turn = _by_stretch(search, chosen(found, times, search).turn, times, pictures)
@@ -240,7 +292,7 @@ def chosen(found: Sequence[Sequence[Turn]], times: Floats, search: Search) -> Tr
     """Return the most probable way through the turns that were found in n frames."""
     path, margin = steadiest_path(
         [np.array([one.turn for one in of_frame]) for of_frame in found],
-        [np.array([one.gain for one in of_frame]) / search.temper for of_frame in found],
+        [log_odds(search, of_frame) for of_frame in found],
         times,
         1.0 / search.arm,
     )
