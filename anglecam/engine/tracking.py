@@ -97,24 +97,25 @@ def search_for(sample: Sample, fit: Fit) -> Search:
     few = body.thinned(max(1, len(body.places) // _FEW_PIXELS))
     turns = turns_to_try(body, centre, sample.median.shape, fit.proposal.turn[fit.seen])
     search = Search(sample, fit, body, few, centre, arm, turns, max(1.0, fit.ratio), np.empty((0, 2)))
-    wrong, right = _held_out_poses(search)
-    return replace(search, temper=max(search.temper, _nats_per_odds(right)), wrong=wrong)
+    wrong, right, nearest = _held_out_poses(search)
+    temper = min(_nats_per_odds(right), _nats_per_odds(nearest))
+    return replace(search, temper=max(search.temper, temper), wrong=wrong)
 
 
-def _held_out_poses(search: Search) -> tuple[Floats, Floats]:
+def _held_out_poses(search: Search) -> tuple[Floats, Floats, Floats]:
     """Return what right and wrong poses gain in the frames of the sample, by the body as the other half shows it.
 
     Returns
     -------
     wrong : ndarray
         (n, 2) turn from the right pose, rad, and by how much it gained less, nats.
-    right : ndarray
-        (frames,) nats that the right pose gained.
+    right, nearest : ndarray
+        (frames,) nats that the right pose gained, and by how much the best of the wrong ones gained less.
     """
     sample, proposal = search.sample, search.fit.proposal
     shifts = carried_by(proposal.carriers(sample), search.centre)
     count, poses = len(sample.pictures), proposal.poses(sample)
-    wrong, gained = list[tuple[float, float]](), list[float]()
+    wrong, gained, ahead = list[tuple[float, float]](), list[float](), list[float]()
     for half in range(2):
         target = learn_target(sample, poses, np.arange(half, count, 2))
         body = body_of(target)
@@ -129,9 +130,11 @@ def _held_out_poses(search: Search) -> tuple[Floats, Floats]:
             found = [
                 (_wrapped(one.turn - right), one.gain) for one in candidates(learnt, sample.pictures[k], shifts[k])
             ]
-            wrong += [(turn, gain - other) for turn, other in found if abs(turn) * search.arm > _APART_PX]
+            others = [(turn, gain - other) for turn, other in found if abs(turn) * search.arm > _APART_PX]
+            wrong += others
             gained.append(gain)
-    return np.array(wrong).reshape(-1, 2), np.array(gained)
+            ahead.append(min((less for _, less in others), default=gain))
+    return np.array(wrong).reshape(-1, 2), np.array(gained), np.array(ahead)
 
 
 def _nats_per_odds(ahead: Floats) -> float:
