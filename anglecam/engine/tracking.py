@@ -46,6 +46,8 @@ _LIKE, _BESIDE_PX = 0.7, 25.0
 """Share of the better pose's gain from which on a pose so near to it may be a look-alike, as of a gear's next tooth."""
 _FEWEST_ALIKE = 4
 """Poses that were found at the same turn from the right one, from which on that turn has odds of its own."""
+_LEAST_SPREAD = 0.01
+"""Standard deviation of such a share: few frames may agree by chance."""
 _FEWEST = 8
 """Frames of the sample from which a body is learnt again."""
 _JUMP = 20.0
@@ -82,10 +84,10 @@ class Search:
     turns: Floats
     """(m,) rad."""
     temper: float
-    """Nats of gain for one of log odds between two poses: neighbouring pixels are off together."""
+    """Independent pixels for which one counts: neighbours are off together."""
     wrong: Floats
-    """(n, 2) of poses that were found beside the right ones: turn from the right one, rad, and by how much it gained
-    less, nats."""
+    """(n, 2) of poses that were found beside the right ones: turn from the right one, rad, and by which share of its
+    gain it gained less."""
 
 
 def search_for(sample: Sample, fit: Fit) -> Search:
@@ -97,25 +99,21 @@ def search_for(sample: Sample, fit: Fit) -> Search:
     few = body.thinned(max(1, len(body.places) // _FEW_PIXELS))
     turns = turns_to_try(body, centre, sample.median.shape, fit.proposal.turn[fit.seen])
     search = Search(sample, fit, body, few, centre, arm, turns, max(1.0, fit.ratio), np.empty((0, 2)))
-    wrong, right, nearest = _held_out_poses(search)
-    temper = min(_nats_per_odds(right), _nats_per_odds(nearest))
-    return replace(search, temper=max(search.temper, temper), wrong=wrong)
+    return replace(search, wrong=_wrong_poses(search))
 
 
-def _held_out_poses(search: Search) -> tuple[Floats, Floats, Floats]:
-    """Return what right and wrong poses gain in the frames of the sample, by the body as the other half shows it.
+def _wrong_poses(search: Search) -> Floats:
+    """Return the other poses that are found in the frames of the sample, by the body as the other half shows it.
 
     Returns
     -------
-    wrong : ndarray
-        (n, 2) turn from the right pose, rad, and by how much it gained less, nats.
-    right, nearest : ndarray
-        (frames,) nats that the right pose gained, and by how much the best of the wrong ones gained less.
+    ndarray
+        (n, 2) turn from the right pose, rad, and by which share of its gain they gained less.
     """
     sample, proposal = search.sample, search.fit.proposal
     shifts = carried_by(proposal.carriers(sample), search.centre)
     count, poses = len(sample.pictures), proposal.poses(sample)
-    wrong, gained, ahead = list[tuple[float, float]](), list[float](), list[float]()
+    wrong = list[tuple[float, float]]()
     for half in range(2):
         target = learn_target(sample, poses, np.arange(half, count, 2))
         body = body_of(target)
@@ -124,36 +122,22 @@ def _held_out_poses(search: Search) -> tuple[Floats, Floats, Floats]:
         few = body.thinned(max(1, len(body.places) // _FEW_PIXELS))
         learnt = replace(search, fit=replace(search.fit, target=target), body=body, few=few)
         for k in (k for k in range(1 - half, count, 2) if search.fit.seen[k]):
-            right = proposal.turn[k]
-            frame = frame_of(sample, target, sample.pictures[k])
+            right, picture = proposal.turn[k], sample.pictures[k]
+            frame = frame_of(sample, target, picture)
             gain = float(gains_about(frame, body, search.centre, np.array([right]), shifts[k]).sum())
-            found = [
-                (_wrapped(one.turn - right), one.gain) for one in candidates(learnt, sample.pictures[k], shifts[k])
-            ]
-            others = [(turn, gain - other) for turn, other in found if abs(turn) * search.arm > _APART_PX]
-            wrong += others
-            gained.append(gain)
-            ahead.append(min((less for _, less in others), default=gain))
-    return np.array(wrong).reshape(-1, 2), np.array(gained), np.array(ahead)
-
-
-def _nats_per_odds(ahead: Floats) -> float:
-    """Return by what the difference between the gains of two poses is divided to be their log odds.
-
-    The difference between the right pose and the other one has a mean and a variance over frames (n,). Of two normal
-    distributions with these means of either sign, the log odds of a difference d are 2·mean·d/variance.
-    """
-    if len(ahead) == 0:
-        return 1.0
-    mean = float(np.median(ahead))
-    variance = float(stats.median_abs_deviation(ahead, scale="normal")) ** 2
-    return variance / (2.0 * mean) if mean > 0.0 else np.inf
+            found = [(_wrapped(one.turn - right), one.gain) for one in candidates(learnt, picture, shifts[k])]
+            if gain > 0.0:
+                wrong += [(turn, 1.0 - less / gain) for turn, less in found if abs(turn) * search.arm > _APART_PX]
+    return np.array(wrong).reshape(-1, 2)
 
 
 def log_odds(search: Search, found: Sequence[Turn]) -> Floats:
     """Return the log odds (m,) of the poses that were found in a frame, over that nothing is there.
 
-    How much a difference of gain says depends on the turn between two poses: of a gear's teeth none is the right one.
+    How much it says that a pose gains less than the best one depends on the turn between the two: of a gear's teeth
+    none is the right one. The share by which it gains less has a mean and a variance over frames. Of two normal
+    distributions with these means of either sign, the log odds of a share s are 2·mean·s/variance; they are no more
+    than those of the pixels.
     """
     if not found:
         return np.empty(0)
@@ -161,11 +145,13 @@ def log_odds(search: Search, found: Sequence[Turn]) -> Floats:
     near = _APART_PX / search.arm
     odds = np.empty(len(found))
     for i, one in enumerate(found):
+        less = (best.gain - one.gain) / search.temper
         alike = np.abs(np.angle(np.exp(1j * (search.wrong[:, 0] - one.turn + best.turn)))) < near
-        nats = search.temper
         if alike.sum() >= _FEWEST_ALIKE:
-            nats = max(1.0, search.fit.ratio, _nats_per_odds(search.wrong[alike, 1]))
-        odds[i] = best.gain / search.temper - (best.gain - one.gain) / nats
+            shares = search.wrong[alike, 1]
+            spread = max(_LEAST_SPREAD, float(stats.median_abs_deviation(shares, scale="normal")))
+            less = min(less, 2.0 * max(0.0, float(np.median(shares))) * (1.0 - one.gain / best.gain) / spread**2)
+        odds[i] = best.gain / search.temper - less
     return odds
 
 
