@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,24 +61,44 @@ def looks(stills: Stills, hints: Hints = NO_HINTS) -> Iterator[Learnt]:
     Learnt
         Of each look; none where nothing moves.
     """
-    for sample in sample_stills(stills):
+    samples = sample_stills(stills)
+    for n, sample in enumerate(samples):
         with one_opencv_thread(), threadpool_limits(1, "blas"):  # matrices this small take longer with more
-            learnt = _explained(sample, stills, hints)
+            learnt = _explained(sample, samples[n + 1 :], stills, hints)
         yield learnt
 
 
-def _explained(sample: Sample, stills: Stills, hints: Hints) -> Learnt:
-    proposals = [one for find in FINDERS for one in find(sample)]
-    fits = compete(sample, proposals, declared.proposals(sample, hints))
-    found = sorted(fits, key=lambda one: rank(Learnt(sample, (one,)), hints))
+def _explained(sample: Sample, parts: Sequence[Sample], stills: Stills, hints: Hints) -> Learnt:
+    found = _competing(sample, hints)
     if not found:
         return Learnt(sample, ())
+    proposal = found[0].fit.proposal
     closer = sample_part(stills, swept(sample, found[0].fit))
     if closer is not None and closer.scale > CLOSER * sample.scale:
-        again = compete(closer, [found[0].fit.proposal.in_frames(sample.frames, closer.frames)])
+        again = compete(closer, [proposal.in_frames(sample.frames, closer.frames)])
         if again and (again[0].turns or not found[0].turns):
             return Learnt(closer, (again[0], *found[1:]), sample)
+    elif found[0].turns:
+        # scenery that seems to turn along keeps the body's surroundings wide; a part of the picture may show it better
+        for part in parts:
+            if part.scale > CLOSER * sample.scale and _shows(part, proposal.centre_px):
+                again = _competing(part, hints)
+                if again and again[0].turns and again[0].lead > found[0].lead:
+                    return Learnt(part, (again[0], *found[1:]), sample)
     return Learnt(sample, tuple(found))
+
+
+def _competing(sample: Sample, hints: Hints) -> list[Explanation]:
+    """Return the explanations of a sample, those that obey the hints first."""
+    proposals = [one for find in FINDERS for one in find(sample)]
+    fits = compete(sample, proposals, declared.proposals(sample, hints))
+    return sorted(fits, key=lambda one: rank(Learnt(sample, (one,)), hints))
+
+
+def _shows(sample: Sample, point_px: Floats) -> bool:
+    """Return whether a point (2,) of the film, px, lies in a sample."""
+    place = sample.place(point_px)
+    return bool((place >= 0.0).all() and (place < sample.median.shape[::-1]).all())
 
 
 def rank(one: Learnt, hints: Hints) -> int:
