@@ -134,8 +134,8 @@ def _wrong_poses(search: Search) -> Floats:
 def log_odds(search: Search, found: Sequence[Turn]) -> Floats:
     """Return the log odds (m,) of the poses that were found in a frame, over that nothing is there.
 
-    How much it says that a pose gains less than the best one depends on the turn between the two: of a gear's teeth
-    none is the right one. The share by which it gains less has a mean and a variance over frames. Of two normal
+    How much it says that a pose gains less than the best one depends on the turn between the two: a gear looks the
+    same a tooth further. The share by which it gains less has a mean and a variance over frames. Of two normal
     distributions with these means of either sign, the log odds of a share s are 2·mean·s/variance; they are no more
     than those of the pixels.
     """
