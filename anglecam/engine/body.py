@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
 from anglecam.engine.likelihood import pose_gains
-from anglecam.engine.sample import Sample
 from anglecam.engine.target import Picture, Target, rotations
 
 _MOST_PIXELS = 1500
@@ -51,9 +50,8 @@ class Frame:
     """By how much the variance of a pixel is larger in it than usual, grey levels²."""
 
 
-def frame_of(sample: Sample, target: Target, picture: Picture) -> Frame:
-    """Return a picture as a body is sought in it."""
-    excess = sample.excess(picture)
+def frame_of(target: Target, picture: Picture, excess: float) -> Frame:
+    """Return a picture, whose pixels have so much more variance than usual, as a body is sought in it."""
     precision = np.float32(1.0) / (target.background_variance + np.float32(excess))
     return Frame(picture, target.background, precision, excess)
 
@@ -182,9 +180,11 @@ class Turn:
 NOT_SEEN = Turn(float("nan"), float("nan"), float("nan"), 0.0)
 
 
-def turn_near(frame: Frame, body: Body, centre: Floats, guess: float, shift: Floats = STANDS) -> Turn:
-    """Return the turn of most likelihood within some pixels of a guess, about a centre that is shifted."""
-    arm = body.arm(centre)
+def turn_near(frame: Frame, body: Body, centre: Floats, arm: float, guess: float, shift: Floats = STANDS) -> Turn:
+    """Return the turn of most likelihood within some pixels of a guess, about a centre that is shifted.
+
+    ``arm`` is that of the body (`Body.arm`), px.
+    """
     step = _FINE_PX / arm
     tried: Floats = guess + step * np.arange(-6.0, 7.0)
     of_parts = gains_about(frame, body, centre, tried, shift)

@@ -8,17 +8,47 @@ nothing for either.
 
 from __future__ import annotations
 
-from math import exp, log, pi, sqrt
+from math import log, pi, sqrt
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 _OUTLIERS = 0.02
 """Share of pixels that may have any of 256 grey levels: an occluder, a glint."""
+_SCALE = (1.0 - _OUTLIERS) / sqrt(2.0 * pi)
+"""Of the normal part of the density."""
+_FLOOR = np.float32(_OUTLIERS / 256.0 / _SCALE)
+_UNKNOWN = np.float32(1.0 / 256.0 / _SCALE)
+_HALF = np.float32(-0.5)
+_SMALLEST = np.float32(-25.0)
+"""Exponents below it are that; the floor is 10⁷ times larger."""
+_TOGETHER = 64
+"""Ratios of densities, each between 10⁻⁴ and 10⁴, whose product a double holds: one logarithm serves them all."""
+_MATHS = {"nsz", "arcp", "contract", "afn", "reassoc"}  # all but that no value is NaN
 
 
-@njit("float32[:, ::1](float32[:, ::1], float32[:, ::1], float32[:, ::1])", cache=True, nogil=True)
-def log_density(picture, mean, variance):  # type: ignore[no-untyped-def]
+@njit(inline="always")
+def _exp(z):  # type: ignore[no-untyped-def]
+    """Return e to a power that is not positive: (e^(z/64))^64, within 10⁻⁵ of it, by many pixels at once."""
+    x = max(z, _SMALLEST) * np.float32(1.0 / 64.0)
+    e = np.float32(1.0 / 24.0) + x * (np.float32(1.0 / 120.0) + x * np.float32(1.0 / 720.0))
+    e = np.float32(1.0) + x * (np.float32(1.0) + x * (np.float32(0.5) + x * (np.float32(1.0 / 6.0) + x * e)))
+    e = e * e
+    e = e * e
+    e = e * e
+    e = e * e
+    e = e * e
+    return e * e
+
+
+@njit(inline="always")
+def _density(off, precision):  # type: ignore[no-untyped-def]
+    """Return the density at a distance from the mean, over `_SCALE`."""
+    return sqrt(precision) * _exp(_HALF * off * off * precision) + _FLOOR
+
+
+def log_density(picture: NDArray[np.float32], mean: NDArray[np.float32], variance: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the log density of each pixel: normal, and a share that may have any of 256 grey levels.
 
     Parameters
@@ -26,56 +56,55 @@ def log_density(picture, mean, variance):  # type: ignore[no-untyped-def]
     picture, mean, variance : ndarray
         (h, w) float32; grey levels, and grey levels².
     """
+    density = _densities(picture, mean, variance)
+    return np.log(density, out=density)
+
+
+@njit("float32[:, ::1](float32[:, ::1], float32[:, ::1], float32[:, ::1])", cache=True, nogil=True, error_model="numpy")
+def _densities(picture, mean, variance):  # type: ignore[no-untyped-def]
     result = np.empty_like(picture)
-    floor, unknown = np.float32(_OUTLIERS / 256.0), np.float32(log(1.0 / 256.0))
-    scale, half = np.float32((1.0 - _OUTLIERS) / sqrt(2.0 * pi)), np.float32(-0.5)
+    scale = np.float32(_SCALE)
     for i in range(picture.shape[0]):
         for j in range(picture.shape[1]):
-            off, spread = picture[i, j] - mean[i, j], variance[i, j]
-            if not (off * off >= 0.0 and spread > 0.0):
-                result[i, j] = unknown
-                continue
-            result[i, j] = log(scale / sqrt(spread) * exp(half * off * off / spread) + floor)
+            off = picture[i, j] - mean[i, j]
+            density = _density(off, np.float32(1.0) / variance[i, j])
+            known = off * off >= 0.0 and variance[i, j] > 0.0
+            result[i, j] = scale * (density if known else _UNKNOWN)
     return result
 
 
 @njit(
-    "void(float32[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float32, float32[:, ::1], "
+    "void(float64[:, ::1], float32[:, ::1], float32[:, ::1], float32[:, ::1], float32, float32[:, ::1], "
     "float32[:, ::1])",
     cache=True,
     nogil=True,
-    fastmath={"nsz", "arcp", "contract", "afn", "reassoc"},  # all but that no value is NaN
+    fastmath=_MATHS,
     error_model="numpy",
 )
-def add_gain(gain, picture, body, body_variance, excess, background, background_variance):  # type: ignore[no-untyped-def]
-    """Add to ``gain`` (h, w) the log density of each pixel of a body over that of the background.
+def multiply_odds(odds, picture, body, body_variance, excess, background, background_variance):  # type: ignore[no-untyped-def]
+    """Multiply ``odds`` (h, w) with the density of each pixel of a body over that of the background.
 
     Parameters
     ----------
-    gain, picture, body, body_variance : ndarray
-        (h, w) float32; grey levels, and grey levels². Where the picture is NaN nothing is added. Where a mean is, any
+    odds : ndarray
+        (h, w) float64, the product over some pictures, `_TOGETHER` at most.
+    picture, body, body_variance : ndarray
+        (h, w) float32; grey levels, and grey levels². Where the picture is NaN nothing changes. Where a mean is, any
         grey level is as probable.
     excess : float
         By how much the variance of a pixel is larger in this picture than usual, grey levels².
     background, background_variance : ndarray
         (h, w) float32, the same of the background.
     """
-    scale = (1.0 - _OUTLIERS) / sqrt(2.0 * pi)
-    floor, unknown, half = np.float32(_OUTLIERS / 256.0 / scale), np.float32(1.0 / 256.0 / scale), np.float32(-0.5)
-    for i in range(gain.shape[0]):
-        for j in range(gain.shape[1]):
+    for i in range(odds.shape[0]):
+        for j in range(odds.shape[1]):
             seen = picture[i, j]
-            if not seen * seen >= 0.0:
-                continue
             off, off_behind = seen - body[i, j], seen - background[i, j]
-            as_body, as_background = unknown, unknown
-            if off * off >= 0.0:
-                sharp = np.float32(1.0) / (body_variance[i, j] + excess)
-                as_body = sqrt(sharp) * exp(half * off * off * sharp) + floor
-            if off_behind * off_behind >= 0.0:
-                sharp = np.float32(1.0) / (background_variance[i, j] + excess)
-                as_background = sqrt(sharp) * exp(half * off_behind * off_behind * sharp) + floor
-            gain[i, j] += log(as_body / as_background)
+            as_body = _density(off, np.float32(1.0) / (body_variance[i, j] + excess))
+            as_background = _density(off_behind, np.float32(1.0) / (background_variance[i, j] + excess))
+            as_body = as_body if off * off >= 0.0 else _UNKNOWN
+            as_background = as_background if off_behind * off_behind >= 0.0 else _UNKNOWN
+            odds[i, j] *= as_body / as_background if seen * seen >= 0.0 else np.float32(1.0)
 
 
 @njit(inline="always")
@@ -93,7 +122,7 @@ def _between(picture, x, y):  # type: ignore[no-untyped-def]
     "int64[::1], int64, float64[:, :, ::1])",
     cache=True,
     nogil=True,
-    fastmath={"nsz", "arcp", "contract", "afn", "reassoc"},  # all but that no value is NaN
+    fastmath=_MATHS,
     error_model="numpy",
 )
 def pose_gains(picture, background, precision, excess, places, body, part, parts, poses):  # type: ignore[no-untyped-def]
@@ -128,28 +157,34 @@ def pose_gains(picture, background, precision, excess, places, body, part, parts
         (m, parts) nats.
     """
     height, width = picture.shape
-    gains = np.zeros((len(poses), parts))
-    floor = np.float32(_OUTLIERS / 256.0 * sqrt(2.0 * pi) / (1.0 - _OUTLIERS))
-    half = np.float32(-0.5)
+    gains, product = np.zeros((len(poses), parts)), np.ones(parts)
     n = len(places)
-    sharp = np.empty(n, np.float32)
-    for i in range(n):
-        sharp[i] = np.float32(1.0) / (body[i, 1] + excess)
+    sharp = np.float32(1.0) / (body[:, 1] + excess)
+    off, off_behind, precise, behind = np.empty((4, n), np.float32)
+    of_part = np.empty(n, np.int64)
     for m in range(len(poses)):
         a, b, c = np.float32(poses[m, 0, 0]), np.float32(poses[m, 0, 1]), np.float32(poses[m, 0, 2])
         d, e, f = np.float32(poses[m, 1, 0]), np.float32(poses[m, 1, 1]), np.float32(poses[m, 1, 2])
+        shown = 0
         for i in range(n):
             x = a * places[i, 0] + b * places[i, 1] + c
             y = d * places[i, 0] + e * places[i, 1] + f
             if x < 0.0 or y < 0.0 or x >= width - 1 or y >= height - 1:
                 continue
             seen = _between(picture, x, y)
-            off = seen - body[i, 0]
-            if not off * off >= 0.0:
+            off[shown] = seen - body[i, 0]
+            if not off[shown] * off[shown] >= 0.0:
                 continue
-            off_behind = seen - _between(background, x, y)
-            behind = precision[int(y + np.float32(0.5)), int(x + np.float32(0.5))]
-            as_body = sqrt(sharp[i]) * exp(half * off * off * sharp[i]) + floor
-            as_background = sqrt(behind) * exp(half * off_behind * off_behind * behind) + floor
-            gains[m, part[i]] += log(as_body / as_background)
+            off_behind[shown] = seen - _between(background, x, y)
+            precise[shown], of_part[shown] = sharp[i], part[i]
+            behind[shown] = precision[int(y + np.float32(0.5)), int(x + np.float32(0.5))]
+            shown += 1
+        for i in range(shown):
+            off[i] = _density(off[i], precise[i]) / _density(off_behind[i], behind[i])
+        for first in range(0, shown, _TOGETHER):
+            for i in range(first, min(first + _TOGETHER, shown)):
+                product[of_part[i]] *= off[i]
+            for k in range(parts):
+                gains[m, k] += log(product[k])
+                product[k] = 1.0
     return gains

@@ -71,6 +71,15 @@ def steadiest_path(
     return path, margin
 
 
+def most_from_motion(resolution: float) -> float:
+    """Return how many nats the motion can say for one turn in a frame and against another one, at most.
+
+    A turn has a part in three changes of the speed and in two steps.
+    """
+    longest = float(np.log1p((np.pi / resolution) ** 2))
+    return 3.0 * longest + 2.0 * (longest + 0.5 * (np.pi / _FAST) ** 2)
+
+
 def _hidden(turn: Floats, gain: Floats, time: Floats, scales: tuple[float, float], resolution: float) -> Flags:
     """Return (n,) frames in which the body is more probably hidden than where the way leads.
 

@@ -85,7 +85,10 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
         body = body_of(target)
         if body is None:
             return fit
-        frames = [frame_of(sample, target, picture) for picture in sample.pictures]
+        frames = [
+            frame_of(target, picture, float(excess))
+            for picture, excess in zip(sample.pictures, sample.excesses, strict=True)
+        ]
         centre, carriers = sample.place(proposal.centre_px), proposal.carriers(sample)
         shifts = carried_by(carriers, centre)
         turn = _searched(frames, body, centre, proposal.turn, shifts)
@@ -167,8 +170,9 @@ def _searched(frames: list[Frame], body: Body, centre: Floats, turn: Floats, shi
 
 def _about(frames: list[Frame], body: Body, centre: Floats, turn: Floats, shifts: Floats) -> list[Turn]:
     """Return the turns about a centre near first guesses; not seen where the body gains nothing."""
+    arm = body.arm(centre)
     found = [
-        turn_near(frames[k], body, centre, guess, shifts[k]) if np.isfinite(guess) else NOT_SEEN
+        turn_near(frames[k], body, centre, arm, guess, shifts[k]) if np.isfinite(guess) else NOT_SEEN
         for k, guess in enumerate(turn)
     ]
     return [one if one.gain > _ODDS else NOT_SEEN for one in found]

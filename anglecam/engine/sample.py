@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import cv2
 import numpy as np
@@ -220,8 +220,7 @@ def in_light(picture: NDArray[np.float32], median: NDArray[np.float32]) -> NDArr
         weight = np.maximum(0.0, 1.0 - (off / (_TUKEY * scale)) ** 2) ** 2
         weighted = terms.T * weight
         factor = np.linalg.solve(weighted @ terms + prior, weighted @ ratio)
-    y, x = np.indices((height, width)).reshape(2, -1)
-    light = np.exp(_quadratic(x / width, y / height) @ factor).reshape(height, width)
+    light = np.exp(_quadratic_of(height, width) @ factor).reshape(height, width)
     steady = picture / light
     # white is at least as bright as it shows, and black at least as dark
     steady = np.where(picture >= _BRIGHT, np.maximum(steady, median), steady)
@@ -233,6 +232,13 @@ def _quadratic(x: Floats, y: Floats) -> Floats:
     """Return (n, 6) functions of places, in widths and heights of the picture."""
     x, y = x - 0.5, y - 0.5
     return np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y])
+
+
+@lru_cache(maxsize=4)
+def _quadratic_of(height: int, width: int) -> Floats:
+    """Return the functions of all pixels of a picture, row by row."""
+    y, x = np.indices((height, width)).reshape(2, -1)
+    return _quadratic(x / width, y / height)
 
 
 def noise_of(pictures: NDArray[np.float32]) -> float:

@@ -64,7 +64,8 @@ def _most_likely(sample: Sample, mean: Floats, axis: Floats, along: Floats) -> F
     for k in np.flatnonzero(np.isfinite(along)):
         tried = along[k] + _TRIED_PX
         poses = np.stack([turned(np.zeros(2), 0.0, mean + one * axis) for one in tried])
-        gains = body.gains(frame_of(sample, target, sample.pictures[k]), poses).sum(axis=1)
+        frame = frame_of(target, sample.pictures[k], float(sample.excesses[k]))
+        gains = body.gains(frame, poses).sum(axis=1)
         at = int(np.clip(np.argmax(gains), 1, len(tried) - 2))
         bend = float(gains[at - 1] + gains[at + 1] - 2.0 * gains[at])
         aside = 0.5 * float(gains[at - 1] - gains[at + 1]) / bend if bend < 0.0 else 0.0

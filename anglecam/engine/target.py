@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
-from anglecam.engine.likelihood import add_gain
+from anglecam.engine.likelihood import multiply_odds
 from anglecam.engine.sample import Sample
 
 Picture = NDArray[np.float32]
@@ -130,13 +130,13 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
     excess = sample.excesses[use]
     for _ in range(_ROUNDS):
         behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
-        gain = np.zeros_like(part)
+        odds = np.ones(part.shape)
         for frame, j, m in zip(held, known, maps, strict=True):
             # interpolation averages the noise of a frame, so that both are compared with the interpolated one
             here, spread = (cv2.warpAffine(one, m, size, flags=back) for one in (background, behind))
-            add_gain(gain, frame, appearance, variance, excess[j], here, spread)
+            multiply_odds(odds, frame, appearance, variance, excess[j], here, spread)
         # a pixel of the body has two parameters, mean and variance (Schwarz, Annals of Statistics 6, 1978)
-        seen = np.isfinite(appearance) & (cv2.GaussianBlur(gain, (0, 0), 1.0) > np.log(len(known)))
+        seen = np.isfinite(appearance) & (cv2.GaussianBlur(np.log(odds).astype(np.float32), (0, 0), 1.0) > np.log(len(known)))
         visibility = seen.astype(np.float32)
         cover = np.zeros(used.shape, np.float32)
         for j, m in zip(known, maps, strict=True):

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
 
 from anglecam.data.typing import Flags, Floats, Image
 from anglecam.engine.body import (
@@ -25,7 +24,7 @@ from anglecam.engine.body import (
     turns_to_try,
     with_ratio,
 )
-from anglecam.engine.path import steadiest_path
+from anglecam.engine.path import most_from_motion, steadiest_path
 from anglecam.engine.refine import Fit, refine
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import NOTHING, carried_by, score
@@ -46,6 +45,8 @@ _LIKE, _BESIDE_PX = 0.7, 25.0
 """Share of the better pose's gain from which on a pose so near to it may be a look-alike, as of a gear's next tooth."""
 _FEWEST_ALIKE = 4
 """Poses that were found at the same turn from the right one, from which on that turn has odds of its own."""
+_MAD = 1.4826
+"""Standard deviation of normal values over the median of their magnitudes."""
 _LEAST_SPREAD = 0.01
 """Standard deviation of such a share: few frames may agree by chance."""
 _FEWEST = 8
@@ -123,36 +124,41 @@ def _wrong_poses(search: Search) -> Floats:
         learnt = replace(search, fit=replace(search.fit, target=target), body=body, few=few)
         for k in (k for k in range(1 - half, count, 2) if search.fit.seen[k]):
             right, picture = proposal.turn[k], sample.pictures[k]
-            frame = frame_of(sample, target, picture)
+            frame = frame_of(target, picture, float(sample.excesses[k]))
             gain = float(gains_about(frame, body, search.centre, np.array([right]), shifts[k]).sum())
-            found = [(_wrapped(one.turn - right), one.gain) for one in candidates(learnt, picture, shifts[k])]
+            found = [(float(_wrapped(one.turn - right)), one.gain) for one in candidates(learnt, picture, shifts[k])]
             if gain > 0.0:
                 wrong += [(turn, 1.0 - less / gain) for turn, less in found if abs(turn) * search.arm > _APART_PX]
     return np.array(wrong).reshape(-1, 2)
 
 
-def log_odds(search: Search, found: Sequence[Turn]) -> Floats:
+def log_odds(search: Search, turn: Floats, gain: Floats) -> Floats:
     """Return the log odds (m,) of the poses that were found in a frame, over that nothing is there.
 
     How much it says that a pose gains less than the best one depends on the turn between the two: a gear looks the
     same a tooth further. The share by which it gains less has a mean and a variance over frames. Of two normal
     distributions with these means of either sign, the log odds of a share s are 2·mean·s/variance; they are no more
     than those of the pixels.
+
+    Parameters
+    ----------
+    search : Search
+        For the body.
+    turn, gain : ndarray
+        (m,) rad and nats.
     """
-    if not found:
-        return np.empty(0)
-    best = max(found, key=lambda one: one.gain)
-    near = _APART_PX / search.arm
-    odds = np.empty(len(found))
-    for i, one in enumerate(found):
-        less = (best.gain - one.gain) / search.temper
-        alike = np.abs(np.angle(np.exp(1j * (search.wrong[:, 0] - one.turn + best.turn)))) < near
-        if alike.sum() >= _FEWEST_ALIKE:
-            shares = search.wrong[alike, 1]
-            spread = max(_LEAST_SPREAD, float(stats.median_abs_deviation(shares, scale="normal")))
-            less = min(less, 2.0 * max(0.0, float(np.median(shares))) * (1.0 - one.gain / best.gain) / spread**2)
-        odds[i] = best.gain / search.temper - less
-    return odds
+    odds = gain / search.temper
+    if len(odds) < 2:
+        return np.asarray(odds)
+    best, near = int(gain.argmax()), _APART_PX / search.arm
+    away = np.abs(_wrapped(search.wrong[:, 0] - (turn - turn[best])[:, None])) < near
+    for i in np.flatnonzero(away.sum(axis=1) >= _FEWEST_ALIKE):
+        shares = search.wrong[away[i], 1]
+        usual = float(np.median(shares))
+        spread = max(_LEAST_SPREAD, _MAD * float(np.median(np.abs(shares - usual))))
+        learnt = 2.0 * max(0.0, usual) * (1.0 - gain[i] / gain[best]) / spread**2
+        odds[i] = max(odds[i], odds[best] - learnt)
+    return np.asarray(odds)
 
 
 def candidates(search: Search, picture: Picture, shift: Floats = STANDS) -> list[Turn]:
@@ -160,22 +166,20 @@ def candidates(search: Search, picture: Picture, shift: Floats = STANDS) -> list
 
     The body's centre is shifted by (2,) px of the sample where another body carries it.
     """
-    frame = frame_of(search.sample, search.fit.target, picture)
+    frame = frame_of(search.fit.target, picture, search.sample.excess(picture))
     gains = gains_about(frame, search.few, search.centre, search.turns, shift).sum(axis=1)
-    peaks: list[float] = []
-    for at in np.argsort(-gains):
-        turn = float(search.turns[at])
-        if all(abs(_wrapped(turn - peak)) * search.arm > _APART_PX for peak in peaks):
-            peaks.append(turn)
-        if len(peaks) == _PEAKS:
-            break
-    around = np.array(peaks)[:, None] + np.array([-1.0, 0.0, 1.0]) * 0.5 * _STEP_PX / search.arm
+    around = _peaks(search, gains)[:, None] + np.array([-1.0, 0.0, 1.0]) * 0.5 * _STEP_PX / search.arm
     whole = gains_about(frame, search.body, search.centre, around.ravel(), shift).sum(axis=1).reshape(-1, 3)
-    best = float(whole.max())
+    most = whole.max(axis=1)
+    best = float(most.max())
     floor = max(_HOPELESS * best, float(np.log(len(search.turns))) * search.fit.ratio)
-    order = [k for k in np.argsort(-whole.max(axis=1)) if whole[k].max() > floor][:_CANDIDATES]
-    near = [float(around[k, int(np.argmax(whole[k]))]) for k in order]
-    found = [turn_near(frame, search.body, search.centre, turn, shift) for turn in near]
+    order = np.argsort(-most)
+    order = order[most[order] > floor][:_CANDIDATES]
+    near = around[order, whole[order].argmax(axis=1)]
+    found = [
+        turn_near(frame, search.body, search.centre, search.arm, turn, shift)
+        for turn in near[_may_be(search, near, most[order])]
+    ]
     apart: list[Turn] = []
     for one in sorted((one for one in found if np.isfinite(one.turn)), key=lambda one: -one.gain):
         if all(_another(search, one, other) for other in apart):
@@ -183,14 +187,32 @@ def candidates(search: Search, picture: Picture, shift: Floats = STANDS) -> list
     return apart
 
 
+def _peaks(search: Search, gains: Floats) -> Floats:
+    """Return the turns of most gain that are apart from each other."""
+    left, peaks = gains.copy(), list[float]()
+    while len(peaks) < _PEAKS and np.isfinite(left).any():
+        peaks.append(float(search.turns[int(left.argmax())]))
+        left[np.abs(_wrapped(search.turns - peaks[-1])) * search.arm <= _APART_PX] = -np.inf
+    return np.array(peaks)
+
+
+def _may_be(search: Search, turn: Floats, gain: Floats) -> Flags:
+    """Return which of some turns (m,) can be right, the likeliest first: for the others no motion can say enough.
+
+    Their gains are off by some share before they are refined.
+    """
+    odds = log_odds(search, turn, gain)
+    return (gain > _LIKE * gain[:1]) | (odds > odds[:1] - most_from_motion(1.0 / search.arm))
+
+
 def _another(search: Search, one: Turn, better: Turn) -> bool:
     """Return whether a pose is another one than a better one: not a lower peak beside it."""
-    away = abs(_wrapped(one.turn - better.turn)) * search.arm
+    away = abs(float(_wrapped(one.turn - better.turn))) * search.arm
     return away > (_APART_PX if one.gain > _LIKE * better.gain else _BESIDE_PX)
 
 
-def _wrapped(turn: float) -> float:
-    return float((turn + np.pi) % (2.0 * np.pi) - np.pi)
+def _wrapped(turn: Floats | float) -> Floats:
+    return np.asarray((turn + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def steadier(
@@ -281,7 +303,10 @@ def chosen(found: Sequence[Sequence[Turn]], times: Floats, search: Search) -> Tr
     """Return the most probable way through the turns that were found in n frames."""
     path, margin = steadiest_path(
         [np.array([one.turn for one in of_frame]) for of_frame in found],
-        [log_odds(search, of_frame) for of_frame in found],
+        [
+            log_odds(search, np.array([one.turn for one in of_frame]), np.array([one.gain for one in of_frame]))
+            for of_frame in found
+        ],
         times,
         1.0 / search.arm,
     )

@@ -7,15 +7,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from anglecam.engine.body import Turn
 from anglecam.engine.tracking import log_odds
 
 
 def _odds(shares: list[float], gains: tuple[float, float], away: float = np.pi, temper: float = 10.0) -> np.ndarray:
     """Return the log odds of two poses that are half a turn apart, where shares were seen at a turn of ``away``."""
     wrong = np.column_stack([np.full(len(shares), away), shares])
-    turns = [Turn(turn, 0.01, 1.0, gain) for turn, gain in zip((0.3, 0.3 + np.pi), gains, strict=True)]
-    return log_odds(SimpleNamespace(arm=60.0, temper=temper, wrong=wrong), turns)
+    search = SimpleNamespace(arm=60.0, temper=temper, wrong=wrong)
+    return log_odds(search, np.array([0.3, 0.3 + np.pi]), np.array(gains))
 
 
 def test_a_look_alike_is_as_probable_as_the_pose_that_gains_most():
