@@ -63,7 +63,7 @@ class Body:
     places: Picture
     """(n, 2) in the coordinates of the body, px."""
     values: Picture
-    """(n, 2) mean, grey levels, and variance, grey levels²."""
+    """(n, 4) mean, grey levels, variance, grey levels², and what cosine and sine of the turn add to the mean."""
     middle: Floats
     """(2,) mean of the places, px."""
     reach: float
@@ -111,7 +111,8 @@ def body_of(target: Target, most: int = _MOST_PIXELS) -> Body | None:
     chosen = np.random.default_rng(0).permutation(len(rows))[:most] if len(rows) > most else np.arange(len(rows))
     rows_of, columns_of = rows[chosen], columns[chosen]
     places = np.column_stack([columns_of, rows_of]) - float(target.pad)
-    values = np.column_stack([target.appearance[rows_of, columns_of], target.variance[rows_of, columns_of]])
+    of_target = (target.appearance, target.variance, *target.shading)
+    values = np.column_stack([one[rows_of, columns_of] for one in of_target])
     middle = np.array([columns.mean(), rows.mean()]) - target.pad
     reach = max(2.0, float(np.sqrt(((places - middle) ** 2).sum(axis=1).mean())))
     away = np.hypot(*(places - middle).T)

@@ -48,7 +48,9 @@ def _density(off, precision):  # type: ignore[no-untyped-def]
     return sqrt(precision) * _exp(_HALF * off * off * precision) + _FLOOR
 
 
-def log_density(picture: NDArray[np.float32], mean: NDArray[np.float32], variance: NDArray[np.float32]) -> NDArray[np.float32]:
+def log_density(
+    picture: NDArray[np.float32], mean: NDArray[np.float32], variance: NDArray[np.float32]
+) -> NDArray[np.float32]:
     """Return the log density of each pixel: normal, and a share that may have any of 256 grey levels.
 
     Parameters
@@ -143,7 +145,8 @@ def pose_gains(picture, background, precision, excess, places, body, part, parts
     places : ndarray
         (n, 2) float32, the body's pixels in its own coordinates.
     body : ndarray
-        (n, 2) float32, their mean, grey levels, and variance, grey levels².
+        (n, 4) float32, their mean, grey levels, and variance, grey levels²; cosine and sine of the turn add two more
+        columns, grey levels, to the mean.
     part : ndarray
         (n,) part to which each of them belongs.
     parts : int
@@ -172,7 +175,7 @@ def pose_gains(picture, background, precision, excess, places, body, part, parts
             if x < 0.0 or y < 0.0 or x >= width - 1 or y >= height - 1:
                 continue
             seen = _between(picture, x, y)
-            off[shown] = seen - body[i, 0]
+            off[shown] = seen - (body[i, 0] + a * body[i, 2] + b * body[i, 3])
             if not off[shown] * off[shown] >= 0.0:
                 continue
             off_behind[shown] = seen - _between(background, x, y)

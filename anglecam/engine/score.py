@@ -148,7 +148,7 @@ class Lead:
     """The same in its standard errors."""
 
 
-def score(sample: Sample, name: str, poses: Sequence[Floats | None]) -> Score:
+def score(sample: Sample, name: str, poses: Sequence[Floats | None], light: Floats | None = None) -> Score:
     """Return how well poses predict the sample, each half from the other.
 
     Parameters
@@ -159,6 +159,8 @@ def score(sample: Sample, name: str, poses: Sequence[Floats | None]) -> Score:
         Of the explanation.
     poses : sequence of (2, 3) ndarray or None
         K maps from the coordinates of the body to the sample; all ``None``: nothing moves.
+    light : (K, 2) ndarray, optional
+        Cosine and sine of the turn before the light (`learn_target`); by default those of the poses.
     """
     count = len(sample.pictures)
     shape = sample.pictures.shape
@@ -166,10 +168,10 @@ def score(sample: Sample, name: str, poses: Sequence[Floats | None]) -> Score:
     covers = np.zeros(shape, bool)
     known = list(poses)
     for half in range(2):
-        target = learn_target(sample, known, np.arange(half, count, 2))
+        target = learn_target(sample, known, np.arange(half, count, 2), light)
         for k in range(1 - half, count, 2):
             pose = known[k]
-            picture, variance = target.predict(pose)
+            picture, variance = target.predict(pose, None if light is None else light[k])
             variance = variance + sample.excesses[k]
             density[k] = log_density(sample.pictures[k], picture, variance)
             pictures[k] = np.where(np.isfinite(sample.pictures[k]), picture, np.nan)

@@ -32,7 +32,8 @@ def slide_of(sample: Sample, fit: Fit) -> Slide:
     """Return what predicts best of a body whose middle moves on the straight line that is nearest to a turning one's.
 
     Its places on the line are those of the turning body, or those at which the unturned body is most likely: the one
-    explanation must not be worse than the other only because the other was fitted.
+    explanation must not be worse than the other only because the other was fitted. It may change its brightness with the
+    same terms as the turning one.
     """
     poses = fit.proposal.poses(sample)
     rows, columns = np.nonzero(fit.target.visibility)
@@ -45,8 +46,9 @@ def slide_of(sample: Sample, fit: Fit) -> Slide:
     fitted = along
     for _ in range(_ROUNDS):
         fitted = _most_likely(sample, mean, axis, fitted)
+    light = np.array([np.zeros(2) if p is None else p[0, :2] for p in poses])
     tried = (_unturned(mean, axis, places) for places in (along, fitted))
-    return max((Slide(poses, score(sample, "slides", poses)) for poses in tried), key=lambda one: one.score.total)
+    return max((Slide(poses, score(sample, "slides", poses, light)) for poses in tried), key=lambda one: one.score.total)
 
 
 def _unturned(mean: Floats, axis: Floats, along: Floats) -> list[Floats | None]:

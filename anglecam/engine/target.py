@@ -26,6 +26,12 @@ _ROUNDS = 2
 _MAD2 = 1.4826**2
 _BORDER = 8
 """Pixels around what pictures show, beyond the reach of smoothing."""
+_SHADE = 0.25
+"""Usual change of a surface's brightness with the cosine of its turn before the light, as a share of it."""
+_FAR = 2.5
+"""Standard deviations beyond which a value has no more weight in a regression."""
+_FEWEST_LIT = 8
+"""Frames from which on a change with the light is sought: three means and a variance."""
 _FRACTION2 = 1.0 / 12.0
 """Variance, px², of a place that is rounded to whole pixels."""
 
@@ -36,6 +42,8 @@ class Target:
 
     appearance: Picture = field(repr=False)
     """(H, W) a, grey levels, in the coordinates of the body."""
+    shading: Picture = field(repr=False)
+    """(2, H, W) grey levels that the cosine and the sine of its turn add to it."""
     visibility: Picture = field(repr=False)
     """(H, W) v."""
     variance: Picture = field(repr=False)
@@ -47,14 +55,18 @@ class Target:
     pad: int
     """Pixels by which the coordinates of the body reach beyond the picture."""
 
-    def predict(self, pose: Floats | None) -> tuple[Picture, Picture]:
-        """Return the picture (h, w) for a pose (2, 3), or without the body, and its variance."""
+    def predict(self, pose: Floats | None, light: Floats | None = None) -> tuple[Picture, Picture]:
+        """Return the picture (h, w) for a pose (2, 3), or without the body, and its variance.
+
+        ``light`` is that of `learn_target`, (2,); by default that of the pose.
+        """
         if pose is None:
             return self.background, self.background_variance
+        lit = self.appearance + np.tensordot(np.float32(pose[0, :2] if light is None else light), self.shading, 1)
         height, width = self.background.shape
         onto = _onto_picture(pose, self.pad)
         seen = cv2.warpAffine(self.visibility, onto, (width, height), flags=cv2.INTER_LINEAR)
-        body = cv2.warpAffine(self.visibility * self.appearance, onto, (width, height), flags=cv2.INTER_LINEAR)
+        body = cv2.warpAffine(self.visibility * lit, onto, (width, height), flags=cv2.INTER_LINEAR)
         spread = cv2.warpAffine(self.visibility * self.variance, onto, (width, height), flags=cv2.INTER_LINEAR)
         return (
             np.asarray(body + (1.0 - seen) * self.background),
@@ -85,8 +97,14 @@ def rotations(turn: Floats) -> tuple[Floats, Floats]:
     )
 
 
-def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int64]) -> Target:
+def learn_target(
+    sample: Sample, poses: list[Floats | None], use: NDArray[np.int64], light: Floats | None = None
+) -> Target:
     """Learn body and background from some frames of a sample.
+
+    A matt surface under light that stands still is as bright as the cosine between its normal and the light. When it
+    turns about the line of sight, this is a constant, a cosine and a sine of the turn, for every surface (Basri and
+    Jacobs, IEEE Transactions on Pattern Analysis and Machine Intelligence 25, 2003, for the light instead).
 
     Parameters
     ----------
@@ -96,6 +114,8 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
         K maps from the coordinates of the body to the sample, px; ``None`` where the pose is unknown.
     use : (m,) ndarray of int
         Frames to learn from.
+    light : (K, 2) ndarray, optional
+        Cosine and sine of the turn before the light; by default those of the poses.
 
     Returns
     -------
@@ -110,7 +130,8 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
     blank = np.zeros((height + 2 * pad, width + 2 * pad), np.float32)
     if len(known) < 2:
         behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
-        return Target(blank, blank, blank, background, behind, pad)
+        unlit = np.zeros((2, *blank.shape), np.float32)
+        return Target(blank, unlit, blank, blank, background, behind, pad)
     maps = [_onto_picture(pose, pad) for j in known if (pose := poses[use[j]]) is not None]
     box = _shown(maps, (height, width), blank.shape)
     maps = [np.column_stack([m[:, :2], m @ [box[1].start, box[0].start, 1.0]]) for m in maps]
@@ -120,23 +141,29 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
     held = np.stack(
         [cv2.warpAffine(used[j], m, size, flags=back, borderValue=np.nan) for j, m in zip(known, maps, strict=True)]
     )
-    appearance, variance = _typical(np.asarray(held, np.float32))
+    before_light = [pose[0, :2] if light is None else light[use[j]] for j in known if (pose := poses[use[j]]) is not None]
+    lights = np.array(before_light, np.float32)
+    shading = _shading(held, lights, sample.noise)
+    added = np.tensordot(lights, shading, 1)
+    appearance, variance = _typical(held - added)
     often = np.isfinite(held).sum(axis=0).astype(np.float32)
     # a mean and a variance from n values predict another one with the variance (n + 1)/(n − 1); from 3 they do not
     appearance = np.where(often > 3, appearance, np.nan)
-    variance = variance * (often + 1.0) / np.maximum(often - 1.0, 1.0)
+    found = np.where(shading.any(axis=0), np.float32(3.0), np.float32(1.0))  # means
+    variance = variance * (often + found) / np.maximum(often - found, 1.0)
     variance = variance + sample.noise**2 + _FRACTION2 * _slope2(appearance)
     visibility = part
     excess = sample.excesses[use]
     for _ in range(_ROUNDS):
         behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
         odds = np.ones(part.shape)
-        for frame, j, m in zip(held, known, maps, strict=True):
+        for frame, lit, j, m in zip(held, appearance + added, known, maps, strict=True):
             # interpolation averages the noise of a frame, so that both are compared with the interpolated one
             here, spread = (cv2.warpAffine(one, m, size, flags=back) for one in (background, behind))
-            multiply_odds(odds, frame, appearance, variance, excess[j], here, spread)
+            multiply_odds(odds, frame, lit, variance, excess[j], here, spread)
         # a pixel of the body has two parameters, mean and variance (Schwarz, Annals of Statistics 6, 1978)
-        seen = np.isfinite(appearance) & (cv2.GaussianBlur(np.log(odds).astype(np.float32), (0, 0), 1.0) > np.log(len(known)))
+        gain = cv2.GaussianBlur(np.log(odds).astype(np.float32), (0, 0), 1.0)
+        seen = np.isfinite(appearance) & (gain > np.log(len(known)))
         visibility = seen.astype(np.float32)
         cover = np.zeros(used.shape, np.float32)
         for j, m in zip(known, maps, strict=True):
@@ -149,10 +176,55 @@ def learn_target(sample: Sample, poses: list[Floats | None], use: NDArray[np.int
         )
     behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
     around = [(one.start, n - one.stop) for one, n in zip(box, blank.shape, strict=True)]
-    seen_as, v, spread_of = (
-        np.asarray(np.pad(np.nan_to_num(one), around), np.float32) for one in (appearance, visibility, variance)
+    seen_as, v, spread_of, *shades = (
+        np.asarray(np.pad(np.nan_to_num(one), around), np.float32)
+        for one in (appearance, visibility, variance, *shading)
     )
-    return Target(seen_as, v, spread_of, background, behind, pad)
+    return Target(seen_as, np.stack(shades), v, spread_of, background, behind, pad)
+
+
+def _shading(held: Picture, lights: Picture, noise: float) -> Picture:
+    """Return what cosine and sine (m, 2) of the turn add to the pixels (m, …) of a body, (2, …) grey levels.
+
+    It is nothing where a constant explains them as well, for the number of its parameters (Schwarz).
+    """
+    columns = np.ascontiguousarray(held.reshape(len(held), -1).T)
+    median, variance = _typical(held)
+    limit = np.sqrt(variance.ravel() + np.float32(noise**2))
+    found = _regressed(columns, median.ravel(), limit, lights - lights.mean(axis=0), np.float32(_SHADE))
+    return np.asarray(found.T.reshape(2, *held.shape[1:]))
+
+
+@njit("float32[:, ::1](float32[:, ::1], float32[::1], float32[::1], float32[:, ::1], float32)", cache=True, nogil=True)
+def _regressed(values, middle, spread, terms, shade):  # type: ignore[no-untyped-def]
+    """Return the coefficients (n, 2) of terms (m, 2) in values (n, m), where they are worth it.
+
+    Values that are off by more than `_FAR` times their spread count as if they were off by so much.
+    """
+    found = np.zeros((len(values), 2), np.float32)
+    for i in range(len(values)):
+        n, sx, sy, sr, sxx, sxy, syy, sxr, syr, srr = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        far = _FAR * spread[i]
+        for k in range(values.shape[1]):
+            off = values[i, k] - middle[i]
+            if not off * off >= 0.0:
+                continue
+            off = min(max(off, -far), far)
+            x, y = terms[k, 0], terms[k, 1]
+            n, sx, sy, sr = n + 1, sx + x, sy + y, sr + off
+            sxx, sxy, syy = sxx + x * x, sxy + x * y, syy + y * y
+            sxr, syr, srr = sxr + x * off, syr + y * off, srr + off * off
+        if n < _FEWEST_LIT:
+            continue
+        prior = (spread[i] / (shade * max(middle[i], np.float32(1.0)))) ** 2
+        sxx, sxy, syy = sxx - sx * sx / n + prior, sxy - sx * sy / n, syy - sy * sy / n + prior
+        sxr, syr, srr = sxr - sx * sr / n, syr - sy * sr / n, srr - sr * sr / n
+        determinant = sxx * syy - sxy * sxy
+        a, b = (syy * sxr - sxy * syr) / determinant, (sxx * syr - sxy * sxr) / determinant
+        left = srr - a * sxr - b * syr
+        if left < srr * np.exp(-2.0 * np.log(n) / n):
+            found[i, 0], found[i, 1] = a, b
+    return found
 
 
 def _shown(maps: list[Floats], shape: tuple[int, ...], padded: tuple[int, ...]) -> tuple[slice, slice]:

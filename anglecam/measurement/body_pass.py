@@ -39,7 +39,7 @@ _LOOKED_AT = 4
 """Times the pictures of a sample, from which it is chosen."""
 _KEPT_BYTES = 200_000_000
 """Memory for the reduced pictures of a film, which may have to be looked through again."""
-_STEADIER = 3
+_STEADIER = 6
 """Rounds of learning a body again from a steadier motion, at most."""
 _SHIFTED_PX = 0.05
 """By which light, a codec and interpolation shift an edge, px: 0.02 to 0.08 in MJPG films."""
