@@ -71,6 +71,17 @@ def steadiest_path(
     return path, margin
 
 
+def unsteadiness(turn: Floats, time: Floats, resolution: float) -> float:
+    """Return the mean cost of the changes along a way (n,), rad, NaN where it is unknown, at times (n,), s."""
+    seen = np.isfinite(turn)
+    step, lasts = _wrapped(np.diff(turn[seen])), np.diff(time[seen])
+    if len(step) < 2:
+        return np.inf
+    ratio = lasts[1:] / lasts[:-1]
+    change = _wrapped(step[1:] - step[:-1] * ratio) / (resolution * np.maximum(1.0, ratio))
+    return float(np.log1p(change**2).mean())
+
+
 def most_from_motion(resolution: float) -> float:
     """Return how many nats the motion can say for one turn in a frame and against another one, at most.
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Flags, Floats
 from anglecam.engine.likelihood import log_density
 from anglecam.engine.sample import Sample
-from anglecam.engine.target import learn_target, turned
+from anglecam.engine.target import learn_target, light_of, turned
 
 NOTHING = "nothing moves"
 _MOST_VARIANCE = 256.0**2 / 2.0
@@ -167,11 +167,12 @@ def score(sample: Sample, name: str, poses: Sequence[Floats | None], light: Floa
     density, pictures, variances = (np.empty(shape, np.float16) for _ in range(3))
     covers = np.zeros(shape, bool)
     known = list(poses)
+    light = light_of(known) if light is None else light
     for half in range(2):
         target = learn_target(sample, known, np.arange(half, count, 2), light)
         for k in range(1 - half, count, 2):
             pose = known[k]
-            picture, variance = target.predict(pose, None if light is None else light[k])
+            picture, variance = target.predict(pose, light[k])
             variance = variance + sample.excesses[k]
             density[k] = log_density(sample.pictures[k], picture, variance)
             pictures[k] = np.where(np.isfinite(sample.pictures[k]), picture, np.nan)

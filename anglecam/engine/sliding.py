@@ -11,7 +11,7 @@ from anglecam.engine.body import body_of, frame_of
 from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import Score, score
-from anglecam.engine.target import learn_target, turned
+from anglecam.engine.target import learn_target, light_of, turned
 
 _ROUNDS = 2
 """Of learning and locating in turn, as for a body that turns (`anglecam.engine.refine`)."""
@@ -36,6 +36,7 @@ def slide_of(sample: Sample, fit: Fit) -> Slide:
     same terms as the turning one.
     """
     poses = fit.proposal.poses(sample)
+    light = light_of(poses)
     rows, columns = np.nonzero(fit.target.visibility)
     middle = np.array([columns.mean(), rows.mean()]) - fit.target.pad
     shifts = np.array([np.full(2, np.nan) if p is None else p[:, :2] @ middle + p[:, 2] - middle for p in poses])
@@ -46,7 +47,6 @@ def slide_of(sample: Sample, fit: Fit) -> Slide:
     fitted = along
     for _ in range(_ROUNDS):
         fitted = _most_likely(sample, mean, axis, fitted)
-    light = np.array([np.zeros(2) if p is None else p[0, :2] for p in poses])
     tried = (_unturned(mean, axis, places) for places in (along, fitted))
     return max((Slide(poses, score(sample, "slides", poses, light)) for poses in tried), key=lambda one: one.score.total)
 

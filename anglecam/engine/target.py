@@ -9,6 +9,7 @@ glitters or the pose is wrong, a pixel of the body differs from frame to frame.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -79,6 +80,11 @@ class Target:
         return cv2.warpAffine(self.visibility, _onto_picture(pose, self.pad), (width, height)) > 0.0
 
 
+def light_of(poses: Sequence[Floats | None]) -> Floats:
+    """Return cosine and sine (K, 2) of the turns of poses (2, 3), as `learn_target` takes them."""
+    return np.array([np.zeros(2) if pose is None else pose[0, :2] for pose in poses])
+
+
 def turned(centre: Floats, turn: float, shift: Floats | None = None) -> Floats:
     """Return the (2, 3) map of a body that is turned about a centre (2,), px, counter-clockwise as seen, rad."""
     cos, sin = np.cos(turn), np.sin(turn)
@@ -98,7 +104,7 @@ def rotations(turn: Floats) -> tuple[Floats, Floats]:
 
 
 def learn_target(
-    sample: Sample, poses: list[Floats | None], use: NDArray[np.int64], light: Floats | None = None
+    sample: Sample, poses: Sequence[Floats | None], use: NDArray[np.int64], light: Floats | None = None
 ) -> Target:
     """Learn body and background from some frames of a sample.
 
@@ -110,12 +116,12 @@ def learn_target(
     ----------
     sample : Sample
         K frames.
-    poses : list of (2, 3) ndarray or None
+    poses : sequence of (2, 3) ndarray or None
         K maps from the coordinates of the body to the sample, px; ``None`` where the pose is unknown.
     use : (m,) ndarray of int
         Frames to learn from.
     light : (K, 2) ndarray, optional
-        Cosine and sine of the turn before the light; by default those of the poses.
+        Cosine and sine of the turn before the light (`light_of`); by default the body is as bright in every pose.
 
     Returns
     -------
@@ -141,29 +147,26 @@ def learn_target(
     held = np.stack(
         [cv2.warpAffine(used[j], m, size, flags=back, borderValue=np.nan) for j, m in zip(known, maps, strict=True)]
     )
-    before_light = [pose[0, :2] if light is None else light[use[j]] for j in known if (pose := poses[use[j]]) is not None]
-    lights = np.array(before_light, np.float32)
-    shading = _shading(held, lights, sample.noise)
-    added = np.tensordot(lights, shading, 1)
-    appearance, variance = _typical(held - added)
-    often = np.isfinite(held).sum(axis=0).astype(np.float32)
-    # a mean and a variance from n values predict another one with the variance (n + 1)/(n − 1); from 3 they do not
-    appearance = np.where(often > 3, appearance, np.nan)
-    found = np.where(shading.any(axis=0), np.float32(3.0), np.float32(1.0))  # means
-    variance = variance * (often + found) / np.maximum(often - found, 1.0)
-    variance = variance + sample.noise**2 + _FRACTION2 * _slope2(appearance)
+    lights = np.zeros((len(known), 2), np.float32) if light is None else np.asarray(light[use[known]], np.float32)
+    shading = np.zeros((2, *part.shape), np.float32)
     visibility = part
     excess = sample.excesses[use]
-    for _ in range(_ROUNDS):
+    for step in range(_ROUNDS):
+        if step and light is not None:
+            # only of the body: the surroundings, too, change smoothly as it turns before them
+            shading = _without_motion(_shading(held, lights, sample.noise) * visibility, appearance, variance)
+        added = np.tensordot(lights, shading, 1)
+        appearance, variance = _predicted(held - added, shading, sample.noise)
         behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
         odds = np.ones(part.shape)
         for frame, lit, j, m in zip(held, appearance + added, known, maps, strict=True):
             # interpolation averages the noise of a frame, so that both are compared with the interpolated one
             here, spread = (cv2.warpAffine(one, m, size, flags=back) for one in (background, behind))
             multiply_odds(odds, frame, lit, variance, excess[j], here, spread)
-        # a pixel of the body has two parameters, mean and variance (Schwarz, Annals of Statistics 6, 1978)
         gain = cv2.GaussianBlur(np.log(odds).astype(np.float32), (0, 0), 1.0)
-        seen = np.isfinite(appearance) & (gain > np.log(len(known)))
+        # a pixel of the body has two parameters, mean and variance, or four (Schwarz, Annals of Statistics 6, 1978)
+        least = np.log(len(known)) * np.where(shading.any(axis=0), 2.0, 1.0)
+        seen = np.isfinite(appearance) & (gain > least)
         visibility = seen.astype(np.float32)
         cover = np.zeros(used.shape, np.float32)
         for j, m in zip(known, maps, strict=True):
@@ -183,6 +186,17 @@ def learn_target(
     return Target(seen_as, np.stack(shades), v, spread_of, background, behind, pad)
 
 
+def _predicted(unlit: Picture, shading: Picture, noise: float) -> tuple[Picture, Picture]:
+    """Return the mean of a body's pixels (m, …), what the light adds taken out, and the variance of another value."""
+    appearance, variance = _typical(unlit)
+    often = np.isfinite(unlit).sum(axis=0).astype(np.float32)
+    # a mean and a variance from n values predict another one with the variance (n + 1)/(n − 1); from 3 they do not
+    appearance = np.where(often > 3, appearance, np.nan)
+    means = np.where(shading.any(axis=0), np.float32(3.0), np.float32(1.0))
+    variance = variance * (often + means) / np.maximum(often - means, 1.0)
+    return appearance, np.asarray(variance + noise**2 + _FRACTION2 * _slope2(appearance), np.float32)
+
+
 def _shading(held: Picture, lights: Picture, noise: float) -> Picture:
     """Return what cosine and sine (m, 2) of the turn add to the pixels (m, …) of a body, (2, …) grey levels.
 
@@ -193,6 +207,25 @@ def _shading(held: Picture, lights: Picture, noise: float) -> Picture:
     limit = np.sqrt(variance.ravel() + np.float32(noise**2))
     found = _regressed(columns, median.ravel(), limit, lights - lights.mean(axis=0), np.float32(_SHADE))
     return np.asarray(found.T.reshape(2, *held.shape[1:]))
+
+
+def _without_motion(shading: Picture, appearance: Picture, variance: Picture) -> Picture:
+    """Return a change with the light (2, …) without what a motion adds to a body's appearance.
+
+    Where the centre is off, or the turns are, the body is displaced by a cosine and a sine of its turn: to first order
+    by multiples of its slopes to the right, downwards and around. These are left to the poses.
+    """
+    lit = shading.any(axis=0)
+    if not lit.any():
+        return shading
+    across, down = _slopes(appearance)
+    y, x = np.indices(lit.shape)
+    motions = np.stack([across, down, (x - x[lit].mean()) * down - (y - y[lit].mean()) * across])[:, lit]
+    weight = 1.0 / np.sqrt(variance[lit])
+    of_motion = np.linalg.lstsq((motions * weight).T, (shading[:, lit] * weight).T, rcond=None)[0]
+    left = np.zeros_like(shading)
+    left[:, lit] = shading[:, lit] - of_motion.T @ motions
+    return left
 
 
 @njit("float32[:, ::1](float32[:, ::1], float32[::1], float32[::1], float32[:, ::1], float32)", cache=True, nogil=True)
@@ -278,10 +311,16 @@ def _of_ordered(ordered):  # type: ignore[no-untyped-def]
 
 def _slope2(picture: Picture) -> Picture:
     """Return the squared gradient, grey levels² per px²."""
+    across, down = _slopes(picture)
+    return np.asarray(across**2 + down**2)
+
+
+def _slopes(picture: Picture) -> tuple[Picture, Picture]:
+    """Return the gradient to the right and downwards, grey levels per px."""
     filled = np.nan_to_num(picture)
     across = cv2.Sobel(filled, cv2.CV_32F, 1, 0, scale=0.125)
     down = cv2.Sobel(filled, cv2.CV_32F, 0, 1, scale=0.125)
-    return np.asarray(across**2 + down**2)
+    return np.asarray(across), np.asarray(down)
 
 
 def _onto_picture(pose: Floats, pad: int) -> Floats:

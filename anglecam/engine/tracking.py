@@ -28,7 +28,7 @@ from anglecam.engine.path import most_from_motion, steadiest_path
 from anglecam.engine.refine import Fit, refine
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import NOTHING, carried_by, score
-from anglecam.engine.target import Picture, learn_target
+from anglecam.engine.target import Picture, learn_target, light_of
 
 _STEP_PX = 2.0
 """Of the search for a turn."""
@@ -116,7 +116,7 @@ def _wrong_poses(search: Search) -> Floats:
     count, poses = len(sample.pictures), proposal.poses(sample)
     wrong = list[tuple[float, float]]()
     for half in range(2):
-        target = learn_target(sample, poses, np.arange(half, count, 2))
+        target = learn_target(sample, poses, np.arange(half, count, 2), light_of(poses))
         body = body_of(target)
         if body is None:
             continue
@@ -281,8 +281,9 @@ def _by_stretch(search: Search, turn: Floats, times: Floats, pictures: Sequence[
     seen = np.flatnonzero(np.isfinite(turn))
     if not pictures or len(seen) < _FEWEST:
         return None
-    step = np.angle(np.exp(1j * np.diff(turn[seen])))
-    change = np.abs(np.diff(step, prepend=step[:1]))
+    step, lasts = _wrapped(np.diff(turn[seen])), np.diff(times[seen])
+    expected = step[:-1] * lasts[1:] / lasts[:-1]
+    change = np.abs(np.append(0.0, _wrapped(step[1:] - expected)))
     jumps = np.flatnonzero(change > max(_JUMP * float(np.median(change)), _APART_PX / search.arm))
     runs = [run for run in np.split(seen, jumps + 1) if len(run) >= _FEWEST]
     if len(jumps) == 0 or not runs:

@@ -15,6 +15,7 @@ from anglecam.engine.body import Turn
 from anglecam.engine.frame_choice import spread_over_motion, thumbnail
 from anglecam.engine.hints import Hints
 from anglecam.engine.learn import Learnt, looks, rank
+from anglecam.engine.path import unsteadiness
 from anglecam.engine.reasons import why_ambiguous, why_jump, why_not_as_hinted, why_nothing_turns
 from anglecam.engine.refine import sensitivities
 from anglecam.engine.sample import FRAMES, Sample, Stills
@@ -92,13 +93,13 @@ def _followed(camera: HeldCamera, rig: Rig, hints: Hints, learnt: Learnt, progre
     film = camera.film
     search = search_for(learnt.sample, learnt.explanations[0].fit)
     seen = follow(camera, search.sample, partial(_candidates, search), progress)
-    for _ in range(_STEADIER):
-        again = steadier(search, seen.found, seen.time, seen.pictures)
-        if again is None:
-            break
+    tried = [(search, seen, chosen(seen.found, seen.time, search))]
+    while len(tried) <= _STEADIER and (again := steadier(search, seen.found, seen.time, seen.pictures)) is not None:
         search = again
         seen = _again(seen, again) or follow(camera, again.sample, partial(_candidates, again), progress)
-    track = chosen(seen.found, seen.time, search)
+        tried.append((search, seen, chosen(seen.found, seen.time, search)))
+    # of motions that explain the film as well, the steadiest
+    search, seen, track = min(tried, key=lambda one: unsteadiness(one[2].turn, one[1].time, 1.0 / one[0].arm))
     jump = why_jump(track.turn, film.first_frame)
     if jump is not None:
         return jump
