@@ -28,7 +28,7 @@ from anglecam.engine.free_pose import free_pose
 from anglecam.engine.rotation_centre import common_centre
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import Proposal, carried_by
-from anglecam.engine.target import Target, learn_target, light_of, rotations, turned
+from anglecam.engine.target import Target, learn_target, rotations, turned
 
 _ODDS = float(special.logit(0.95))
 """Logarithm of the odds at which a body counts as seen."""
@@ -79,12 +79,12 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
     Fit or None
         ``None`` where nothing follows the proposal.
     """
-    # a body that changes with the light is much like one that is displaced: where it is, is found without light
+    # a body that changes with the light is much like one that is displaced: its centre is found without
     fit = _fitted(sample, proposal, rounds)
     if fit is None:
         return None
     poses = fit.proposal.poses(sample)
-    return replace(fit, target=learn_target(sample, poses, np.arange(len(poses)), light_of(poses)))
+    return replace(fit, target=learn_target(sample, poses, np.arange(len(poses)), lit=True))
 
 
 def _fitted(sample: Sample, proposal: Proposal, rounds: int) -> Fit | None:

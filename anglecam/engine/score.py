@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Flags, Floats
 from anglecam.engine.likelihood import log_density
 from anglecam.engine.sample import Sample
-from anglecam.engine.target import learn_target, light_of, turned
+from anglecam.engine.target import learn_target, turned
 
 NOTHING = "nothing moves"
 _MOST_VARIANCE = 256.0**2 / 2.0
@@ -148,7 +148,7 @@ class Lead:
     """The same in its standard errors."""
 
 
-def score(sample: Sample, name: str, poses: Sequence[Floats | None], light: Floats | None = None) -> Score:
+def score(sample: Sample, name: str, poses: Sequence[Floats | None], *, lit: bool = False) -> Score:
     """Return how well poses predict the sample, each half from the other.
 
     Parameters
@@ -159,20 +159,19 @@ def score(sample: Sample, name: str, poses: Sequence[Floats | None], light: Floa
         Of the explanation.
     poses : sequence of (2, 3) ndarray or None
         K maps from the coordinates of the body to the sample; all ``None``: nothing moves.
-    light : (K, 2) ndarray, optional
-        Cosine and sine of the turn before the light (`learn_target`); by default those of the poses.
+    lit : bool
+        Whether the brightness of the body changes with its turn before the light.
     """
     count = len(sample.pictures)
     shape = sample.pictures.shape
     density, pictures, variances = (np.empty(shape, np.float16) for _ in range(3))
     covers = np.zeros(shape, bool)
     known = list(poses)
-    light = light_of(known) if light is None else light
     for half in range(2):
-        target = learn_target(sample, known, np.arange(half, count, 2), light)
+        target = learn_target(sample, known, np.arange(half, count, 2), lit=lit)
         for k in range(1 - half, count, 2):
             pose = known[k]
-            picture, variance = target.predict(pose, light[k])
+            picture, variance = target.predict(pose)
             variance = variance + sample.excesses[k]
             density[k] = log_density(sample.pictures[k], picture, variance)
             pictures[k] = np.where(np.isfinite(sample.pictures[k]), picture, np.nan)

@@ -11,7 +11,7 @@ from anglecam.engine.body import body_of, frame_of
 from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import Score, score
-from anglecam.engine.target import learn_target, light_of, turned
+from anglecam.engine.target import learn_target, turned
 
 _ROUNDS = 2
 """Of learning and locating in turn, as for a body that turns (`anglecam.engine.refine`)."""
@@ -32,11 +32,9 @@ def slide_of(sample: Sample, fit: Fit) -> Slide:
     """Return what predicts best of a body whose middle moves on the straight line that is nearest to a turning one's.
 
     Its places on the line are those of the turning body, or those at which the unturned body is most likely: the one
-    explanation must not be worse than the other only because the other was fitted. It may change its brightness with the
-    same terms as the turning one.
+    explanation must not be worse than the other only because the other was fitted.
     """
     poses = fit.proposal.poses(sample)
-    light = light_of(poses)
     rows, columns = np.nonzero(fit.target.visibility)
     middle = np.array([columns.mean(), rows.mean()]) - fit.target.pad
     shifts = np.array([np.full(2, np.nan) if p is None else p[:, :2] @ middle + p[:, 2] - middle for p in poses])
@@ -48,7 +46,7 @@ def slide_of(sample: Sample, fit: Fit) -> Slide:
     for _ in range(_ROUNDS):
         fitted = _most_likely(sample, mean, axis, fitted)
     tried = (_unturned(mean, axis, places) for places in (along, fitted))
-    return max((Slide(poses, score(sample, "slides", poses, light)) for poses in tried), key=lambda one: one.score.total)
+    return max((Slide(poses, score(sample, "slides", poses)) for poses in tried), key=lambda one: one.score.total)
 
 
 def _unturned(mean: Floats, axis: Floats, along: Floats) -> list[Floats | None]:

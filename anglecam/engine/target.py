@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Floats
 from anglecam.engine.likelihood import multiply_odds
 from anglecam.engine.sample import Sample
+from anglecam.engine.shading import shading_of, slopes, without_motion
 
 Picture = NDArray[np.float32]
 _ROUNDS = 2
@@ -27,12 +28,6 @@ _ROUNDS = 2
 _MAD2 = 1.4826**2
 _BORDER = 8
 """Pixels around what pictures show, beyond the reach of smoothing."""
-_SHADE = 0.25
-"""Usual change of a surface's brightness with the cosine of its turn before the light, as a share of it."""
-_FAR = 2.5
-"""Standard deviations beyond which a value has no more weight in a regression."""
-_FEWEST_LIT = 8
-"""Frames from which on a change with the light is sought: three means and a variance."""
 _FRACTION2 = 1.0 / 12.0
 """Variance, px², of a place that is rounded to whole pixels."""
 
@@ -56,14 +51,11 @@ class Target:
     pad: int
     """Pixels by which the coordinates of the body reach beyond the picture."""
 
-    def predict(self, pose: Floats | None, light: Floats | None = None) -> tuple[Picture, Picture]:
-        """Return the picture (h, w) for a pose (2, 3), or without the body, and its variance.
-
-        ``light`` is that of `learn_target`, (2,); by default that of the pose.
-        """
+    def predict(self, pose: Floats | None) -> tuple[Picture, Picture]:
+        """Return the picture (h, w) for a pose (2, 3), or without the body, and its variance."""
         if pose is None:
             return self.background, self.background_variance
-        lit = self.appearance + np.tensordot(np.float32(pose[0, :2] if light is None else light), self.shading, 1)
+        lit = self.appearance + np.tensordot(np.float32(pose[0, :2]), self.shading, 1)
         height, width = self.background.shape
         onto = _onto_picture(pose, self.pad)
         seen = cv2.warpAffine(self.visibility, onto, (width, height), flags=cv2.INTER_LINEAR)
@@ -78,11 +70,6 @@ class Target:
         """Return (h, w) whether the body in a pose covers a pixel of the picture, or a part of it."""
         height, width = self.background.shape
         return cv2.warpAffine(self.visibility, _onto_picture(pose, self.pad), (width, height)) > 0.0
-
-
-def light_of(poses: Sequence[Floats | None]) -> Floats:
-    """Return cosine and sine (K, 2) of the turns of poses (2, 3), as `learn_target` takes them."""
-    return np.array([np.zeros(2) if pose is None else pose[0, :2] for pose in poses])
 
 
 def turned(centre: Floats, turn: float, shift: Floats | None = None) -> Floats:
@@ -104,13 +91,9 @@ def rotations(turn: Floats) -> tuple[Floats, Floats]:
 
 
 def learn_target(
-    sample: Sample, poses: Sequence[Floats | None], use: NDArray[np.int64], light: Floats | None = None
+    sample: Sample, poses: Sequence[Floats | None], use: NDArray[np.int64], *, lit: bool = False
 ) -> Target:
     """Learn body and background from some frames of a sample.
-
-    A matt surface under light that stands still is as bright as the cosine between its normal and the light. When it
-    turns about the line of sight, this is a constant, a cosine and a sine of the turn, for every surface (Basri and
-    Jacobs, IEEE Transactions on Pattern Analysis and Machine Intelligence 25, 2003, for the light instead).
 
     Parameters
     ----------
@@ -120,8 +103,8 @@ def learn_target(
         K maps from the coordinates of the body to the sample, px; ``None`` where the pose is unknown.
     use : (m,) ndarray of int
         Frames to learn from.
-    light : (K, 2) ndarray, optional
-        Cosine and sine of the turn before the light (`light_of`); by default the body is as bright in every pose.
+    lit : bool
+        Whether the brightness of the body changes with its turn before the light (`anglecam.engine.shading`).
 
     Returns
     -------
@@ -144,25 +127,30 @@ def learn_target(
     part = blank[box]
     size = part.shape[::-1]
     back = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-    held = np.stack(
-        [cv2.warpAffine(used[j], m, size, flags=back, borderValue=np.nan) for j, m in zip(known, maps, strict=True)]
+    seen_in = (
+        cv2.warpAffine(used[j], m, size, flags=back, borderValue=np.nan) for j, m in zip(known, maps, strict=True)
     )
-    lights = np.zeros((len(known), 2), np.float32) if light is None else np.asarray(light[use[known]], np.float32)
+    held = np.stack([np.asarray(one, np.float32) for one in seen_in])
     shading = np.zeros((2, *part.shape), np.float32)
+    appearance, variance = _predicted(held, shading, sample.noise)
+    shown: Sequence[Picture] = [appearance] * len(known)
     visibility = part
     excess = sample.excesses[use]
     for step in range(_ROUNDS):
-        if step and light is not None:
+        if step and lit:
             # only of the body: the surroundings, too, change smoothly as it turns before them
-            shading = _without_motion(_shading(held, lights, sample.noise) * visibility, appearance, variance)
-        added = np.tensordot(lights, shading, 1)
-        appearance, variance = _predicted(held - added, shading, sample.noise)
+            lights = np.array([pose[0, :2] for j in known if (pose := poses[use[j]]) is not None], np.float32)
+            shading = shading_of(held, *_typical(held), lights, sample.noise) * visibility
+            shading = without_motion(shading, appearance, variance)
+            added = np.asarray(np.tensordot(lights, shading, 1), np.float32)
+            appearance, variance = _predicted(held - added, shading, sample.noise)
+            shown = list(appearance + added)
         behind = background_variance + sample.noise**2 + _FRACTION2 * _slope2(background)
         odds = np.ones(part.shape)
-        for frame, lit, j, m in zip(held, appearance + added, known, maps, strict=True):
+        for frame, mean, j, m in zip(held, shown, known, maps, strict=True):
             # interpolation averages the noise of a frame, so that both are compared with the interpolated one
             here, spread = (cv2.warpAffine(one, m, size, flags=back) for one in (background, behind))
-            multiply_odds(odds, frame, lit, variance, excess[j], here, spread)
+            multiply_odds(odds, frame, mean, variance, excess[j], here, spread)
         gain = cv2.GaussianBlur(np.log(odds).astype(np.float32), (0, 0), 1.0)
         # a pixel of the body has two parameters, mean and variance, or four (Schwarz, Annals of Statistics 6, 1978)
         least = np.log(len(known)) * np.where(shading.any(axis=0), 2.0, 1.0)
@@ -195,69 +183,6 @@ def _predicted(unlit: Picture, shading: Picture, noise: float) -> tuple[Picture,
     means = np.where(shading.any(axis=0), np.float32(3.0), np.float32(1.0))
     variance = variance * (often + means) / np.maximum(often - means, 1.0)
     return appearance, np.asarray(variance + noise**2 + _FRACTION2 * _slope2(appearance), np.float32)
-
-
-def _shading(held: Picture, lights: Picture, noise: float) -> Picture:
-    """Return what cosine and sine (m, 2) of the turn add to the pixels (m, …) of a body, (2, …) grey levels.
-
-    It is nothing where a constant explains them as well, for the number of its parameters (Schwarz).
-    """
-    columns = np.ascontiguousarray(held.reshape(len(held), -1).T)
-    median, variance = _typical(held)
-    limit = np.sqrt(variance.ravel() + np.float32(noise**2))
-    found = _regressed(columns, median.ravel(), limit, lights - lights.mean(axis=0), np.float32(_SHADE))
-    return np.asarray(found.T.reshape(2, *held.shape[1:]))
-
-
-def _without_motion(shading: Picture, appearance: Picture, variance: Picture) -> Picture:
-    """Return a change with the light (2, …) without what a motion adds to a body's appearance.
-
-    Where the centre is off, or the turns are, the body is displaced by a cosine and a sine of its turn: to first order
-    by multiples of its slopes to the right, downwards and around. These are left to the poses.
-    """
-    lit = shading.any(axis=0)
-    if not lit.any():
-        return shading
-    across, down = _slopes(appearance)
-    y, x = np.indices(lit.shape)
-    motions = np.stack([across, down, (x - x[lit].mean()) * down - (y - y[lit].mean()) * across])[:, lit]
-    weight = 1.0 / np.sqrt(variance[lit])
-    of_motion = np.linalg.lstsq((motions * weight).T, (shading[:, lit] * weight).T, rcond=None)[0]
-    left = np.zeros_like(shading)
-    left[:, lit] = shading[:, lit] - of_motion.T @ motions
-    return left
-
-
-@njit("float32[:, ::1](float32[:, ::1], float32[::1], float32[::1], float32[:, ::1], float32)", cache=True, nogil=True)
-def _regressed(values, middle, spread, terms, shade):  # type: ignore[no-untyped-def]
-    """Return the coefficients (n, 2) of terms (m, 2) in values (n, m), where they are worth it.
-
-    Values that are off by more than `_FAR` times their spread count as if they were off by so much.
-    """
-    found = np.zeros((len(values), 2), np.float32)
-    for i in range(len(values)):
-        n, sx, sy, sr, sxx, sxy, syy, sxr, syr, srr = 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        far = _FAR * spread[i]
-        for k in range(values.shape[1]):
-            off = values[i, k] - middle[i]
-            if not off * off >= 0.0:
-                continue
-            off = min(max(off, -far), far)
-            x, y = terms[k, 0], terms[k, 1]
-            n, sx, sy, sr = n + 1, sx + x, sy + y, sr + off
-            sxx, sxy, syy = sxx + x * x, sxy + x * y, syy + y * y
-            sxr, syr, srr = sxr + x * off, syr + y * off, srr + off * off
-        if n < _FEWEST_LIT:
-            continue
-        prior = (spread[i] / (shade * max(middle[i], np.float32(1.0)))) ** 2
-        sxx, sxy, syy = sxx - sx * sx / n + prior, sxy - sx * sy / n, syy - sy * sy / n + prior
-        sxr, syr, srr = sxr - sx * sr / n, syr - sy * sr / n, srr - sr * sr / n
-        determinant = sxx * syy - sxy * sxy
-        a, b = (syy * sxr - sxy * syr) / determinant, (sxx * syr - sxy * sxr) / determinant
-        left = srr - a * sxr - b * syr
-        if left < srr * np.exp(-2.0 * np.log(n) / n):
-            found[i, 0], found[i, 1] = a, b
-    return found
 
 
 def _shown(maps: list[Floats], shape: tuple[int, ...], padded: tuple[int, ...]) -> tuple[slice, slice]:
@@ -311,16 +236,8 @@ def _of_ordered(ordered):  # type: ignore[no-untyped-def]
 
 def _slope2(picture: Picture) -> Picture:
     """Return the squared gradient, grey levels² per px²."""
-    across, down = _slopes(picture)
+    across, down = slopes(picture)
     return np.asarray(across**2 + down**2)
-
-
-def _slopes(picture: Picture) -> tuple[Picture, Picture]:
-    """Return the gradient to the right and downwards, grey levels per px."""
-    filled = np.nan_to_num(picture)
-    across = cv2.Sobel(filled, cv2.CV_32F, 1, 0, scale=0.125)
-    down = cv2.Sobel(filled, cv2.CV_32F, 0, 1, scale=0.125)
-    return np.asarray(across), np.asarray(down)
 
 
 def _onto_picture(pose: Floats, pad: int) -> Floats:

@@ -28,7 +28,7 @@ from anglecam.engine.path import most_from_motion, steadiest_path
 from anglecam.engine.refine import Fit, refine
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import NOTHING, carried_by, score
-from anglecam.engine.target import Picture, learn_target, light_of
+from anglecam.engine.target import Picture, learn_target
 
 _STEP_PX = 2.0
 """Of the search for a turn."""
@@ -116,7 +116,7 @@ def _wrong_poses(search: Search) -> Floats:
     count, poses = len(sample.pictures), proposal.poses(sample)
     wrong = list[tuple[float, float]]()
     for half in range(2):
-        target = learn_target(sample, poses, np.arange(half, count, 2), light_of(poses))
+        target = learn_target(sample, poses, np.arange(half, count, 2), lit=True)
         body = body_of(target)
         if body is None:
             continue
@@ -262,7 +262,7 @@ def _as_well(search: Search, turn: Floats) -> Search | None:
     if fit is None:
         return None
     nothing, before, after = (
-        score(sample, name, poses)
+        score(sample, name, poses, lit=True)
         for name, poses in (
             (NOTHING, [None] * len(sample.pictures)),
             (known.name, known.poses(sample)),
