@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from anglecam.data.typing import Floats
@@ -15,6 +16,9 @@ _FAR = 9.0
 """Squared standard uncertainties by which a hint may be off the centre: true hints are so in 1 % of all films."""
 _CLICK_PX = 5.0
 """Standard uncertainty of each coordinate of a place that is pointed at, px of the film: by eye."""
+
+_LEAST_PART = 0.05
+"""Of the area of a body's largest part, that of another one that counts."""
 
 
 @dataclass(frozen=True)
@@ -41,16 +45,27 @@ def obeys(fit: Fit, sample: Sample, hints: Hints) -> bool:
         spread = fit.covariance_px2 + hints.pivot_sigma_px**2 * np.eye(2)
         if off @ np.linalg.solve(spread, off) > _FAR:
             return False
-    if hints.mark_px is None:
-        return True
+    return beside_mark(fit, sample, hints) <= np.sqrt(_FAR)
+
+
+def beside_mark(fit: Fit, sample: Sample, hints: Hints) -> float:
+    """Return how far a body is from where it was pointed at, in standard uncertainties of a click.
+
+    It is 0 where nothing contradicts the hint. Pixels that look like the body by chance are few and lie by themselves.
+    """
     k = int(np.argmin(np.abs(sample.frames - hints.mark_frame)))
     turn = fit.proposal.turn[k]
-    if sample.frames[k] != hints.mark_frame or not np.isfinite(turn):
-        return True  # nothing contradicts it
-    rows, columns = np.nonzero(fit.target.visibility)
+    if hints.mark_px is None or sample.frames[k] != hints.mark_frame or not np.isfinite(turn):
+        return 0.0
+    count, labels, stats, _ = cv2.connectedComponentsWithStats((fit.target.visibility > 0.5).astype(np.uint8))
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    if count < 2:
+        return 0.0
+    parts = 1 + np.flatnonzero(areas >= _LEAST_PART * areas.max())
+    rows, columns = np.nonzero(np.isin(labels, parts))
     places = np.column_stack([columns, rows]) - float(fit.target.pad)
     pose = turned(sample.place(fit.proposal.centre_px), float(turn))
     there = sample.in_film(places @ pose[:, :2].T + pose[:, 2])
     there = np.vstack([there, fit.proposal.centre_px])  # a hub is not seen to turn
     off = there - np.clip(there, hints.mark_px[:2], hints.mark_px[2:])
-    return bool((off**2).sum(axis=1).min() <= _FAR * (_CLICK_PX**2 + sample.scale**-2))
+    return float(np.hypot(*off.T).min() / np.hypot(_CLICK_PX, 1.0 / sample.scale))

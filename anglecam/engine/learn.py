@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from anglecam.data.typing import Floats
 from anglecam.engine.competition import Explanation, compete
-from anglecam.engine.hints import NO_HINTS, Hints, obeys
+from anglecam.engine.hints import NO_HINTS, Hints, beside_mark, obeys
 from anglecam.engine.proposals import blobs, declared, features, polar
 from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample, Stills, sample_part, sample_stills
@@ -89,10 +89,10 @@ def _explained(sample: Sample, parts: Sequence[Sample], stills: Stills, hints: H
 
 
 def _competing(sample: Sample, hints: Hints) -> list[Explanation]:
-    """Return the explanations of a sample, those that obey the hints first."""
+    """Return the explanations of a sample, those that obey the hints first, and of these the one that is pointed at."""
     proposals = [one for find in FINDERS for one in find(sample)]
     fits = compete(sample, proposals, declared.proposals(sample, hints))
-    return sorted(fits, key=lambda one: rank(Learnt(sample, (one,)), hints))
+    return sorted(fits, key=lambda one: (rank(Learnt(sample, (one,)), hints), int(beside_mark(one.fit, sample, hints))))
 
 
 def _shows(sample: Sample, point_px: Floats) -> bool:

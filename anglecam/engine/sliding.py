@@ -39,8 +39,9 @@ def slide_of(sample: Sample, fit: Fit) -> Slide:
     middle = np.array([columns.mean(), rows.mean()]) - fit.target.pad
     shifts = np.array([np.full(2, np.nan) if p is None else p[:, :2] @ middle + p[:, 2] - middle for p in poses])
     known = np.isfinite(shifts[:, 0])
-    mean = shifts[known].mean(axis=0)
-    axis = np.linalg.svd(shifts[known] - mean)[2][0]
+    weight = np.maximum(fit.gain[known], 0.0)  # a frame that hardly shows the body says little of its way
+    mean = np.average(shifts[known], axis=0, weights=weight)
+    axis = np.linalg.svd((shifts[known] - mean) * np.sqrt(weight)[:, None])[2][0]
     along = (shifts - mean) @ axis
     fitted = along
     for _ in range(_ROUNDS):
