@@ -45,7 +45,8 @@ def shading_of(held: Picture, median: Picture, variance: Picture, lights: Pictur
     """
     columns = np.ascontiguousarray(held.reshape(len(held), -1).T)
     spread = np.sqrt(variance.ravel() + np.float32(noise**2))
-    found = _regressed(columns, median.ravel(), spread, lights - lights.mean(axis=0), np.float32(_SHADE))
+    likely = np.float32(noise) / (np.float32(_SHADE) * np.maximum(median.ravel(), np.float32(1.0)))
+    found = _regressed(columns, median.ravel(), spread, lights - lights.mean(axis=0), likely**2)
     return np.asarray(found.T.reshape(2, *held.shape[1:]))
 
 
@@ -68,8 +69,12 @@ def without_motion(shading: Picture, appearance: Picture, variance: Picture) -> 
     return left
 
 
-@njit("float32[:, ::1](float32[:, ::1], float32[::1], float32[::1], float32[:, ::1], float32)", cache=True, nogil=True)
-def _regressed(values, middle, spread, terms, shade):  # type: ignore[no-untyped-def]
+@njit(
+    "float32[:, ::1](float32[:, ::1], float32[::1], float32[::1], float32[:, ::1], float32[::1])",
+    cache=True,
+    nogil=True,
+)
+def _regressed(values, middle, spread, terms, prior):  # type: ignore[no-untyped-def]
     """Return the coefficients (n, 2) of terms (m, 2) in values (n, m), where they are worth it.
 
     Values that are off by more than `_FAR` times their spread count as if they were off by so much.
@@ -89,8 +94,7 @@ def _regressed(values, middle, spread, terms, shade):  # type: ignore[no-untyped
             sxr, syr, srr = sxr + x * off, syr + y * off, srr + off * off
         if n < _FEWEST:
             continue
-        prior = (spread[i] / (shade * max(middle[i], np.float32(1.0)))) ** 2
-        sxx, sxy, syy = sxx - sx * sx / n + prior, sxy - sx * sy / n, syy - sy * sy / n + prior
+        sxx, sxy, syy = sxx - sx * sx / n + prior[i], sxy - sx * sy / n, syy - sy * sy / n + prior[i]
         sxr, syr, srr = sxr - sx * sr / n, syr - sy * sr / n, srr - sr * sr / n
         determinant = sxx * syy - sxy * sxy
         a, b = (syy * sxr - sxy * syr) / determinant, (sxx * syr - sxy * sxr) / determinant

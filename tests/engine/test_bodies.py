@@ -125,6 +125,22 @@ def test_a_gear_goes_on_at_the_same_tooth(tmp_path):
     assert measured.series.ok.mean() > 0.9
 
 
+def _lit_wheel(scene, angle):
+    """Draw five spokes, each brighter the more it points upwards, and a mark on one of them."""
+    for along in angle + 2.0 * np.pi * np.arange(5) / 5.0:
+        end = 160.0 + 90.0 * np.cos(along), 120.0 - 90.0 * np.sin(along)
+        things.bar(scene, (160.0, 120.0), end, 14.0, (int(120.0 + 40.0 * np.sin(along)),) * 3)
+    things.disc(scene, (160.0 + 70.0 * np.cos(angle), 120.0 - 70.0 * np.sin(angle)), 5.0, (20, 20, 20))
+
+
+def test_a_wheel_under_light_from_above_does_not_jump_from_spoke_to_spoke(tmp_path):
+    turned = 200.0 * np.sin(np.arange(80) / 18.0)
+    measured = _measured(tmp_path, _lit_wheel, turned)
+    assert measured.doubt is None
+    assert np.abs(_error(measured, turned)).max() < 0.3
+    assert measured.series.ok.mean() > 0.9
+
+
 PIVOT = np.array([160.0, 120.0])
 
 

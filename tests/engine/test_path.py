@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from anglecam.engine.path import steadiest_path
+from anglecam.engine.path import most_from_motion, steadiest_path, unsteadiness
 
 TRUE = np.radians(7.0) * np.arange(40)
 
@@ -54,3 +54,23 @@ def test_a_body_that_jumps_is_not_hidden():
     true = np.where(np.arange(40) < 20, 0.0, 0.5)
     path, _ = steadiest_path([np.array([a]) for a in true], [np.array([30.0])] * 40, np.arange(40) / 30.0, 0.005)
     assert (path == 0).all()
+
+
+def test_a_turn_that_the_picture_rules_out_by_more_than_motion_can_say_is_on_no_way():
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        turns = [np.array([angle, rng.uniform(-np.pi, np.pi)]) for angle in TRUE % (2.0 * np.pi) - np.pi]
+        gains = [rng.normal(0.0, 20.0, 2) for _ in TRUE]
+        turns[15], gains[15] = turns[15][:2], np.array([0.0, -most_from_motion(0.01) - 1.0])
+        path, _ = steadiest_path(turns, gains, np.arange(40) / 30.0, 0.01)
+        assert path[15] != 1
+
+
+def test_a_way_that_jumps_to_a_look_alike_and_back_is_less_steady():
+    time = np.arange(40) / 30.0
+    jumps = TRUE.copy()
+    jumps[20:25] += np.radians(72.0)
+    assert unsteadiness(TRUE, time, 0.01) < 0.01
+    assert unsteadiness(jumps, time, 0.01) > 0.5
+    hidden = np.where((np.arange(40) > 20) & (np.arange(40) < 24), np.nan, TRUE)
+    assert unsteadiness(hidden, time, 0.01) < 0.01

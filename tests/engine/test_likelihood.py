@@ -1,0 +1,55 @@
+"""The sums over pixels are those of their definition, in double precision."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from anglecam.engine.likelihood import log_density, multiply_odds, pose_gains
+
+RNG = np.random.default_rng(4)
+PICTURE, MEAN, BACK = (RNG.uniform(0.0, 255.0, (30, 40)).astype(np.float32) for _ in range(3))
+MEAN[:, :20] = PICTURE[:, :20] + RNG.normal(0.0, 3.0, (30, 20))
+VARIANCE, BACK_VARIANCE = (RNG.uniform(1.0, 30.0, (30, 40)).astype(np.float32) for _ in range(2))
+
+
+def _expected(picture, mean, variance):
+    normal = stats.norm.pdf(picture.astype(float), mean, np.sqrt(variance.astype(float)))
+    known = np.isfinite(mean) & np.isfinite(picture)
+    return np.log(np.where(known, 0.98 * normal + 0.02 / 256.0, 1.0 / 256.0))
+
+
+def test_a_pixel_is_as_probable_as_the_mixture_says():
+    mean = MEAN.copy()
+    mean[3, 4] = np.nan
+    np.testing.assert_allclose(log_density(PICTURE, mean, VARIANCE), _expected(PICTURE, mean, VARIANCE), atol=1e-4)
+
+
+def test_odds_are_the_product_over_pictures():
+    odds = np.ones(PICTURE.shape)
+    picture = PICTURE.copy()
+    picture[7, 8] = np.nan
+    for _ in range(3):
+        multiply_odds(odds, picture, MEAN, VARIANCE, 2.0, BACK, BACK_VARIANCE)
+    log_odds = _expected(picture, MEAN, VARIANCE + 2.0) - _expected(picture, BACK, BACK_VARIANCE + 2.0)
+    np.testing.assert_allclose(np.log(odds), np.where(np.isfinite(picture), 3.0 * log_odds, 0.0), atol=1e-3)
+
+
+@pytest.mark.parametrize("shade", [0.0, 12.0])
+def test_the_gain_of_a_pose_is_the_sum_over_the_body(shade):
+    rows, columns = np.nonzero(np.ones((12, 14)))
+    places = np.column_stack([columns, rows]).astype(np.float32)
+    variance = VARIANCE[rows, columns]
+    body = np.column_stack([MEAN[rows + 5, columns + 3], variance, *np.full((2, len(rows)), shade)])
+    part = np.arange(len(rows)) % 3
+    pose = np.array([[[1.0, 0.0, 3.0], [0.0, 1.0, 5.0]]])
+    precision = 1.0 / (BACK_VARIANCE + 1.5)
+    found = pose_gains(
+        PICTURE, BACK, precision, np.float32(1.5), places, np.ascontiguousarray(body, np.float32), part, 3, pose
+    )
+    seen, behind = (one[rows + 5, columns + 3] for one in (PICTURE, BACK))
+    log_odds = _expected(seen, body[:, 0] + shade, variance + 1.5)  # unturned: the cosine is 1, the sine 0
+    log_odds -= _expected(seen, behind, BACK_VARIANCE[rows + 5, columns + 3] + 1.5)
+    expected = [log_odds[part == k].sum() for k in range(3)]
+    np.testing.assert_allclose(found[0], expected, rtol=1e-4, atol=0.05)
