@@ -16,7 +16,6 @@ _FAR = 9.0
 """Squared standard uncertainties by which a hint may be off the centre: true hints are so in 1 % of all films."""
 _CLICK_PX = 5.0
 """Standard uncertainty of each coordinate of a place that is pointed at, px of the film: by eye."""
-
 _LEAST_PART = 0.05
 """Of the area of a body's largest part, that of another one that counts."""
 

@@ -99,7 +99,8 @@ def _followed(camera: HeldCamera, rig: Rig, hints: Hints, learnt: Learnt, progre
         seen = _again(seen, again) or follow(camera, again.sample, partial(_candidates, again), progress)
         tried.append((search, seen, chosen(seen.found, seen.time, search)))
     # of motions that explain the film as well, the steadiest
-    search, seen, track = min(tried, key=lambda one: unsteadiness(one[2].turn, one[1].time, 1.0 / one[0].arm))
+    resolution = 1.0 / tried[0][0].arm
+    search, seen, track = min(tried, key=lambda one: unsteadiness(one[2].turn, one[1].time, resolution))
     jump = why_jump(track.turn, film.first_frame)
     if jump is not None:
         return jump
