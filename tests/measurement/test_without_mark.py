@@ -38,11 +38,12 @@ def _plate(scene, angle):
 )
 def test_a_body_without_a_mark_is_measured(tmp_path, monkeypatch, draw, by, rms_deg):
     monkeypatch.setattr(mark_pass, "find_mark", lambda *_, **__: None)
-    film = open_film(things.film(tmp_path / "clip.mkv", draw, SWING))
+    swing = SWING + 0.4  # never exactly upright: whole pixels of the finer scene draw a bar 0.1 px aside there
+    film = open_film(things.film(tmp_path / "clip.mkv", draw, swing))
     measured = measure_clip(film, Rig())
     assert measured.by in by
     assert measured.series.ok.all()
-    error = np.degrees(measured.series.angle) - SWING
+    error = np.degrees(measured.series.angle) - swing
     error -= np.median(error)
     assert np.sqrt((error**2).mean()) < rms_deg
     assert np.sqrt(((error / np.degrees(measured.series.sigma)) ** 2).mean()) < 1.5
