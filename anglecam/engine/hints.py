@@ -56,10 +56,8 @@ def beside_mark(fit: Fit, sample: Sample, hints: Hints) -> float:
     turn = fit.proposal.turn[k]
     if hints.mark_px is None or sample.frames[k] != hints.mark_frame or not np.isfinite(turn):
         return 0.0
-    count, labels, stats, _ = cv2.connectedComponentsWithStats((fit.target.visibility > 0.5).astype(np.uint8))
+    _, labels, stats, _ = cv2.connectedComponentsWithStats((fit.target.visibility > 0.5).astype(np.uint8))
     areas = stats[1:, cv2.CC_STAT_AREA]
-    if count < 2:
-        return 0.0
     parts = 1 + np.flatnonzero(areas >= _LEAST_PART * areas.max())
     rows, columns = np.nonzero(np.isin(labels, parts))
     places = np.column_stack([columns, rows]) - float(fit.target.pad)

@@ -58,13 +58,13 @@ def steadiest_path(
             path[k] = int(np.argmax(gains[k]))
         return path, margin
     angle, gain, time = [turns[k] for k in used], [gains[k] for k in used], times[used]
-    steps = [_wrapped(b[None, :] - a[:, None]) for a, b in pairwise(angle)]
+    steps = [wrapped(b[None, :] - a[:, None]) for a, b in pairwise(angle)]
     scale, longest = resolution, _FAST
     for _ in range(_ROUNDS):
         order, apart = _least_cost(steps, gain, time, (scale, longest), resolution)
         way = np.array([a[k] for a, k in zip(angle, order, strict=True)])
         scale = max(resolution, _usual_change(way, time))
-        longest = max(resolution, float(np.quantile(np.abs(_wrapped(np.diff(way))), _MOST)))
+        longest = max(resolution, float(np.quantile(np.abs(wrapped(np.diff(way))), _MOST)))
     chosen = np.array([g[k] for g, k in zip(gain, order, strict=True)])
     hidden = _hidden(way, chosen, time, (scale, longest), resolution)
     path[used], margin[used] = np.where(hidden, -1, order), np.where(hidden, np.inf, apart)
@@ -74,12 +74,20 @@ def steadiest_path(
 def unsteadiness(turn: Floats, time: Floats, resolution: float) -> float:
     """Return the mean cost of the changes along a way (n,), rad, NaN where it is unknown, at times (n,), s."""
     seen = np.isfinite(turn)
-    step, lasts = _wrapped(np.diff(turn[seen])), np.diff(time[seen])
-    if len(step) < 2:
+    if seen.sum() < 3:
         return np.inf
+    change, ratio = changes(turn[seen], time[seen])
+    return float(np.log1p((change / (resolution * np.maximum(1.0, ratio))) ** 2).mean())
+
+
+def changes(turn: Floats, time: Floats) -> tuple[Floats, Floats]:
+    """Return how much the steps of a way (n,), rad, change, and how long each lasts, as multiples of the one before it.
+
+    A step changes from what the speed before it would give. Both are (n - 2,); the first in rad, within half a turn.
+    """
+    step, lasts = wrapped(np.diff(turn)), np.diff(time)
     ratio = lasts[1:] / lasts[:-1]
-    change = _wrapped(step[1:] - step[:-1] * ratio) / (resolution * np.maximum(1.0, ratio))
-    return float(np.log1p(change**2).mean())
+    return wrapped(step[1:] - step[:-1] * ratio), np.asarray(ratio)
 
 
 def most_from_motion(resolution: float) -> float:
@@ -99,7 +107,7 @@ def _hidden(turn: Floats, gain: Floats, time: Floats, scales: tuple[float, float
     seen = np.ones(len(turn), bool)
     while seen.sum() > 4:
         at = np.flatnonzero(seen)
-        jumps = np.flatnonzero(np.abs(_wrapped(np.diff(turn[at]))) > _SAME * resolution) + 1
+        jumps = np.flatnonzero(np.abs(wrapped(np.diff(turn[at]))) > _SAME * resolution) + 1
         runs = [run for run in np.split(np.arange(len(at)), jumps) if len(run) < len(at) - 2]
         costs = [_cost_without(run, turn[at], gain[at], time[at], scales) for run in runs]
         best = int(np.argmin(costs)) if costs else 0
@@ -120,7 +128,7 @@ def _cost_without(
 
 
 def _motion_cost(turn: Floats, time: Floats, scales: tuple[float, float]) -> float:
-    step = _wrapped(np.diff(turn))[:, None, None]
+    step = wrapped(np.diff(turn))[:, None, None]
     triples = zip(step[:-1], step[1:], range(len(step) - 1), strict=True)
     return float(sum(_change_cost(a, b, time[k : k + 3], *scales).sum() for a, b, k in triples))
 
@@ -149,7 +157,7 @@ def _least_cost(
     order.reverse()
     apart = np.full(n, np.inf)
     for k, step in enumerate(steps):
-        other = np.abs(_wrapped(step - step[order[k], order[k + 1]])) > _SAME * resolution
+        other = np.abs(wrapped(step - step[order[k], order[k + 1]])) > _SAME * resolution
         if other.any():
             cost = until[k] + since[k]
             more = float(cost[other].min() - cost[order[k], order[k + 1]])
@@ -157,7 +165,8 @@ def _least_cost(
     return order, apart
 
 
-def _wrapped(turn: Floats) -> Floats:
+def wrapped(turn: Floats | float) -> Floats:
+    """Return angles, rad, within half a turn of zero."""
     return np.asarray((turn + np.pi) % _TURN - np.pi)
 
 
@@ -165,12 +174,12 @@ def _change_cost(before: Floats, after: Floats, time: Floats, scale: float, long
     """Return (a, b, c) cost of the step (b, c) after the step (a, b); a step may lead around either way."""
     first, second = time[1] - time[0], time[2] - time[1]
     expected = before[:, :, None] * (second / first)
-    change = _wrapped(after[None] - expected) / (scale * max(1.0, second / first))
+    change = wrapped(after[None] - expected) / (scale * max(1.0, second / first))
     step = np.log1p((after / longest) ** 2) + 0.5 * (after / _FAST) ** 2
     return np.asarray(np.log1p(change**2) + step[None])
 
 
 def _usual_change(angle: Floats, time: Floats) -> float:
     """Return the median change of the steps between turns, rad."""
-    step = _wrapped(np.diff(angle)) / np.diff(time)
-    return float(np.median(np.abs(_wrapped(np.diff(step) * np.diff(time)[1:]))))
+    step = wrapped(np.diff(angle)) / np.diff(time)
+    return float(np.median(np.abs(wrapped(np.diff(step) * np.diff(time)[1:]))))

@@ -84,7 +84,8 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
     if fit is None:
         return None
     poses = fit.proposal.poses(sample)
-    return replace(fit, target=learn_target(sample, poses, np.arange(len(poses)), lit=True))
+    target = learn_target(sample, poses, np.arange(len(poses)), lit=True)
+    return fit if body_of(target) is None else replace(fit, target=target)
 
 
 def _fitted(sample: Sample, proposal: Proposal, rounds: int) -> Fit | None:

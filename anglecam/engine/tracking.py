@@ -24,7 +24,7 @@ from anglecam.engine.body import (
     turns_to_try,
     with_ratio,
 )
-from anglecam.engine.path import most_from_motion, steadiest_path
+from anglecam.engine.path import changes, most_from_motion, steadiest_path, wrapped
 from anglecam.engine.refine import Fit, refine
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import NOTHING, carried_by, score
@@ -126,7 +126,7 @@ def _wrong_poses(search: Search) -> Floats:
             right, picture = proposal.turn[k], sample.pictures[k]
             frame = frame_of(target, picture, float(sample.excesses[k]))
             gain = float(gains_about(frame, body, search.centre, np.array([right]), shifts[k]).sum())
-            found = [(float(_wrapped(one.turn - right)), one.gain) for one in candidates(learnt, picture, shifts[k])]
+            found = [(float(wrapped(one.turn - right)), one.gain) for one in candidates(learnt, picture, shifts[k])]
             if gain > 0.0:
                 wrong += [(turn, 1.0 - less / gain) for turn, less in found if abs(turn) * search.arm > _APART_PX]
     return np.array(wrong).reshape(-1, 2)
@@ -151,7 +151,7 @@ def log_odds(search: Search, turn: Floats, gain: Floats) -> Floats:
     if len(odds) < 2:
         return np.asarray(odds)
     best, near = int(gain.argmax()), _APART_PX / search.arm
-    away = np.abs(_wrapped(search.wrong[:, 0] - (turn - turn[best])[:, None])) < near
+    away = np.abs(wrapped(search.wrong[:, 0] - (turn - turn[best])[:, None])) < near
     for i in np.flatnonzero(away.sum(axis=1) >= _FEWEST_ALIKE):
         shares = search.wrong[away[i], 1]
         usual = float(np.median(shares))
@@ -192,7 +192,7 @@ def _peaks(search: Search, gains: Floats) -> Floats:
     left, peaks = gains.copy(), list[float]()
     while len(peaks) < _PEAKS and np.isfinite(left).any():
         peaks.append(float(search.turns[int(left.argmax())]))
-        left[np.abs(_wrapped(search.turns - peaks[-1])) * search.arm <= _APART_PX] = -np.inf
+        left[np.abs(wrapped(search.turns - peaks[-1])) * search.arm <= _APART_PX] = -np.inf
     return np.array(peaks)
 
 
@@ -207,12 +207,8 @@ def _may_be(search: Search, turn: Floats, gain: Floats) -> Flags:
 
 def _another(search: Search, one: Turn, better: Turn) -> bool:
     """Return whether a pose is another one than a better one: not a lower peak beside it."""
-    away = abs(float(_wrapped(one.turn - better.turn))) * search.arm
+    away = abs(float(wrapped(one.turn - better.turn))) * search.arm
     return away > (_APART_PX if one.gain > _LIKE * better.gain else _BESIDE_PX)
-
-
-def _wrapped(turn: Floats | float) -> Floats:
-    return np.asarray((turn + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def steadier(
@@ -281,9 +277,7 @@ def _by_stretch(search: Search, turn: Floats, times: Floats, pictures: Sequence[
     seen = np.flatnonzero(np.isfinite(turn))
     if not pictures or len(seen) < _FEWEST:
         return None
-    step, lasts = _wrapped(np.diff(turn[seen])), np.diff(times[seen])
-    expected = step[:-1] * lasts[1:] / lasts[:-1]
-    change = np.abs(np.append(0.0, _wrapped(step[1:] - expected)))
+    change = np.abs(np.append(0.0, changes(turn[seen], times[seen])[0]))
     jumps = np.flatnonzero(change > max(_JUMP * float(np.median(change)), _APART_PX / search.arm))
     runs = [run for run in np.split(seen, jumps + 1) if len(run) >= _FEWEST]
     if len(jumps) == 0 or not runs:
