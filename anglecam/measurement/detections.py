@@ -119,8 +119,8 @@ def frame_of_mark(film: Film, mark: RigMark) -> Frame:
     return found
 
 
-def in_all_frames(ok: NDArray[np.bool_], places_px: Floats) -> Floats:
-    """Arrange the positions of the measured frames in all frames; NaN elsewhere."""
-    placed = np.full((len(ok), 2), np.nan)
-    placed[ok] = places_px
+def in_all_frames(ok: NDArray[np.bool_], values: Floats) -> Floats:
+    """Arrange values (m, …) of the measured frames in all frames (n, …); NaN elsewhere."""
+    placed = np.full((len(ok), *values.shape[1:]), np.nan)
+    placed[ok] = values
     return placed

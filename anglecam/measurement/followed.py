@@ -31,6 +31,14 @@ from anglecam.measurement.trust import why_doubtful, why_few, why_no_rotation, w
 from anglecam.progress import Progress, unseen
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
+from anglecam.vision.status import UNDECODABLE
+
+
+_MANY = 0.05
+"""Share of the frames without an angle of the mark from which on the body is looked for, too. It only saves time."""
+_ANOTHER = 3.0
+"""Usual difference of the mark's angle from the body's, in standard uncertainties, beyond which they are two bodies:
+of one it is 0.67."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,13 @@ class Followed:
     """Cause why the angle is not that of the whole body; ``None`` where it is."""
     doubt: str | None
     """Why the clip is no success although frames of it are measured; ``None`` where it is one."""
+
+
+    @property
+    def lost(self) -> float:
+        """Share of the decoded frames that are not measured."""
+        decoded = np.array([s != UNDECODABLE for s in self.detections.status])
+        return float((~self.ok[decoded]).mean()) if decoded.any() else 0.0
 
 
 def follow_mark_or_body(
@@ -89,15 +104,41 @@ def follow_mark_or_body(
     final = known is not None or film.undecodable == len(film.times) or rig.mark_rgb is not None
     if isinstance(by_mark, Followed):
         contradicted = why_not_as_declared(by_mark.detections, by_mark.ok, by_mark.angles, rig) is not None
-        if by_mark.doubt is None or contradicted or final or camera.unknown:
+        seen = by_mark.doubt is None and by_mark.lost < _MANY
+        if seen or contradicted or final or camera.unknown:
             return by_mark
     cause = camera.unknown or (by_mark if final else None) or detect_body(camera, rig, progress)
     by_body = _measured(film, rig, command, cause, progress) if isinstance(cause, Detections) else cause
     if isinstance(by_mark, Followed) and (isinstance(by_body, str) or by_body.doubt is not None):
         return by_mark
+    if isinstance(by_mark, Followed) and isinstance(by_body, Followed) and by_mark.doubt is None:
+        return _more_certain(by_mark, by_body)
     if isinstance(by_body, Followed):
         return by_body
     raise InputError(f"{film.path}: {by_body}")
+
+
+def _more_certain(by_mark: Followed, by_body: Followed) -> Followed:
+    """Return the mark's angles or those of the body, whichever leave less unknown of the film.
+
+    The expected logarithmic score of a forecast decides (Good, Journal of the Royal Statistical Society B 14, 1952):
+    where a frame is not measured, the angle is known as well as the spread of the motion. A body that does not turn as
+    the mark does is another one than the mark is on.
+    """
+    both = by_mark.ok & by_body.ok
+    marks, bodies = (
+        (in_all_frames(one.ok, one.angles.line), in_all_frames(one.ok, one.angles.sigma)) for one in (by_mark, by_body)
+    )
+    off = np.exp(1j * (marks[0] - bodies[0])[both])
+    off = np.angle(off / off.mean()) / np.hypot(marks[1], bodies[1])[both] if both.any() else np.array([np.inf])
+    if np.median(np.abs(off)) > _ANOTHER:
+        return by_mark
+    spread = max(float(np.std(np.unwrap(one.angles.line))) for one in (by_mark, by_body))
+    unknown = [
+        float(np.log(np.minimum(np.where(np.isfinite(sigma), sigma, spread), spread)).mean())
+        for _, sigma in (marks, bodies)
+    ]
+    return by_mark if unknown[0] <= unknown[1] else by_body
 
 
 def _measured(
