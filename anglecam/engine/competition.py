@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from anglecam.data.typing import Floats
+from anglecam.engine.path import middle
 from anglecam.engine.refine import Fit, refine
 from anglecam.engine.sample import Sample, noise_of
 from anglecam.engine.score import NOTHING, Proposal, Score, score
@@ -72,11 +73,15 @@ def compete(sample: Sample, proposals: Sequence[Proposal], declared: Sequence[Pr
     """
     small = halved(sample)
     still = score(small, NOTHING, [None] * len(small.pictures))
-    finalists = _unlike(sample, _in_order(small, declared, still), [], _FINALISTS // 2)
-    finalists += _unlike(sample, _in_order(small, proposals, still), finalists, _FINALISTS)
-    fits = [fit for proposal in finalists if (fit := refine(sample, proposal)) is not None]
-    rivals = [score(sample, NOTHING, [None] * len(sample.pictures)), *(slide_of(sample, fit).score for fit in fits)]
-    found = [_compared(fit, score(sample, fit.proposal.name, fit.proposal.poses(sample)), rivals) for fit in fits]
+    # a hint adds to what is found without one, and to what that is compared with it adds nothing
+    finalists = _unlike(sample, _in_order(small, proposals, still), [], _FINALISTS)
+    pointed_at = _unlike(sample, _in_order(small, declared, still), finalists, _FINALISTS // 2)
+    rivals = [score(sample, NOTHING, [None] * len(sample.pictures))]
+    found: list[Explanation] = []
+    for some in (finalists, pointed_at):
+        fits = [fit for proposal in some if (fit := refine(sample, proposal)) is not None]
+        rivals += [slide_of(sample, fit).score for fit in fits]
+        found += [_compared(fit, score(sample, fit.proposal.name, fit.proposal.poses(sample)), rivals) for fit in fits]
     return sorted(found, key=lambda one: (not one.turns, -one.score.total if one.turns else -one.lead))
 
 
@@ -122,7 +127,7 @@ def _all_turns(proposal: Proposal, fit: Fit) -> Floats:
     """Return the turns of a proposal with those of every other frame as they were fitted."""
     turn, fitted = proposal.turn.copy(), fit.proposal.turn
     both = np.isfinite(turn[::2]) & np.isfinite(fitted)
-    turn -= np.median(turn[::2][both] - fitted[both]) if both.any() else 0.0
+    turn -= middle(turn[::2][both] - fitted[both]) if both.any() else 0.0
     turn[::2] = np.where(np.isfinite(fitted), fitted, turn[::2])
     return turn
 
@@ -136,8 +141,8 @@ def _alike(sample: Sample, one: Proposal, other: Proposal) -> bool:
     height, width = sample.pictures.shape[1:]
     corners = np.array([[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]]) * [width, height]
     first, second = (np.stack([pose for pose in p.poses(sample) if pose is not None]) for p in seen)
-    base = np.median(one.turn[both] - other.turn[both])
-    back = turned(sample.place(other.centre_px), float(base))
+    base = middle(one.turn[both] - other.turn[both])
+    back = turned(sample.place(other.centre_px), base)
     placed = corners @ first[:, :, :2].swapaxes(1, 2) + first[:, None, :, 2]
     moved = (corners @ back[:, :2].T + back[:, 2]) @ second[:, :, :2].swapaxes(1, 2) + second[:, None, :, 2]
     return float(np.median(np.hypot(*np.moveaxis(placed - moved, -1, 0)))) < _APART_PX

@@ -170,6 +170,11 @@ def wrapped(turn: Floats | float) -> Floats:
     return np.asarray((turn + np.pi) % _TURN - np.pi)
 
 
+def middle(turn: Floats) -> float:
+    """Return the direction, rad, of the median of the unit vectors of some angles (n,), which may lie around a circle."""
+    return float(np.arctan2(np.median(np.sin(turn)), np.median(np.cos(turn))))
+
+
 def _change_cost(before: Floats, after: Floats, time: Floats, scale: float, longest: float) -> Floats:
     """Return (a, b, c) cost of the step (b, c) after the step (a, b); a step may lead around either way."""
     first, second = time[1] - time[0], time[2] - time[1]

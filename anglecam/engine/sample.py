@@ -7,7 +7,7 @@ reduced, so that memory and time do not grow with the film.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
 import cv2
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
+from anglecam.engine.tint import tinted
 
 FRAMES = 48
 """Frames of a sample, at most."""
@@ -71,6 +72,8 @@ class Sample:
     """Standard deviation of a pixel where nothing moves, grey levels, the codec's errors included."""
     median: NDArray[np.float32] = field(repr=False)
     """(h, w) of the pictures; the light of other frames is compared with it."""
+    tint: Floats | None = None
+    """(3,) mixture of colours that the pictures show (`anglecam.engine.tint`); ``None``: their brightness."""
 
     def excess(self, picture: NDArray[np.float32]) -> float:
         """Return by how much the variance of a pixel at rest is larger in a frame than usual, grey levels²."""
@@ -109,7 +112,7 @@ class Sample:
         height, width = self.median.shape
         left, top = self.corner_px.astype(int)
         part = np.s_[top : top + round(height / self.scale), left : left + round(width / self.scale)]
-        return in_light(_seen(image, move, self.scale, part, (width, height)), self.median)
+        return in_light(_seen(image, move, self.scale, part, (width, height), self.tint), self.median)
 
     def in_film(self, place: Floats) -> Floats:
         """Map places (…, 2) of the sample to the film, px."""
@@ -121,11 +124,20 @@ class Stills:
     """K frames spread over a film."""
 
     images: Sequence[Image] = field(repr=False)
-    """(height, width, 3), BGR."""
+    """(height, width, 3), BGR, or (height, width[, 1]) brightness."""
     moves: Sequence[Floats | None]
     """For each the (2, 3) affine map from the picture of a camera at rest to the frame, px; ``None`` for none."""
     frames: NDArray[np.int64]
     """(K,) their numbers in the film."""
+    tint: Floats | None = None
+    """(3,) mixture of colours by which they are seen; ``None``: by their brightness."""
+
+    def seen(
+        self, scale: float, part: tuple[slice, slice] = np.s_[:, :], size: tuple[int, int] | None = None
+    ) -> NDArray[np.float32]:
+        """Return (K, h, w) the same part of all frames, reduced, as a camera at rest sees it."""
+        shown = zip(self.images, self.moves, strict=True)
+        return np.stack([_seen(image, move, scale, part, size, self.tint) for image, move in shown])
 
 
 def sample_stills(stills: Stills) -> list[Sample]:
@@ -144,7 +156,7 @@ def sample_stills(stills: Stills) -> list[Sample]:
     """
     height, width = stills.images[0].shape[:2]
     small = min(1.0, LONGEST_PX / max(width, height))
-    whole = np.stack([_seen(*one, small) for one in zip(stills.images, stills.moves, strict=True)])
+    whole = stills.seen(small)
     boxes = changed_boxes(steady_light(whole[_alike(whole)]))
     found = (sample_part(stills, box / small) for box in boxes)
     return [one for one in found if one is not None]
@@ -171,11 +183,12 @@ def sample_part(stills: Stills, box_px: Floats) -> Sample | None:
         return None
     scale = min(1.0, LONGEST_PX / max(right - left, bottom - top))
     part = np.s_[top:bottom, left:right]
-    pictures = np.stack([_seen(*one, scale, part) for one in zip(stills.images, stills.moves, strict=True)])
+    pictures = stills.seen(scale, part)
     shown = _alike(pictures)
     if shown.sum() < _LEAST_FRAMES:
         return None
-    return sample_of(pictures[shown], stills.frames[shown], scale, np.array([left, top]))
+    seen = sample_of(pictures[shown], stills.frames[shown], scale, np.array([left, top]))
+    return replace(seen, tint=stills.tint)
 
 
 def _alike(pictures: NDArray[np.float32]) -> NDArray[np.bool_]:
@@ -256,17 +269,20 @@ def _seen(
     image: Image,
     move: Floats | None,
     scale: float,
-    part: tuple[slice, slice] = np.s_[:, :],
-    size: tuple[int, int] | None = None,
+    part: tuple[slice, slice],
+    size: tuple[int, int] | None,
+    tint: Floats | None,
 ) -> NDArray[np.float32]:
-    """Return a part of a frame as a camera at rest sees it, grey and reduced."""
-    grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if image.ndim == 3 and image.shape[2] == 3 else image.squeeze()
+    """Return a part of a frame as a camera at rest sees it, in one colour and reduced."""
+    coloured = image.ndim == 3 and image.shape[2] == 3
+    shown = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY) if coloured and tint is None else image.squeeze()
     if move is not None:
         still = cv2.WARP_INVERSE_MAP | cv2.INTER_LINEAR
-        grey = cv2.warpAffine(grey, move, grey.shape[::-1], flags=still, borderMode=cv2.BORDER_REPLICATE)
-    height, width = grey[part].shape
-    shown = size or (max(1, round(width * scale)), max(1, round(height * scale)))
-    return cv2.resize(grey[part], shown, interpolation=cv2.INTER_AREA).astype(np.float32)
+        shown = cv2.warpAffine(shown, move, shown.shape[1::-1], flags=still, borderMode=cv2.BORDER_REPLICATE)
+    height, width = shown[part].shape[:2]
+    size = size or (max(1, round(width * scale)), max(1, round(height * scale)))
+    reduced = cv2.resize(shown[part], size, interpolation=cv2.INTER_AREA)
+    return reduced.astype(np.float32) if tint is None else tinted(reduced, tint)
 
 
 def changed_boxes(pictures: NDArray[np.float32]) -> list[Floats]:

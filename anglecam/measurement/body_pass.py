@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -20,6 +20,7 @@ from anglecam.engine.reasons import why_ambiguous, why_jump, why_not_as_hinted, 
 from anglecam.engine.refine import sensitivities
 from anglecam.engine.sample import FRAMES, Sample, Stills
 from anglecam.engine.target import Picture as Grey
+from anglecam.engine.tint import tint_of
 from anglecam.engine.tracking import Search, Track, candidates, chosen, search_for, steadier
 from anglecam.io.rig import Rig
 from anglecam.measurement.camera_pass import HeldCamera
@@ -73,7 +74,7 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
         pictures = sorted([*pictures, _picture(film, hints.mark_frame)], key=lambda picture: picture.index)
     looked: list[Learnt] = []
     doubtful: Detections | None = None
-    for learnt in looks(stills_of(pictures, camera), hints):
+    for learnt in _looks(pictures, camera, hints):
         looked.append(learnt)
         if rank(learnt, hints) == 0:
             found = _followed(camera, rig, hints, learnt, progress)
@@ -86,6 +87,14 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     if best is None or not best.turns:
         return why_nothing_turns(best, film.first_frame)
     return _followed(camera, rig, hints, best, progress)
+
+
+def _looks(pictures: list[Picture], camera: HeldCamera, hints: Hints) -> Iterator[Learnt]:
+    """Look at pictures of a clip by their brightness, and then by their colour."""
+    yield from looks(stills_of(pictures, camera), hints)
+    tint = tint_of([image for picture in pictures if (image := picture.colours) is not None])
+    if tint is not None:
+        yield from looks(stills_of(pictures, camera, tint), hints)
 
 
 def _followed(camera: HeldCamera, rig: Rig, hints: Hints, learnt: Learnt, progress: Progress) -> Detections | str:
@@ -141,22 +150,22 @@ def _picture(film: Film, index: int) -> Picture:
     return next(picture for picture, _ in film.pictures(lambda _: None) if picture.index == index)
 
 
-def _image(picture: Picture, camera: HeldCamera) -> Image | None:
-    """Return a picture as the body is sought in it: its colours are needed where the scenery is followed."""
-    return picture.brightness if camera.steady is None else picture.colours
+def _image(picture: Picture, camera: HeldCamera, tint: Floats | None) -> Image | None:
+    """Return a picture as the body is sought in it: its colours are needed where the scenery is followed, too."""
+    return picture.brightness if camera.steady is None and tint is None else picture.colours
 
 
-def stills_of(pictures: list[Picture], camera: HeldCamera) -> Stills:
-    """Return pictures, without those in which the camera's motion is unknown."""
+def stills_of(pictures: list[Picture], camera: HeldCamera, tint: Floats | None = None) -> Stills:
+    """Return pictures, without those in which the camera's motion is unknown, by brightness or by a mixture of colours."""
     images, maps, numbers = list[Image](), list[Floats | None](), list[int]()
     for picture in pictures:
-        image = _image(picture, camera)
+        image = _image(picture, camera, tint)
         move = None if image is None else _move(image, picture, camera.steady)
         if image is not None and (move is None or move.known):
             images.append(image)
             maps.append(None if move is None else _affine(move))
             numbers.append(picture.index)
-    return Stills(images, maps, np.array(numbers))
+    return Stills(images, maps, np.array(numbers), tint)
 
 
 def _move(image: Image, picture: Picture, steady: CameraMotion | None) -> CameraMove | None:
@@ -208,7 +217,7 @@ def follow(camera: HeldCamera, sample: Sample, find: Find, progress: Progress) -
     moves, found, kept = list[CameraMove](), list[list[Turn]](), list[Image | None]()
     keep = film.count * sample.median.size < _KEPT_BYTES
     before: Image | None = None
-    shown = film.pictures(lambda picture: _image(picture, camera))
+    shown = film.pictures(lambda picture: _image(picture, camera, sample.tint))
     for picture, image in watched(shown, progress, "following what turns", film.count):
         time.append(picture.time)
         decoded.append(image is not None)

@@ -90,7 +90,8 @@ def other_bodies(
         In the order in which they were found, which is that of how surely.
     """
     rig = of_any_body(rig)
-    stills = stills_of(moving_stills(camera.film), camera)
+    learnt = first.detections.learnt
+    stills = stills_of(moving_stills(camera.film), camera, None if learnt is None else learnt.sample.tint)
     measured = _of_first(first, rig)
     known: list[_Known | None] = [measured]
     progress(Stage("looking for what else moves"))
