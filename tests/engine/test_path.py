@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from anglecam.engine.path import most_from_motion, steadiest_path, unsteadiness
+from anglecam.engine.path import middle, most_from_motion, steadiest_path, unsteadiness
 
 TRUE = np.radians(7.0) * np.arange(40)
 
@@ -74,3 +74,10 @@ def test_a_way_that_jumps_to_a_look_alike_and_back_is_less_steady():
     assert unsteadiness(jumps, time, 0.01) > 0.5
     hidden = np.where((np.arange(40) > 20) & (np.arange(40) < 24), np.nan, TRUE)
     assert unsteadiness(hidden, time, 0.01) < 0.01
+
+
+def test_the_middle_of_angles_is_the_same_all_around_the_circle():
+    off = np.radians([-4.0, -1.0, 0.0, 1.0, 4.0, 170.0])
+    for turn in np.radians(np.arange(-180.0, 181.0, 30.0)):
+        around = (off + turn + np.pi) % (2.0 * np.pi) - np.pi
+        assert abs(np.angle(np.exp(1j * (middle(around) - turn)))) < np.radians(1.5)
