@@ -243,15 +243,15 @@ def _surest(rest: Rest, found: Sequence[Explanation], known: Sequence[Proposal])
             joint = next((k for k, body in enumerate(known) if _carries(body, proposal)), None)
             if joint is None or turns_relative(known[joint], proposal):
                 return Moving(proposal, masked, one.fit, lead, "turns", joint, rest.targets)
-    for one in sorted(found, key=lambda one: -one.score.total):
-        slide = slide_of(masked, one.fit)
-        lead = min(slide.score.lead(rival) for rival in rivals)
-        if lead >= SURE and one.score.lead(slide.score) < SURE:
-            motion = _as_translation(masked, slide.poses)
-            return Moving(motion, masked, one.fit, lead, "translates", before=rest.targets)
-        lead = min(one.score.lead(rival) for rival in rivals)
+    slides = [slide_of(masked, one.fit) for one in found]
+    others: list[tuple[Score, Explanation, Sequence[Floats | None] | None]] = [(one.score, one, None) for one in found]
+    others += [(slide.score, one, slide.poses) for one, slide in zip(found, slides, strict=True)]
+    for score_of, one, poses in sorted(others, key=lambda other: -other[0].total):
+        lead = min(score_of.lead(rival) for rival in rivals)
         if lead >= SURE:
-            return Moving(one.fit.proposal, masked, one.fit, lead, "otherwise", before=rest.targets)
+            motion = one.fit.proposal if poses is None else _as_translation(masked, poses)
+            how = "otherwise" if poses is None else "translates"
+            return Moving(motion, masked, one.fit, lead, how, before=rest.targets)
     return None
 
 

@@ -171,8 +171,9 @@ def wrapped(turn: Floats | float) -> Floats:
 
 
 def middle(turn: Floats) -> float:
-    """Return the direction, rad, of the median of the unit vectors of some angles (n,), which may lie around a circle."""
-    return float(np.arctan2(np.median(np.sin(turn)), np.median(np.cos(turn))))
+    """Return the median of angles (n,), rad, which may lie around a circle: of their distances from their direction."""
+    around = float(np.arctan2(np.median(np.sin(turn)), np.median(np.cos(turn))))
+    return around + float(np.median(wrapped(turn - around)))
 
 
 def _change_cost(before: Floats, after: Floats, time: Floats, scale: float, longest: float) -> Floats:

@@ -1,9 +1,9 @@
 """Pictures without their brightness: what differs in colour alone.
 
 Light and shadows multiply all three colours of a pixel, so that the logarithms of their ratios do not change
-(Finlayson, Hordley, Lu and Drew, IEEE Transactions on Pattern Analysis and Machine Intelligence 28, 2006). A shadow that
-passes is not seen in them, and a body that is as bright as the wall behind it may be. Of the two ratios that mixture is
-taken in which what changes differs most from the noise.
+(Finlayson, Hordley, Lu and Drew, IEEE Transactions on Pattern Analysis and Machine Intelligence 28, 2006). In them, a
+shadow that passes is not seen, and a body that is as bright as the wall behind it may be. The two ratios are mixed so
+that what changes differs most from the noise.
 """
 
 from __future__ import annotations

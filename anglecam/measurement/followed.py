@@ -33,7 +33,6 @@ from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.status import UNDECODABLE
 
-
 _MANY = 0.05
 """Share of the frames without an angle of the mark from which on the body is looked for, too. It only saves time."""
 _ANOTHER = 3.0
@@ -56,7 +55,6 @@ class Followed:
     """Cause why the angle is not that of the whole body; ``None`` where it is."""
     doubt: str | None
     """Why the clip is no success although frames of it are measured; ``None`` where it is one."""
-
 
     @property
     def lost(self) -> float:

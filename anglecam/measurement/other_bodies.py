@@ -24,11 +24,12 @@ from anglecam.engine.target import Picture
 from anglecam.engine.tracking import Search, candidates, chosen, search_for
 from anglecam.io.rig import Rig, RigPivot
 from anglecam.measurement.angles import Angles, coarse_angles
-from anglecam.measurement.body_pass import follow, moving_stills, rigid_motion, stills_of
+from anglecam.measurement.body_pass import rigid_motion
 from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.followed import Followed
 from anglecam.measurement.rigid_motion import RigidMotion
+from anglecam.measurement.seen_frames import follow, moving_stills, stills_of
 from anglecam.progress import Progress, Stage, unseen
 from anglecam.vision.pivot.estimate import PivotEstimate
 

@@ -100,7 +100,8 @@ def proposals(sample: Sample, near_px: Sequence[Floats] = ()) -> list[Proposal]:
     for sharp in (False, True):
         coarse, fine = _stack(sample, *_COARSE, sharp), _stack(sample, *_FINE, sharp)
         near = [(sample.place(at) + 0.5) * coarse.scale - 0.5 for at in near_px]
-        runs.append([(fine.scale, one) for one in _search(coarse, fine, near)] if len(coarse.changed[0]) > 0 else [])
+        change = min(len(coarse.changed[0]), len(fine.changed[0])) > 0
+        runs.append([(fine.scale, one) for one in _search(coarse, fine, near)] if change else [])
     mixed = [one for pair in itertools.zip_longest(*runs) for one in pair if one is not None]
     return [
         Proposal(
