@@ -78,8 +78,9 @@ def compete(sample: Sample, proposals: Sequence[Proposal], declared: Sequence[Pr
     pointed_at = _unlike(sample, _in_order(small, declared, still), finalists, _FINALISTS // 2)
     rivals = [score(sample, NOTHING, [None] * len(sample.pictures))]
     found: list[Explanation] = []
+    seen_small = np.arange(0, len(sample.pictures), 2)
     for some in (finalists, pointed_at):
-        fits = [fit for proposal in some if (fit := refine(sample, proposal)) is not None]
+        fits = [fit for proposal in some if (fit := refine(sample, proposal, surest=seen_small)) is not None]
         rivals += [slide_of(sample, fit).score for fit in fits]
         found += [_compared(fit, score(sample, fit.proposal.name, fit.proposal.poses(sample)), rivals) for fit in fits]
     return sorted(found, key=lambda one: (not one.turns, -one.score.total if one.turns else -one.lead))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import special
 
 from anglecam.data.typing import Flags, Floats
@@ -62,7 +63,9 @@ class Fit:
         return np.isfinite(self.proposal.turn)
 
 
-def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
+def refine(
+    sample: Sample, proposal: Proposal, rounds: int = 2, *, surest: NDArray[np.int64] | None = None
+) -> Fit | None:
     """Fit a body to a sample, starting from a proposal.
 
     Parameters
@@ -73,6 +76,9 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
         Off by some pixels at most.
     rounds : int
         Of learning and locating in turn.
+    surest : (m,) ndarray of int, optional
+        Frames of which the turns are known best: the first round learns from them alone. Where the turns of some frames
+        are off from those of the others, the body would be learnt twice, beside itself, and the turns stay off.
 
     Returns
     -------
@@ -80,7 +86,7 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
         ``None`` where nothing follows the proposal.
     """
     # a body that changes with the light is much like one that is displaced: its centre is found without
-    fit = _fitted(sample, proposal, rounds)
+    fit = _fitted(sample, proposal, rounds, surest)
     if fit is None:
         return None
     poses = fit.proposal.poses(sample)
@@ -88,10 +94,11 @@ def refine(sample: Sample, proposal: Proposal, rounds: int = 2) -> Fit | None:
     return fit if body_of(target) is None else replace(fit, target=target)
 
 
-def _fitted(sample: Sample, proposal: Proposal, rounds: int) -> Fit | None:
-    fit = None
-    for _ in range(rounds):
-        target = learn_target(sample, proposal.poses(sample), np.arange(len(sample.pictures)))
+def _fitted(sample: Sample, proposal: Proposal, rounds: int, surest: NDArray[np.int64] | None) -> Fit | None:
+    fit, every = None, np.arange(len(sample.pictures))
+    for n in range(rounds):
+        use = every if n or surest is None else surest
+        target = learn_target(sample, proposal.poses(sample), use)
         body = body_of(target)
         if body is None:
             return fit
