@@ -21,14 +21,14 @@ from anglecam.vision.image.transforms import rotation
 from anglecam.vision.registration.appearance import HIDDEN_MISFIT, TileAppearance, compare_tiles
 from anglecam.vision.stabilise.scenery import Scenery, scenery_motion
 from anglecam.vision.stabilise.tile_cuts import as_views, brightness, cut_tiles
-from anglecam.vision.stabilise.windows import follow_windows, subtract_local_mean
+from anglecam.vision.stabilise.windows import TOLERANCE_PX, follow_windows, subtract_local_mean
 
 _MAX_STEPS = 4
 """Gauss-Newton steps; from an error of a few hundredths of a pixel one step is nearly enough."""
 _SETTLED_PX = 5e-3
 """Step below which the iteration ends, px."""
-_MIN_INFORMATION = 0.3
-"""Least share of the tiles' information, in every direction, that a frame must show."""
+_MIN_SEEN = 0.3
+"""Least share of the tiles that a frame must show."""
 _MAX_LIGHT_CHANGE = 0.4
 """Largest relative change of contrast that light causes."""
 _MAX_MISFIT = 4.0
@@ -129,8 +129,7 @@ class BackgroundMotion:
             seen &= misfit < HIDDEN_MISFIT * usual
             normals, gradients = fit.weighted(self.variance * usual)
             normal = normals[seen].sum(axis=0)
-            shares = np.linalg.eigvals(np.linalg.solve(normals.sum(axis=0)[1:, 1:], normal[1:, 1:]))
-            if shares.min() < _MIN_INFORMATION:
+            if seen.mean() < _MIN_SEEN or np.linalg.eigvalsh(normal[1:, 1:])[0] < 1.0 / TOLERANCE_PX**2:
                 return _unknown(origin)
             step, covariance = solve_motion(normal, gradients[seen].sum(axis=0), self.rolls)
             shift, roll = shift - step[1:] @ rotation(roll), roll + float(step[0])
