@@ -102,7 +102,8 @@ def follow_mark_or_body(
     final = known is not None or film.undecodable == len(film.times) or rig.mark_rgb is not None
     if isinstance(by_mark, Followed):
         contradicted = why_not_as_declared(by_mark.detections, by_mark.ok, by_mark.angles, rig) is not None
-        seen = by_mark.doubt is None and by_mark.lost < _MANY
+        # a declared neutral is a direction of the line to the mark
+        seen = by_mark.doubt is None and (by_mark.lost < _MANY or rig.neutral != "auto")
         if seen or contradicted or final or camera.unknown:
             return by_mark
     cause = camera.unknown or (by_mark if final else None) or detect_body(camera, rig, progress)

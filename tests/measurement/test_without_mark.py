@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from anglecam.io.rig import Rig
-from anglecam.measurement import mark_pass
+from anglecam.measurement import followed, mark_pass
 from anglecam.measurement.clip import measure_clip
 from anglecam.video.open_film import open_film
 from support import things
@@ -49,17 +49,33 @@ def test_a_body_without_a_mark_is_measured(tmp_path, monkeypatch, draw, by, rms_
     assert np.sqrt(((error / np.degrees(measured.series.sigma)) ** 2).mean()) < 1.5
 
 
-def test_a_stick_is_measured_where_its_mark_comes_and_goes(tmp_path):
-    seen = iter(np.arange(len(SWING)) % 12 < 5)
+def _with_blinking_mark(folder, shown, rig, rgb=(40, 160, 60)):
+    """Measure a stick with a mark that is shown in so many of 12 frames."""
+    seen = iter(np.arange(len(SWING)) % 12 < shown)
 
     def blinking(scene, angle):
         things.stick((120, 90, 60), 16.0, PIVOT, 130.0)(scene, angle)
         if next(seen):
-            things.disc(scene, things.hanging(PIVOT, 115.0, angle), 9.0, (40, 160, 60))
+            things.disc(scene, things.hanging(PIVOT, 115.0, angle), 9.0, rgb)
 
-    measured = measure_clip(open_film(things.film(tmp_path / "clip.mkv", blinking, SWING)), Rig())
+    return measure_clip(open_film(things.film(folder / "clip.mkv", blinking, SWING)), rig)
+
+
+def test_a_stick_is_measured_where_its_mark_comes_and_goes(tmp_path):
+    measured = _with_blinking_mark(tmp_path, 5, Rig())
     assert measured.doubt is None
     error = np.degrees(measured.series.angle) - SWING
     error -= np.nanmedian(error)
     assert measured.series.ok.mean() > 0.9
     assert np.sqrt(np.nanmean(error**2)) < 0.1
+
+
+@pytest.mark.parametrize(("neutral", "by"), [(-90.0, "mark"), ("auto", "body")])
+def test_a_mark_with_a_declared_neutral_is_kept_where_it_comes_and_goes(tmp_path, monkeypatch, neutral, by):
+    monkeypatch.setattr(followed, "register_clip", lambda *_: "off")
+    measured = _with_blinking_mark(tmp_path, 9, Rig(neutral=neutral), (200, 30, 30))
+    ok = measured.series.ok
+    assert measured.by == by
+    assert ok.mean() == pytest.approx(0.75 if by == "mark" else 1.0, abs=0.05)
+    error = (np.degrees(measured.series.angle) - SWING)[ok]
+    assert np.abs(error if by == "mark" else error - np.median(error)).max() < 1.0
