@@ -77,7 +77,7 @@ def refine(
     rounds : int
         Of learning and locating in turn.
     surest : (m,) ndarray of int, optional
-        Frames of which the turns are known best: the first round learns from them alone. Where the turns of some frames
+        Frames of which the turns are known best: a round before learns from them alone. Where the turns of some frames
         are off from those of the others, the body would be learnt twice, beside itself, and the turns stay off.
 
     Returns
@@ -96,8 +96,7 @@ def refine(
 
 def _fitted(sample: Sample, proposal: Proposal, rounds: int, surest: NDArray[np.int64] | None) -> Fit | None:
     fit, every = None, np.arange(len(sample.pictures))
-    for n in range(rounds):
-        use = every if n or surest is None else surest
+    for use in [*([] if surest is None else [surest]), *[every] * rounds]:
         target = learn_target(sample, proposal.poses(sample), use)
         body = body_of(target)
         if body is None:
