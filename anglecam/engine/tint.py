@@ -24,7 +24,8 @@ _LEVELS, _MIDDLE = 64.0, 128.0
 _SMALL_PX = 120
 """Longer side of the pictures from which the mixture is found."""
 _LEAST = 1e-4
-"""Variance of a ratio below which a film is grey: 1/100, a grey level of a hundred."""
+"""Standard deviation of a ratio below which a film is grey: a hundredth of a grey level of a hundred, far less than the
+rounding of colours gives."""
 
 
 def tint_of(images: Sequence[Image]) -> Floats | None:

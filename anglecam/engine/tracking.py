@@ -24,7 +24,7 @@ from anglecam.engine.body import (
     turns_to_try,
     with_ratio,
 )
-from anglecam.engine.path import changes, most_from_motion, steadiest_path, wrapped
+from anglecam.engine.path import changes, middle, most_from_motion, steadiest_path, wrapped
 from anglecam.engine.refine import Fit, refine
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import NOTHING, carried_by, score
@@ -250,9 +250,8 @@ def _as_well(search: Search, turn: Floats) -> Search | None:
     both = np.isfinite(at_sample) & np.isfinite(known.turn)
     if both.sum() < _FEWEST:
         return None
-    turned = np.exp(1j * (at_sample - known.turn)[both])
-    usual = np.median(turned.real) + 1j * np.median(turned.imag)
-    if np.abs(np.angle(turned / usual)).max() * search.arm < _APART_PX:
+    off = (at_sample - known.turn)[both]
+    if np.abs(wrapped(off - middle(off))).max() * search.arm < _APART_PX:
         return None
     fit = refine(sample, replace(known, name="steady motion", turn=at_sample))
     if fit is None:

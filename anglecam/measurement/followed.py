@@ -34,7 +34,8 @@ from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.status import UNDECODABLE
 
 _MANY = 0.05
-"""Share of the frames without an angle of the mark from which on the body is looked for, too. It only saves time."""
+"""Share of the frames without an angle of the mark from which on the body is looked for, too. It saves that time in
+films in which the body could add few frames; it does not choose between the two."""
 _ANOTHER = 3.0
 """Usual difference of the mark's angle from the body's, in standard uncertainties, beyond which they are two bodies:
 of one it is 0.67."""
