@@ -99,6 +99,8 @@ class Data:
     """As initially assumed. It determines which unknowns are free."""
     prior: Floats
     """(3, 3) prior information on pivot and direction, 1/px² and 1/rad²."""
+    wander_px: Floats
+    """(frames, 2) displacement of the pivot in each frame."""
 
     @property
     def free(self) -> NDArray[np.intp]:
@@ -125,7 +127,10 @@ class Data:
     def seen(self, state: State) -> list[TileViews]:
         """Return the views with offsets from those centres."""
         off = self.centres(state) - (self.start_px + self.tiles.heights[:, None] * self.axis.parallax)
-        return [replace(v, offsets=v.offsets - shift) for v, shift in zip(self.views, off, strict=True)]
+        return [
+            replace(v, offsets=v.offsets - shift - np.repeat(self.wander_px, np.diff(v.starts), axis=0))
+            for v, shift in zip(self.views, off, strict=True)
+        ]
 
     def prior_in(self, state: State) -> Floats:
         """Return the prior information (free, free)."""
@@ -160,7 +165,7 @@ class Round:
 
 def alternate(data: Data, state: State) -> Round:
     """Alternate between appearance and state until the centres of rotation settle; return the last round."""
-    appearance = _learn_all(data, data.views.__getitem__, state)
+    appearance = _learn_all(data, data.seen(state).__getitem__, state)
     now = one_round(data, state, appearance, None, np.ones(len(appearance)))
     accelerated, origin = _acceleration(data.axis), state
     for done in range(1, _MAX_ROUNDS):

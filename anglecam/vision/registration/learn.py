@@ -16,9 +16,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats
 from anglecam.vision.image.clusters import group_neighbours
+from anglecam.vision.image.transforms import rotation
 from anglecam.vision.pivot.estimate import PivotEstimate
 from anglecam.vision.registration.alternation import Data, Round, State, alternate, compare_all, one_round
 from anglecam.vision.registration.appearance import join_tiles
@@ -33,7 +35,7 @@ from anglecam.vision.registration.centre_equations import (
     effective_centre,
 )
 from anglecam.vision.registration.own_centres import have_own_centres
-from anglecam.vision.registration.pivot_wander import excess_displacement, pivot_wander
+from anglecam.vision.registration.pivot_wander import displacements, excess_displacement, pivot_wander
 from anglecam.vision.registration.tile_choice import choose_tiles
 from anglecam.vision.registration.tiles import (
     TILE_SIDE_PX,
@@ -88,7 +90,10 @@ def learn_body(
     tiles = choose_tiles(stack, plane, pivot.centre_px, noise)
     if len(tiles.corners) < _FEWEST_TILES:
         return None
+    moving = frames[0].pivot_covariance_px2 is not None
     data, last = _learn(frames, tiles, plane, pivot)
+    if not moving:
+        data, last = _where_it_wandered(data, last)
     end = _at_the_end(data, last)
     if not plane.axis.parallax.any():
         height, width = frames[0].image.shape[:2]
@@ -97,15 +102,20 @@ def learn_body(
         if have_own_centres(*end, last.state.turns, arms, deep.axis.parallax):
             tiles = choose_tiles(stack, deep, pivot.centre_px, noise)
             if len(tiles.corners) >= _FEWEST_TILES:
-                plane, (data, last) = deep, _learn(frames, tiles, deep, pivot, last.state)
+                plane, (data, last) = deep, _learn(frames, tiles, deep, pivot, last.state, data.wander_px)
                 end = _at_the_end(data, last)
     if not _is_seen(end):
         return None
-    return _body(data, last, end, plane, moving=frames[0].pivot_covariance_px2 is not None)
+    return _body(data, last, end, plane, moving)
 
 
 def _learn(
-    frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, pivot: PivotEstimate, flat: State | None = None
+    frames: Sequence[FrameView],
+    tiles: Tiles,
+    plane: MotionPlane,
+    pivot: PivotEstimate,
+    flat: State | None = None,
+    wander_px: Floats | float = 0.0,
 ) -> tuple[Data, Round]:
     """Learn with the unknowns that the view of the axis leaves free, from the state of a flat body if there is one.
 
@@ -118,13 +128,30 @@ def _learn(
     if plane.axis.estimated:
         prior[DIRECTION, DIRECTION] = plane.axis.direction_sigma**-2
     views = collect_tiles(tiles.corners, tiles.heights, frames, plane, start)
-    data = Data(tiles, views, start, plane.axis, prior)
+    data = Data(tiles, views, start, plane.axis, prior, np.broadcast_to(wander_px, (len(frames), 2)))
     first = _first_state(frames, tiles, plane, start)
     if flat is not None:
         values = first.centres.values.copy()
         values[PIVOT] = flat.centres.pivot
         first = replace(first, centres=Centres(values), turns=flat.turns)
     return data, alternate(data, first)
+
+
+def _where_it_wandered(data: Data, last: Round) -> tuple[Data, Round]:
+    """Learn once more, each frame with its pivot where it was seen, if the pivot wanders.
+
+    What is learnt from displaced frames absorbs a quarter of the displacement and takes tiles for hidden (half of the
+    views of a plate, displaced by 0.2 px; 0.15 after it). A third time would make it too large.
+    """
+    normal, gradient = _at_the_end(data, last)
+    whole = _of_whole_body(data, last.state, normal, gradient)
+    birge2, _ = _birge_ratio(data, normal, gradient)
+    wander = pivot_wander(*whole, birge2)
+    if wander == 0.0:
+        return data, last
+    displaced = np.einsum("nij,nj->ni", rotation(last.state.turns), displacements(*whole, birge2, wander))
+    placed = replace(data, wander_px=-displaced)
+    return placed, alternate(placed, last.state)
 
 
 def _first_state(frames: Sequence[FrameView], tiles: Tiles, plane: MotionPlane, start_px: Floats) -> State:
@@ -157,23 +184,21 @@ def _body(data: Data, last: Round, end: tuple[Floats, Floats], plane: MotionPlan
     # what the appearance absorbs is no information; where it absorbs all, the centre is known as it was before
     information = (1.0 - absorbed) * np.linalg.inv(last.covariance) + absorbed * data.prior_in(state)
     covariance = np.asarray(np.linalg.inv(information), dtype=float)
-    corners = data.tiles.corners
-    groups = group_neighbours(corners, _GROUPS)
-    total, freedom = group_scatter(normal, gradient, groups)
     # Two estimates of the Birge ratio: disagreement of groups about the angle and, where neither camera nor pivot
     # moves, the displacement that a body on a fixed pivot cannot have.
-    estimates, wander = [total / max(freedom - len(state.turns), 1)], 0.0
+    birge2, groups = _birge_ratio(data, normal, gradient)
+    wander = 0.0
     if not moving:
-        whole = normal.sum(axis=0), gradient.sum(axis=0)
-        wander = pivot_wander(*whole, max(1.0, estimates[0]))
-        estimates += [excess_displacement(*whole)] if wander == 0.0 else []
-    birge = max(1.0, float(np.sqrt(max(estimates))))
+        whole = _of_whole_body(data, state, normal, gradient)
+        wander = pivot_wander(*whole, birge2)
+        birge2 = birge2 if wander else max(birge2, excess_displacement(*whole))
+    birge = float(np.sqrt(birge2))
     by_unknown = data.by_unknown(state)
     scores = centre_equations(normal, gradient, state.turns, by_unknown).scores
     acting = effective_centre(normal, by_unknown)
     variance_ratio = max(birge**2, disagreement_of_groups(last.covariance, scores, groups, acting))
     information = normal[:, :, 0, 0].sum(axis=1)
-    middles = corners + TILE_SIDE_PX / 2
+    middles = data.tiles.corners + TILE_SIDE_PX / 2
     middle = information @ middles / information.sum()
     return BodyAppearance(
         tiles=join_tiles(last.appearance),
@@ -191,6 +216,20 @@ def _body(data: Data, last: Round, end: tuple[Floats, Floats], plane: MotionPlan
         middle_px=middle,
         extent_px=float(np.sqrt(information @ ((middles - middle) ** 2).sum(axis=1) / information.sum())),
     )
+
+
+def _birge_ratio(data: Data, normal: Floats, gradient: Floats) -> tuple[float, NDArray[np.intp]]:
+    """Return the square of the groups' disagreement about the angle over that expected from noise, and the groups."""
+    groups = group_neighbours(data.tiles.corners, _GROUPS)
+    total, freedom = group_scatter(normal, gradient, groups)
+    return max(1.0, total / max(freedom - normal.shape[1], 1)), groups
+
+
+def _of_whole_body(data: Data, state: State, normal: Floats, gradient: Floats) -> tuple[Floats, Floats]:
+    """Return the sums over tiles of normal matrix and gradient, as if no wander of the pivot were taken out."""
+    whole, score = normal.sum(axis=0)[:, :3, :3], gradient.sum(axis=0)[:, :3]
+    taken_out = np.einsum("nji,nj->ni", rotation(state.turns), data.wander_px)
+    return whole, score - np.einsum("nij,nj->ni", whole[:, :, 1:], taken_out)
 
 
 def _absorbed_of_turns(data: Data, now: Round) -> float:

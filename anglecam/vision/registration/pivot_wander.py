@@ -62,6 +62,15 @@ def excess_displacement(normal: Floats, gradient: Floats) -> float:
     return float(np.einsum("ni,nij,nj->n", score, np.linalg.pinv(information, hermitian=True), score).mean() / 2.0)
 
 
+def displacements(normal: Floats, gradient: Floats, birge2: float, wander: float) -> Floats:
+    """Return (n, 2) the likeliest displacement of each frame for a known standard deviation along each axis, px."""
+    found = np.zeros((len(normal), 2))
+    information, score = beside_turn(normal, gradient)
+    posterior = np.linalg.inv(information / birge2 + np.eye(2) / wander**2)
+    found[normal[:, 0, 0] > NO_INFORMATION] = np.einsum("nij,nj->ni", posterior, score / birge2)
+    return found
+
+
 def beside_turn(normal: Floats, gradient: Floats) -> tuple[Floats, Floats]:
     """Return the information (n, 2, 2) and score (n, 2) of each frame's place, its turn eliminated."""
     seen = normal[:, 0, 0] > NO_INFORMATION
