@@ -243,16 +243,17 @@ def _surest(rest: Rest, found: Sequence[Explanation], known: Sequence[Proposal])
             joint = next((k for k, body in enumerate(known) if _carries(body, proposal)), None)
             if joint is None or turns_relative(known[joint], proposal):
                 return Moving(proposal, masked, one.fit, lead, "turns", joint, rest.targets)
-    slides = [slide_of(masked, one.fit) for one in found]
-    others: list[tuple[Score, Explanation, Sequence[Floats | None] | None]] = [(one.score, one, None) for one in found]
-    others += [(slide.score, one, slide.poses) for one, slide in zip(found, slides, strict=True)]
-    for score_of, one, poses in sorted(others, key=lambda other: -other[0].total):
-        lead = min(score_of.lead(rival) for rival in rivals)
-        if lead >= SURE:
-            motion = one.fit.proposal if poses is None else _as_translation(masked, poses)
-            how = "otherwise" if poses is None else "translates"
-            return Moving(motion, masked, one.fit, lead, how, before=rest.targets)
-    return None
+    sure: list[Moving] = []
+    for one in found:
+        slide = slide_of(masked, one.fit)
+        # what moves otherwise predicts better than what translates
+        how = [("translates", slide.score, _as_translation(masked, slide.poses))]
+        how += [("otherwise", one.score, one.fit.proposal)] if one.lead >= SURE else []
+        for moves, mine, motion in how:
+            lead = min(mine.lead(rival) for rival in rivals)
+            sure.append(Moving(motion, masked, one.fit, lead, moves, before=rest.targets))
+    best = max(sure, key=lambda one: one.lead, default=None)
+    return None if best is None or best.lead < SURE else best
 
 
 def _carries(body: Proposal, other: Proposal) -> bool:
