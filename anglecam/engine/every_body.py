@@ -243,16 +243,16 @@ def _surest(rest: Rest, found: Sequence[Explanation], known: Sequence[Proposal])
             joint = next((k for k, body in enumerate(known) if _carries(body, proposal)), None)
             if joint is None or turns_relative(known[joint], proposal):
                 return Moving(proposal, masked, one.fit, lead, "turns", joint, rest.targets)
-    sure: list[Moving] = []
+    others: list[Moving] = []
     for one in found:
         slide = slide_of(masked, one.fit)
-        # what moves otherwise predicts better than what translates
-        how = [("translates", slide.score, _as_translation(masked, slide.poses))]
-        how += [("otherwise", one.score, one.fit.proposal)] if one.lead >= SURE else []
-        for moves, mine, motion in how:
+        motions = [("translates", slide.score, _as_translation(masked, slide.poses))]
+        if one.lead >= SURE:  # over a translation
+            motions.append(("otherwise", one.score, one.fit.proposal))
+        for how, mine, motion in motions:
             lead = min(mine.lead(rival) for rival in rivals)
-            sure.append(Moving(motion, masked, one.fit, lead, moves, before=rest.targets))
-    best = max(sure, key=lambda one: one.lead, default=None)
+            others.append(Moving(motion, masked, one.fit, lead, how, before=rest.targets))
+    best = max(others, key=lambda one: one.lead, default=None)
     return None if best is None or best.lead < SURE else best
 
 
