@@ -100,7 +100,7 @@ class Data:
     prior: Floats
     """(3, 3) prior information on pivot and direction, 1/px² and 1/rad²."""
     wander_px: Floats
-    """(frames, 2) displacement of the pivot in each frame."""
+    """(frames, 2) displacement of the pivot in each frame; zero if it stands still."""
 
     @property
     def free(self) -> NDArray[np.intp]:

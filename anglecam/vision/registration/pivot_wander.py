@@ -62,8 +62,11 @@ def excess_displacement(normal: Floats, gradient: Floats) -> float:
     return float(np.einsum("ni,nij,nj->n", score, np.linalg.pinv(information, hermitian=True), score).mean() / 2.0)
 
 
-def displacements(normal: Floats, gradient: Floats, birge2: float, wander: float) -> Floats:
-    """Return (n, 2) the likeliest displacement of each frame for a known standard deviation along each axis, px."""
+def frame_displacements(normal: Floats, gradient: Floats, birge2: float, wander: float) -> Floats:
+    """Return (n, 2) the likeliest displacement of the body in each frame, in its own coordinates, px.
+
+    ``wander`` is its standard deviation along each axis, px.
+    """
     found = np.zeros((len(normal), 2))
     information, score = beside_turn(normal, gradient)
     posterior = np.linalg.inv(information / birge2 + np.eye(2) / wander**2)

@@ -9,7 +9,7 @@ import pytest
 from anglecam.io.rig import Rig
 from anglecam.measurement.clip import measure_clip
 from anglecam.video.open_film import open_film
-from anglecam.vision.registration.pivot_wander import displacements, pivot_wander
+from anglecam.vision.registration.pivot_wander import frame_displacements, pivot_wander
 from support.drawn import write_clip
 
 FRAMES, BIRGE2 = 100, 4.0
@@ -47,7 +47,7 @@ def test_each_frame_s_displacement_is_found_beside_its_turn():
     rng = np.random.default_rng(3)
     off = np.column_stack([rng.normal(0.0, 1e-3, FRAMES), rng.normal(0.0, 0.5, (FRAMES, 2))])
     normal, _ = equations(0.5, 3)
-    found = displacements(normal, np.einsum("nij,nj->ni", normal, off), BIRGE2, 0.5)
+    found = frame_displacements(normal, np.einsum("nij,nj->ni", normal, off), BIRGE2, 0.5)
     assert np.std(found - off[:, 1:]) < 0.03  # the prior, for pixels of twice the noise, shrinks it by 2 %
 
 
