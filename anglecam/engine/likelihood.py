@@ -137,7 +137,7 @@ def pose_gains(picture, background, precision, excess, places, body, part, parts
     picture : ndarray
         (h, w) float32; NaN where it is unknown.
     background : ndarray
-        (h, w) float32, its mean, grey levels.
+        (h, w) float32, its mean, grey levels. Where it is NaN, any grey level is as probable.
     precision : ndarray
         (h, w) float32, inverse variance of its pixels in this picture, 1/grey levels².
     excess : float
@@ -183,7 +183,9 @@ def pose_gains(picture, background, precision, excess, places, body, part, parts
             behind[shown] = precision[int(y + np.float32(0.5)), int(x + np.float32(0.5))]
             shown += 1
         for i in range(shown):
-            off[i] = _density(off[i], precise[i]) / _density(off_behind[i], behind[i])
+            as_background = _density(off_behind[i], behind[i])
+            known = off_behind[i] * off_behind[i] * behind[i] >= 0.0
+            off[i] = _density(off[i], precise[i]) / (as_background if known else _UNKNOWN)
         for first in range(0, shown, _TOGETHER):
             for i in range(first, min(first + _TOGETHER, shown)):
                 product[of_part[i]] *= off[i]
