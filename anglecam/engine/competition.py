@@ -94,7 +94,7 @@ def _in_order(small: Sample, proposals: Sequence[Proposal]) -> list[tuple[Score,
     still = score(small, NOTHING, [None] * len(small.pictures))
     rough: list[tuple[Score, Proposal]] = []
     for proposal in proposals:
-        fit = refine(small, proposal.every_other(), 1)
+        fit = refine(small, proposal.every_other(), 1, lit=False)
         if fit is not None:
             better = replace(proposal, centre_px=fit.proposal.centre_px, turn=_all_turns(proposal, fit))
             rough.append((score(small, proposal.name, fit.proposal.poses(small)), better))

@@ -28,7 +28,8 @@ from anglecam.engine.path import changes, middle, most_from_motion, steadiest_pa
 from anglecam.engine.refine import Fit, refine
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import NOTHING, carried_by, score
-from anglecam.engine.target import Picture, learn_target
+from anglecam.engine.target import Picture
+from anglecam.engine.target_learning import learn_target
 
 _STEP_PX = 2.0
 """Of the search for a turn."""
@@ -188,9 +189,13 @@ def candidates(search: Search, picture: Picture, shift: Floats = STANDS) -> list
 
 
 def _peaks(search: Search, gains: Floats) -> Floats:
-    """Return the turns of most gain that are apart from each other."""
+    """Return the turns of most gain that are apart from each other.
+
+    Of a wrong pose the gain is far below zero, as a rule, by few pixels as by all.
+    """
     left, peaks = gains.copy(), list[float]()
-    while len(peaks) < _PEAKS and np.isfinite(left).any():
+    least = -_HOPELESS * float(left.max())
+    while len(peaks) < _PEAKS and float(left.max()) >= least:
         peaks.append(float(search.turns[int(left.argmax())]))
         left[np.abs(wrapped(search.turns - peaks[-1])) * search.arm <= _APART_PX] = -np.inf
     return np.array(peaks)
