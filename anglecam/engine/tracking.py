@@ -172,7 +172,7 @@ def candidates(search: Search, picture: Picture, shift: Floats = STANDS) -> list
     around = _peaks(search, gains)[:, None] + np.array([-1.0, 0.0, 1.0]) * 0.5 * _STEP_PX / search.arm
     whole = gains_about(frame, search.body, search.centre, around.ravel(), shift).sum(axis=1).reshape(-1, 3)
     most = whole.max(axis=1)
-    best = float(most.max())
+    best = float(most.max(initial=0.0))
     floor = max(_HOPELESS * best, float(np.log(len(search.turns))) * search.fit.ratio)
     order = np.argsort(-most)
     order = order[most[order] > floor][:_CANDIDATES]
@@ -194,8 +194,8 @@ def _peaks(search: Search, gains: Floats) -> Floats:
     Of a wrong pose the gain is far below zero, as a rule, by few pixels as by all.
     """
     left, peaks = gains.copy(), list[float]()
-    least = -_HOPELESS * float(left.max())
-    while len(peaks) < _PEAKS and float(left.max()) >= least:
+    least = -_HOPELESS * float(left.max(initial=0.0))
+    while len(peaks) < _PEAKS and (left >= least).any():
         peaks.append(float(search.turns[int(left.argmax())]))
         left[np.abs(wrapped(search.turns - peaks[-1])) * search.arm <= _APART_PX] = -np.inf
     return np.array(peaks)

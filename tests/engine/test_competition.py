@@ -1,4 +1,4 @@
-"""Of many proposals for one body one is fitted; of proposals for two bodies one for each."""
+"""Of many proposals for one body one is fitted, of proposals for two bodies one for each, and it is followed."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from anglecam.engine.competition import compete
 from anglecam.engine.sample import Sample, sample_of
 from anglecam.engine.score import Proposal
+from anglecam.engine.tracking import candidates, search_for
 
 CENTRES = np.array([[60.0, 40.0], [180.0, 40.0]])
 TURNS = np.array([0.5 * np.sin(np.arange(24.0)), 0.4 * np.cos(0.7 * np.arange(24.0))])
@@ -49,3 +50,13 @@ def test_of_two_bodies_each_is_fitted():
     assert len(found) == 2
     for centre in CENTRES:
         assert np.hypot(*(centres - centre).T).min() < 1.0
+
+
+def test_a_fitted_body_is_found_where_it_is_and_not_before_the_bare_background():
+    sample = _sticks(TURNS[:1])
+    fit = compete(sample, [_off(0, 1)])[0].fit
+    search = search_for(sample, fit)
+    for picture, turn in zip(sample.pictures, fit.proposal.turn, strict=True):
+        assert abs(candidates(search, picture)[0].turn - turn) < 0.01
+    noise = np.random.default_rng(5).normal(0.0, 2.0, sample.median.shape)
+    assert candidates(search, (fit.target.background + noise).astype(np.float32)) == []
