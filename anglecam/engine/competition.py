@@ -1,6 +1,7 @@
 """Explanations of what moves compete on held-out frames; the best are fitted, and what they may be mistaken for too.
 
-Every proposal is fitted to a small sample first. Those that predict best are fitted to the whole sample.
+Every proposal is fitted to a small sample first. Those that predict best are fitted to the whole sample, one after the
+other, until what is left is surely predicted better by what was fitted.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ def compete(sample: Sample, proposals: Sequence[Proposal], declared: Sequence[Pr
     small = halved(sample)
     # a hint adds to what is found without one, and to what that is compared with it adds nothing
     finalists = _fitted(sample, small, _in_order(small, proposals), _FINALISTS)
-    pointed_at = _fitted(sample, small, _in_order(small, declared), _FINALISTS // 2, finalists)
+    pointed_at = _fitted(sample, small, _in_order(small, declared), _FINALISTS // 2, finalists, declared=True)
     rivals = [score(sample, NOTHING, [None] * len(sample.pictures))]
     found: list[Explanation] = []
     for fits in (finalists, pointed_at):
@@ -90,7 +91,7 @@ def _compared(fit: Fit, mine: Score, rivals: Sequence[Score]) -> Explanation:
 
 
 def _in_order(small: Sample, proposals: Sequence[Proposal]) -> list[tuple[Score, Proposal]]:
-    """Return proposals that are fitted to a small sample, those that predict best first."""
+    """Return proposals that are fitted to a small sample, and how well they predict it, the best first."""
     still = score(small, NOTHING, [None] * len(small.pictures))
     rough: list[tuple[Score, Proposal]] = []
     for proposal in proposals:
@@ -109,25 +110,27 @@ def _fitted(
     small: Sample,
     order: Sequence[tuple[Score, Proposal]],
     most: int,
-    taken: Sequence[Fit] | None = None,
+    taken: Sequence[Fit] = (),
+    *,
+    declared: bool = False,
 ) -> list[Fit]:
     """Return the first proposals, fitted to a sample, that differ from each other and from those that are taken.
 
-    A body that turns about one centre is not sought again where it predicts the small sample surely better than a
-    proposal for the same pixels, unless the proposal is declared, which is so where others are taken.
+    A proposal is not fitted where a body that turns about one centre surely predicts its pixels of the small sample
+    better, unless it is declared.
     """
     found, better = list[Fit](), list[Score]()
     surest = np.arange(0, len(sample.pictures), 2)
     for rough, proposal in order:
         if len(found) == most:
             break
-        known = any(_alike(sample, proposal, fit.proposal) for fit in (*(taken or ()), *found))
+        known = any(_alike(sample, proposal, fit.proposal) for fit in (*taken, *found))
         if known or any(rough.lead(one) <= -SURE for one in better):
             continue
         fit = refine(sample, proposal, surest=surest)
         if fit is not None:
             found.append(fit)
-            if fit.off_centre <= OFF_CENTRE and taken is None:
+            if fit.off_centre <= OFF_CENTRE and not declared:
                 better.append(score(small, proposal.name, fit.proposal.every_other().poses(small)))
     return found
 
