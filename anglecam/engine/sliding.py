@@ -11,8 +11,7 @@ from anglecam.engine.body import body_of, frame_of
 from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import Score, score
-from anglecam.engine.target import turned
-from anglecam.engine.target_learning import learn_target
+from anglecam.engine.target import learn_target, turned
 
 _ROUNDS = 2
 """Of learning and locating in turn, as for a body that turns (`anglecam.engine.refine`)."""
