@@ -62,9 +62,7 @@ def test_any_grey_level_is_as_probable_where_the_background_is_unknown():
     body = np.column_stack([MEAN[rows, columns], variance, *np.zeros((2, len(rows)))]).astype(np.float32)
     stands = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
     back = np.full_like(BACK, np.nan)
-    found = pose_gains(
-        PICTURE, back, back, np.float32(0.0), places, body, np.zeros(len(rows), np.int64), 1, stands
-    )
+    found = pose_gains(PICTURE, back, back, np.float32(0.0), places, body, np.zeros(len(rows), np.int64), 1, stands)
     seen = PICTURE[rows, columns]
     log_odds = _expected(seen, body[:, 0], variance) - _expected(seen, np.full_like(seen, np.nan), variance)
     np.testing.assert_allclose(found[0, 0], log_odds.sum(), rtol=1e-4, atol=0.05)
