@@ -1,6 +1,7 @@
 """Explanations of what moves compete on held-out frames; the best are fitted, and what they may be mistaken for too.
 
-Every proposal is fitted to a small sample first. Those that predict best are fitted to the whole sample.
+Every proposal is fitted to a small sample first. Those that predict best are fitted to the whole sample, one after the
+other, until what is left is surely predicted better by what was fitted.
 """
 
 from __future__ import annotations
@@ -73,15 +74,12 @@ def compete(sample: Sample, proposals: Sequence[Proposal], declared: Sequence[Pr
         From what somebody declares: the best of them are fitted to the whole sample whatever else is found.
     """
     small = halved(sample)
-    still = score(small, NOTHING, [None] * len(small.pictures))
     # a hint adds to what is found without one, and to what that is compared with it adds nothing
-    finalists = _unlike(sample, _in_order(small, proposals, still), [], _FINALISTS)
-    pointed_at = _unlike(sample, _in_order(small, declared, still), finalists, _FINALISTS // 2)
+    finalists = _fitted(sample, small, _in_order(small, proposals), _FINALISTS)
+    pointed_at = _fitted(sample, small, _in_order(small, declared), _FINALISTS // 2, finalists, declared=True)
     rivals = [score(sample, NOTHING, [None] * len(sample.pictures))]
     found: list[Explanation] = []
-    seen_small = np.arange(0, len(sample.pictures), 2)
-    for some in (finalists, pointed_at):
-        fits = [fit for proposal in some if (fit := refine(sample, proposal, surest=seen_small)) is not None]
+    for fits in (finalists, pointed_at):
         rivals += [slide_of(sample, fit).score for fit in fits]
         found += [_compared(fit, score(sample, fit.proposal.name, fit.proposal.poses(sample)), rivals) for fit in fits]
     return sorted(found, key=lambda one: (not one.turns, -one.score.total if one.turns else -one.lead))
@@ -92,27 +90,49 @@ def _compared(fit: Fit, mine: Score, rivals: Sequence[Score]) -> Explanation:
     return Explanation(fit, mine, min(one.errors for one in leads), min(one.share for one in leads))
 
 
-def _in_order(small: Sample, proposals: Sequence[Proposal], still: Score) -> list[Proposal]:
-    """Return proposals that are fitted to a small sample, those that predict best first."""
+def _in_order(small: Sample, proposals: Sequence[Proposal]) -> list[tuple[Score, Proposal]]:
+    """Return proposals that are fitted to a small sample, and how well they predict it, the best first."""
+    still = score(small, NOTHING, [None] * len(small.pictures))
     rough: list[tuple[Score, Proposal]] = []
     for proposal in proposals:
-        fit = refine(small, proposal.every_other(), 1)
+        fit = refine(small, proposal.every_other(), 1, lit=False)
         if fit is not None:
             better = replace(proposal, centre_px=fit.proposal.centre_px, turn=_all_turns(proposal, fit))
             rough.append((score(small, proposal.name, fit.proposal.poses(small)), better))
     # what explains much of a few frames, and what explains a little of all
-    most = sorted(rough, key=lambda one: -one[0].total)
-    surest = sorted(rough, key=lambda one: -one[0].lead(still))
-    return [proposal for _, proposal in itertools.chain.from_iterable(zip(most, surest, strict=True))]
+    most = np.argsort([-one.total for one, _ in rough], kind="stable").tolist()
+    surest = np.argsort([-one.lead(still) for one, _ in rough], kind="stable").tolist()
+    return [rough[k] for k in dict.fromkeys(itertools.chain.from_iterable(zip(most, surest, strict=True)))]
 
 
-def _unlike(sample: Sample, proposals: Sequence[Proposal], taken: Sequence[Proposal], most: int) -> list[Proposal]:
-    """Return the first proposals that differ from each other and from those that are taken."""
-    chosen: list[Proposal] = []
-    for proposal in proposals:
-        if len(chosen) < most and not any(_alike(sample, proposal, other) for other in (*taken, *chosen)):
-            chosen.append(proposal)
-    return chosen
+def _fitted(
+    sample: Sample,
+    small: Sample,
+    order: Sequence[tuple[Score, Proposal]],
+    most: int,
+    taken: Sequence[Fit] = (),
+    *,
+    declared: bool = False,
+) -> list[Fit]:
+    """Return the first proposals, fitted to a sample, that differ from each other and from those that are taken.
+
+    A proposal is not fitted where a body that turns about one centre surely predicts its pixels of the small sample
+    better, unless it is declared.
+    """
+    found, better = list[Fit](), list[Score]()
+    surest = np.arange(0, len(sample.pictures), 2)
+    for rough, proposal in order:
+        if len(found) == most:
+            break
+        known = any(_alike(sample, proposal, fit.proposal) for fit in (*taken, *found))
+        if known or any(rough.lead(one) <= -SURE for one in better):
+            continue
+        fit = refine(sample, proposal, surest=surest)
+        if fit is not None:
+            found.append(fit)
+            if fit.off_centre <= OFF_CENTRE and not declared:
+                better.append(score(small, proposal.name, fit.proposal.every_other().poses(small)))
+    return found
 
 
 def halved(sample: Sample) -> Sample:

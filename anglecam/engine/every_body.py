@@ -26,7 +26,8 @@ from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample, Stills, changed_boxes, sample_part
 from anglecam.engine.score import NOTHING, Proposal, Score, score
 from anglecam.engine.sliding import slide_of
-from anglecam.engine.target import Picture, Target, learn_target
+from anglecam.engine.target import Picture, Target
+from anglecam.engine.target_learning import learn_target
 from anglecam.threads import one_opencv_thread
 
 MOST = 6

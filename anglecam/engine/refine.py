@@ -29,7 +29,8 @@ from anglecam.engine.free_pose import free_pose
 from anglecam.engine.rotation_centre import common_centre
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import Proposal, carried_by
-from anglecam.engine.target import Target, learn_target, rotations, turned
+from anglecam.engine.target import Target, rotations, turned
+from anglecam.engine.target_learning import learn_target
 
 _ODDS = float(special.logit(0.95))
 """Logarithm of the odds at which a body counts as seen."""
@@ -64,7 +65,12 @@ class Fit:
 
 
 def refine(
-    sample: Sample, proposal: Proposal, rounds: int = 2, *, surest: NDArray[np.int64] | None = None
+    sample: Sample,
+    proposal: Proposal,
+    rounds: int = 2,
+    *,
+    surest: NDArray[np.int64] | None = None,
+    lit: bool = True,
 ) -> Fit | None:
     """Fit a body to a sample, starting from a proposal.
 
@@ -79,6 +85,8 @@ def refine(
     surest : (m,) ndarray of int, optional
         Frames of which the turns are known best: a round before learns from them alone. Where the turns of some frames
         are off from those of the others, the body would be learnt twice, beside itself, and the turns stay off.
+    lit : bool
+        Whether the body is learnt with what changes before the light.
 
     Returns
     -------
@@ -87,8 +95,8 @@ def refine(
     """
     # a body that changes with the light is much like one that is displaced: its centre is found without
     fit = _fitted(sample, proposal, rounds, surest)
-    if fit is None:
-        return None
+    if fit is None or not lit:
+        return fit
     poses = fit.proposal.poses(sample)
     target = learn_target(sample, poses, np.arange(len(poses)), lit=True)
     return fit if body_of(target) is None else replace(fit, target=target)

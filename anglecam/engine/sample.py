@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from anglecam.data.typing import Floats, Image
 from anglecam.engine.tint import tinted
+from anglecam.engine.typical import median_and_variance
 
 FRAMES = 48
 """Frames of a sample, at most."""
@@ -83,6 +84,18 @@ class Sample:
     def excesses(self) -> NDArray[np.float32]:
         """(K,) the same of its pictures."""
         return np.array([self.excess(picture) for picture in self.pictures], np.float32)
+
+    def typical(self, use: NDArray[np.int64]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return (h, w) the median of pictures (m,), grey levels, and the robust variance about it."""
+        key = use.tobytes()
+        if key not in self._typical:
+            self._typical[key] = median_and_variance(self.pictures[use])
+        return self._typical[key]
+
+    @cached_property
+    def _typical(self) -> dict[bytes, tuple[NDArray[np.float32], NDArray[np.float32]]]:
+        """By the pictures' numbers: explanations are learnt from the same halves."""
+        return {}
 
     @cached_property
     def _most_noise(self) -> float:

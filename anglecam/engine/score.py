@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Flags, Floats
 from anglecam.engine.likelihood import log_density
 from anglecam.engine.sample import Sample
-from anglecam.engine.target import learn_target, turned
+from anglecam.engine.target import turned
+from anglecam.engine.target_learning import learn_target
 
 NOTHING = "nothing moves"
 _MOST_VARIANCE = 256.0**2 / 2.0

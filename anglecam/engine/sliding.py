@@ -7,16 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from anglecam.data.typing import Floats
-from anglecam.engine.body import body_of, frame_of
+from anglecam.engine.body import Body, Frame, body_of, frame_of
 from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import Score, score
-from anglecam.engine.target import learn_target, turned
+from anglecam.engine.target import turned
+from anglecam.engine.target_learning import learn_target
 
 _ROUNDS = 2
 """Of learning and locating in turn, as for a body that turns (`anglecam.engine.refine`)."""
 _TRIED_PX = np.arange(-3.0, 3.5, 0.5)
-"""Shifts along the line by which a place may be off."""
+"""Shifts along the line, and across it, by which a place may be off."""
 
 
 @dataclass(frozen=True)
@@ -29,10 +30,10 @@ class Slide:
 
 
 def slide_of(sample: Sample, fit: Fit) -> Slide:
-    """Return what predicts best of a body whose middle moves on the straight line that is nearest to a turning one's.
+    """Return what predicts best of a body that moves on a straight line near the way of a turning one's middle.
 
-    Its places on the line are those of the turning body, or those at which the unturned body is most likely: the one
-    explanation must not be worse than the other only because the other was fitted.
+    The line and the places on it are those of the turning body, or those at which the unturned body is most likely:
+    the one explanation must not be worse than the other only because the other was fitted.
     """
     poses = fit.proposal.poses(sample)
     rows, columns = np.nonzero(fit.target.visibility)
@@ -42,33 +43,46 @@ def slide_of(sample: Sample, fit: Fit) -> Slide:
     weight = np.maximum(fit.gain[known], 0.0)  # a frame that hardly shows the body says little of its way
     mean = np.average(shifts[known], axis=0, weights=weight)
     axis = np.linalg.svd((shifts[known] - mean) * np.sqrt(weight)[:, None])[2][0]
-    along = (shifts - mean) @ axis
-    fitted = along
+    near = mean + ((shifts - mean) @ axis)[:, None] * axis
+    fitted = near
     for _ in range(_ROUNDS):
-        fitted = _most_likely(sample, mean, axis, fitted)
-    tried = (_unturned(mean, axis, places) for places in (along, fitted))
+        fitted = _most_likely(sample, fitted, axis)
+    tried = (_unturned(places) for places in (near, fitted))
     return max((Slide(poses, score(sample, "slides", poses)) for poses in tried), key=lambda one: one.score.total)
 
 
-def _unturned(mean: Floats, axis: Floats, along: Floats) -> list[Floats | None]:
-    """Return poses at places (K,) along a line, px; ``None`` where they are unknown."""
-    return [turned(np.zeros(2), 0.0, mean + one * axis) if np.isfinite(one) else None for one in along]
+def _unturned(shifts: Floats) -> list[Floats | None]:
+    """Return the poses of a body that is shifted by (K, 2) px; ``None`` where it is unknown by how much."""
+    return [turned(np.zeros(2), 0.0, one) if np.isfinite(one).all() else None for one in shifts]
 
 
-def _most_likely(sample: Sample, mean: Floats, axis: Floats, along: Floats) -> Floats:
-    """Return the places (K,) along the line, px, at which the unturned body explains each frame best."""
-    target = learn_target(sample, _unturned(mean, axis, along), np.arange(len(along)))
+def _most_likely(sample: Sample, shifts: Floats, axis: Floats) -> Floats:
+    """Return the shifts (K, 2), px, of most likelihood on a straight line near given ones along an axis (2,)."""
+    target = learn_target(sample, _unturned(shifts), np.arange(len(shifts)))
     body = body_of(target)
     if body is None:
-        return along
-    found = along.copy()
-    for k in np.flatnonzero(np.isfinite(along)):
-        tried = along[k] + _TRIED_PX
-        poses = np.stack([turned(np.zeros(2), 0.0, mean + one * axis) for one in tried])
+        return shifts
+    across = np.array([-axis[1], axis[0]])
+    found, aside, weight = shifts.copy(), np.full(len(shifts), np.nan), np.zeros(len(shifts))
+    for k in np.flatnonzero(np.isfinite(shifts[:, 0])):
         frame = frame_of(target, sample.pictures[k], float(sample.excesses[k]))
-        gains = body.gains(frame, poses).sum(axis=1)
-        at = int(np.clip(np.argmax(gains), 1, len(tried) - 2))
-        bend = float(gains[at - 1] + gains[at + 1] - 2.0 * gains[at])
-        aside = 0.5 * float(gains[at - 1] - gains[at + 1]) / bend if bend < 0.0 else 0.0
-        found[k] = tried[at] + np.clip(aside, -1.0, 1.0) * (tried[1] - tried[0])
-    return found
+        found[k] += _best(frame, body, found[k], axis)[0] * axis
+        aside[k], weight[k] = _best(frame, body, found[k], across)
+    # the line is that of all frames, and no frame may leave it
+    known = weight > 0.0
+    if known.sum() < 2:
+        return found
+    along = (found - shifts[known].mean(axis=0)) @ axis
+    line = np.polynomial.Polynomial.fit(along[known], aside[known], 1, w=np.sqrt(weight[known]))
+    return found + line(along)[:, None] * across
+
+
+def _best(frame: Frame, body: Body, shift: Floats, axis: Floats) -> tuple[float, float]:
+    """Return by how much further along an axis a body is most likely, px, and the weight of that, 1/px²."""
+    poses = np.stack([turned(np.zeros(2), 0.0, shift + one * axis) for one in _TRIED_PX])
+    gains = body.gains(frame, poses).sum(axis=1)
+    at = int(np.clip(np.argmax(gains), 1, len(gains) - 2))
+    step = float(_TRIED_PX[1] - _TRIED_PX[0])
+    bend = float(gains[at - 1] + gains[at + 1] - 2.0 * gains[at])
+    aside = 0.5 * float(gains[at - 1] - gains[at + 1]) / bend if bend < 0.0 else 0.0
+    return float(_TRIED_PX[at] + np.clip(aside, -1.0, 1.0) * step), max(-bend, 0.0) / step**2

@@ -28,7 +28,8 @@ from anglecam.engine.path import changes, middle, most_from_motion, steadiest_pa
 from anglecam.engine.refine import Fit, refine
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import NOTHING, carried_by, score
-from anglecam.engine.target import Picture, learn_target
+from anglecam.engine.target import Picture
+from anglecam.engine.target_learning import learn_target
 
 _STEP_PX = 2.0
 """Of the search for a turn."""
@@ -171,7 +172,7 @@ def candidates(search: Search, picture: Picture, shift: Floats = STANDS) -> list
     around = _peaks(search, gains)[:, None] + np.array([-1.0, 0.0, 1.0]) * 0.5 * _STEP_PX / search.arm
     whole = gains_about(frame, search.body, search.centre, around.ravel(), shift).sum(axis=1).reshape(-1, 3)
     most = whole.max(axis=1)
-    best = float(most.max())
+    best = float(most.max(initial=0.0))
     floor = max(_HOPELESS * best, float(np.log(len(search.turns))) * search.fit.ratio)
     order = np.argsort(-most)
     order = order[most[order] > floor][:_CANDIDATES]
@@ -188,9 +189,13 @@ def candidates(search: Search, picture: Picture, shift: Floats = STANDS) -> list
 
 
 def _peaks(search: Search, gains: Floats) -> Floats:
-    """Return the turns of most gain that are apart from each other."""
+    """Return the turns of most gain that are apart from each other.
+
+    Of a wrong pose the gain is far below zero, as a rule, by few pixels as by all.
+    """
     left, peaks = gains.copy(), list[float]()
-    while len(peaks) < _PEAKS and np.isfinite(left).any():
+    least = -_HOPELESS * float(left.max(initial=0.0))
+    while len(peaks) < _PEAKS and (left >= least).any():
         peaks.append(float(search.turns[int(left.argmax())]))
         left[np.abs(wrapped(search.turns - peaks[-1])) * search.arm <= _APART_PX] = -np.inf
     return np.array(peaks)

@@ -8,7 +8,7 @@ import pytest
 
 from anglecam.engine.sample import Sample, Stills, sample_of, sample_stills, steady_light
 from anglecam.engine.score import NOTHING, Proposal, score
-from anglecam.engine.target import learn_target
+from anglecam.engine.target_learning import learn_target
 
 CENTRE = np.array([60.0, 20.0])
 TURN = 0.4 * np.sin(np.arange(24))

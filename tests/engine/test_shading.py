@@ -10,7 +10,7 @@ from scipy import ndimage
 from anglecam.engine.sample import Sample, sample_of
 from anglecam.engine.score import Proposal, score
 from anglecam.engine.shading import shading_of, without_motion
-from anglecam.engine.target import learn_target
+from anglecam.engine.target_learning import learn_target
 
 CENTRE = np.array([60.0, 60.0])
 TURN = np.radians(97.0) * np.arange(36)
