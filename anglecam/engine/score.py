@@ -125,8 +125,10 @@ class Score:
         """Return by how much this explanation predicts better than another one of the same frames.
 
         What the other one's body covers and this one's does not is left to the other one: a hand may be there as well.
+        A frame in which neither shows its body says nothing: what they predict there is the background of either.
         """
-        where = self.covered & (self.covers | ~other.covers)
+        shown = (self.covers | other.covers).any(axis=(1, 2), keepdims=True)
+        where = self.covered & (self.covers | ~other.covers) & shown
         gained = (self.density - other.density).sum(axis=(1, 2), where=where, dtype=float)
         expected = np.maximum(self._of(self, where) - other._of(self, where), 0.0)
         share = float(gained.sum()) / max(float(expected.sum()), 1e-9)
