@@ -14,8 +14,8 @@ from anglecam.engine.score import Score, score
 from anglecam.engine.target import turned
 from anglecam.engine.target_learning import learn_target
 
-_ROUNDS = 2
-"""Of learning and locating in turn, as for a body that turns (`anglecam.engine.refine`)."""
+_ROUNDS = 3
+"""Of learning and locating in turn: a turning body, whose turns it begins at, has had as many."""
 _TRIED_PX = np.arange(-3.0, 3.5, 0.5)
 """Shifts along the line, and across it, by which a place may be off."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -68,6 +70,15 @@ def test_a_hand_that_covers_the_way_of_a_body_is_no_rival_of_it():
     true = score(held, "true", Proposal("true", CENTRE, turn).poses(held))
     hand = score(held, "hand", [np.eye(2, 3) if k < 12 else None for k in range(36)])
     assert true.lead(hand) > 10.0
+
+
+def test_a_frame_in_which_neither_shows_its_body_says_nothing(swing):
+    few = [pose if k % 4 < 2 else None for k, pose in enumerate(Proposal("few", CENTRE, TURN).poses(swing))]
+    found, nothing = score(swing, "few", few), score(swing, NOTHING, [None] * len(TURN))
+    unseen = np.arange(len(TURN)) % 4 >= 2
+    better = replace(found, density=np.where(unseen[:, None, None], found.density + 1.0, found.density))
+    assert found.lead(nothing) > 6.0
+    assert better.over(nothing) == found.over(nothing)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -46,6 +46,18 @@ def test_what_slides_is_found_where_it_is():
     assert score(sample, "turns", fit.proposal.poses(sample)).lead(slide.score) < 5.0
 
 
+def test_the_line_of_a_slide_is_found_where_that_of_the_turns_is_another():
+    axis = np.array([14.0, 4.0]) / 14.0
+    sample = _sample([_box(s * axis, 0.0, k) for k, s in enumerate(SHIFT)])
+    fit = refine(sample, Proposal("far", FAR, -SHIFT / 350.0))
+    assert fit is not None
+    aside = replace(fit.proposal, centre_px=fit.proposal.centre_px - [0.0, 0.2 * FAR[1]])
+    slide = slide_of(sample, replace(fit, proposal=replace(aside, centre_px=aside.centre_px + [50.0, 0.0])))
+    found = np.array([pose[:, 2] for pose in slide.poses if pose is not None])
+    off = (found - found.mean(axis=0)) @ np.array([-axis[1], axis[0]]) / np.hypot(*axis)
+    assert np.abs(off).max() < 0.3
+
+
 def test_what_turns_is_not_taken_for_a_slide():
     sample = _sample([_box(np.zeros(2), 0.07 * np.sin(0.7 * k), k) for k in range(32)])
     fit = refine(sample, Proposal("far", FAR, 0.07 * np.sin(0.7 * np.arange(32))))
