@@ -249,7 +249,8 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
     noise = whole * float(np.sqrt((information / body.excess).sum() / information.sum()))
     # A frame that a codec distorts more than others scatters more between its tiles. So few tiles estimate this only
     # roughly, hence the weighted mean.
-    left = last.gradients - last.step * last.normals[:, 0]  # after the last step
+    moved = np.array([last.step, *last.displacement_px])
+    left = last.gradients - last.normals @ moved  # after the last step
     total, freedom = group_scatter(last.normals[:, None], left[:, None], body.groups)
     birge2 = (_CLIP_FREEDOM * body.birge**2 + total) / (_CLIP_FREEDOM + max(freedom - 1, 0))
     pose2 = noise_share * max(birge2 * whole**2 - noise**2, 0.0)
@@ -283,6 +284,8 @@ class _Step:
     """(tiles, 3) of the same."""
     normal: Floats
     """(3, 3) of all tiles."""
+    displacement_px: Floats
+    """(2,) of the frame's pivot, most probable after this step; zero where it is known."""
     noise_share: float
     """Share of the angle's variance that is caused by the pixels' noise and not by the pivot."""
 
@@ -304,19 +307,20 @@ def _step(body: BodyAppearance, view: FrameView, turn: float, middles_px: Floats
     if not clear.any() or not np.isfinite(usual):
         return None
     normal, gradient = normals.sum(axis=0), gradients.sum(axis=0)
-    noise_share = 1.0
+    noise_share, displacement = 1.0, np.zeros(2)
     covariance = view.pivot_covariance_px2
     if covariance is None and body.wander_px > 0.0:
         covariance = body.wander_px**2 * np.eye(2)
     if covariance is not None:
-        normal, gradient, noise_share = _eliminate_pivot(normal, gradient, covariance)
+        normal, gradient, noise_share, displacement = _eliminate_pivot(normal, gradient, covariance)
     if not normal[0, 0] > 0.0:  # the body has left the picture
         return None
     step = float(gradient[0] / normal[0, 0])
-    return _Step(step, usual, int(fit.count[clear].sum()), clear, normals, gradients, normal, noise_share)
+    count = int(fit.count[clear].sum())
+    return _Step(step, usual, count, clear, normals, gradients, normal, displacement, noise_share)
 
 
-def _eliminate_pivot(normal: Floats, gradient: Floats, covariance_px2: Floats) -> tuple[Floats, Floats, float]:
+def _eliminate_pivot(normal: Floats, gradient: Floats, covariance_px2: Floats) -> tuple[Floats, Floats, float, Floats]:
     """Eliminate the displacement of the frame's pivot, whose prior covariance is given, from the normal equations.
 
     The covariance is taken to be isotropic, so that the body's angle does not matter.
@@ -327,6 +331,8 @@ def _eliminate_pivot(normal: Floats, gradient: Floats, covariance_px2: Floats) -
         (3, 3) and (3,).
     noise_share : float
         Share of the angle's variance that is caused by the pixels' noise and not by the pivot.
+    displacement : ndarray
+        (2,) most probable one of the pivot after a step of the turn, px.
     """
     prior = 1.0 / max(float(np.trace(covariance_px2)) / 2.0, 1e-9)
     place = normal[1:, 1:] + prior * np.eye(2)
@@ -337,7 +343,8 @@ def _eliminate_pivot(normal: Floats, gradient: Floats, covariance_px2: Floats) -
     reduced_gradient = gradient.copy()
     reduced_gradient[0] -= normal[0, 1:] @ solved[:, 1]
     noise_share = 1.0 - prior * float(solved[:, 0] @ solved[:, 0]) / float(reduced[0, 0])
-    return reduced, reduced_gradient, noise_share
+    displacement = solved[:, 1] - solved[:, 0] * reduced_gradient[0] / reduced[0, 0]
+    return reduced, reduced_gradient, noise_share, np.asarray(displacement, float)
 
 
 def refine_doubtful_turn(body: BodyAppearance, view: FrameView, reach_px: float) -> FrameView:
