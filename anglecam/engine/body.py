@@ -128,9 +128,14 @@ def gains_about(frame: Frame, body: Body, centre: Floats, turns: Floats, shift: 
 
 
 def poses_about(centre: Floats, turns: Floats, shift: Floats = STANDS) -> Floats:
-    """Return the (m, 2, 3) maps of a body that is turned about a centre (2,), px, by angles (m,), rad, and shifted."""
-    rotation = rotations(turns)[0]
-    return np.concatenate([rotation, (centre + shift - rotation @ centre)[:, :, None]], axis=2)
+    """Return the (m, 2, 3) maps of a body that is turned about a centre (2,), px, by angles (m,), rad, and shifted.
+
+    The shift is (2,) or (m, 2), px.
+    """
+    poses = np.empty((len(turns), 2, 3))
+    poses[:, :, :2] = rotations(turns)[0]
+    poses[:, :, 2] = centre + shift - poses[:, :, :2] @ centre
+    return poses
 
 
 def turns_to_try(body: Body, centre: Floats, size: tuple[int, int], known: Floats) -> Floats:

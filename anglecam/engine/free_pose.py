@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anglecam.data.typing import Floats
-from anglecam.engine.body import Body, Frame
-from anglecam.engine.target import turned
+from anglecam.engine.body import Body, Frame, poses_about
 
 _STEPS_PX = (2.0, 1.0, 0.5)
 """Steps of the difference quotients: a pose may begin some pixels off."""
@@ -87,7 +86,7 @@ def _quadratic(gains: Floats, h: float) -> tuple[Floats, Floats]:
 
 
 def _poses(q: Floats, body: Body) -> Floats:
-    return np.stack([turned(body.middle, float(one[0]), one[1:]) for one in q])
+    return poses_about(body.middle, q[:, 0], q[:, 1:])
 
 
 def _as_parameters(pose: Floats, body: Body) -> Floats:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anglecam.data.typing import Floats
-from anglecam.engine.body import Body, Frame, body_of, frame_of
+from anglecam.engine.body import Body, Frame, body_of, frame_of, poses_about
 from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import Score, score
@@ -79,7 +79,7 @@ def _most_likely(sample: Sample, shifts: Floats, axis: Floats) -> Floats:
 
 def _best(frame: Frame, body: Body, shift: Floats, axis: Floats) -> tuple[float, float]:
     """Return by how much further along an axis a body is most likely, px, and the weight of that, 1/px²."""
-    poses = np.stack([turned(np.zeros(2), 0.0, shift + one * axis) for one in _TRIED_PX])
+    poses = poses_about(np.zeros(2), np.zeros(len(_TRIED_PX)), shift + _TRIED_PX[:, None] * axis)
     gains = body.gains(frame, poses).sum(axis=1)
     at = int(np.clip(np.argmax(gains), 1, len(gains) - 2))
     step = float(_TRIED_PX[1] - _TRIED_PX[0])

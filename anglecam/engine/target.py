@@ -9,6 +9,7 @@ glitters or the pose is wrong, a pixel of the body differs from frame to frame.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import cv2
@@ -62,20 +63,20 @@ class Target:
 
 def turned(centre: Floats, turn: float, shift: Floats | None = None) -> Floats:
     """Return the (2, 3) map of a body that is turned about a centre (2,), px, counter-clockwise as seen, rad."""
-    cos, sin = np.cos(turn), np.sin(turn)
-    rotation = np.array([[cos, sin], [-sin, cos]])
-    at = np.asarray(centre, float)
-    offset = at - rotation @ at + (0.0 if shift is None else shift)
-    return np.column_stack([rotation, offset])
+    cos, sin = math.cos(turn), math.sin(turn)
+    x, y = float(centre[0]), float(centre[1])
+    across, down = (0.0, 0.0) if shift is None else (float(shift[0]), float(shift[1]))
+    return np.array([[cos, sin, x - (cos * x + sin * y) + across], [-sin, cos, y - (cos * y - sin * x) + down]])
 
 
 def rotations(turn: Floats) -> tuple[Floats, Floats]:
     """Return the (n, 2, 2) matrices of turns (n,), rad, as in `turned`, and their derivatives."""
     cos, sin = np.cos(turn), np.sin(turn)
-    return (
-        np.stack([np.stack([cos, sin], -1), np.stack([-sin, cos], -1)], 1),
-        np.stack([np.stack([-sin, cos], -1), np.stack([-cos, -sin], -1)], 1),
-    )
+    both = np.empty((2, *np.shape(turn), 2, 2))
+    for one, along, aside in ((both[0], cos, sin), (both[1], -sin, cos)):
+        one[..., 0, 0] = one[..., 1, 1] = along
+        one[..., 0, 1], one[..., 1, 0] = aside, -aside
+    return both[0], both[1]
 
 
 def onto_picture(pose: Floats, pad: int) -> Floats:
