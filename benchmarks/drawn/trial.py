@@ -137,13 +137,15 @@ def _verdict(rms: float, ratio: float, share: float, ok: float) -> str:
 def _errors(film: Drawn, series: AngleSeries, angle_deg: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the errors of the measured frames and what is stated of them, deg.
 
-    A rolling shutter that nobody declared leaves open which row's time an angle is of: the rotation within the readout
-    times 1/√12 is added to sigma.
+    An angle is that of its frame, whose time stamp a container rounds. A rolling shutter that nobody declared leaves
+    open which row's time an angle is of: the rotation within the readout times 1/√12 is added to sigma.
     """
     ok = series.ok
     true = np.unwrap(np.radians(angle_deg))
-    found = np.interp(series.time[ok] - series.time[0], film.times_s, true)
-    speed = np.interp(series.time[ok] - series.time[0], film.times_s, np.gradient(true, film.times_s))
+    stamps = series.time[ok] - series.time[0]
+    frame = np.abs(stamps[:, None] - film.times_s).argmin(axis=1)
+    found = true[frame]
+    speed = np.gradient(true, film.times_s)[frame]
     sigma = np.hypot(series.sigma[ok], speed * film.faults.readout_s / np.sqrt(12.0))
     turn = np.exp(1j * (series.angle[ok] - found))
     middle = np.angle((turn / sigma**2).sum())
