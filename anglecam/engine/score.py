@@ -131,7 +131,8 @@ class Score:
         where = self.covered & (self.covers | ~other.covers) & shown
         gained = (self.density - other.density).sum(axis=(1, 2), where=where, dtype=float)
         expected = np.maximum(self._of(self, where) - other._of(self, where), 0.0)
-        share = float(gained.sum()) / max(float(expected.sum()), 1e-9)
+        whole = float(expected.sum())
+        share = float(gained.sum()) / whole if whole > 0.0 else 0.0
         count = len(gained)
         error = float(np.sqrt(((gained - share * expected) ** 2).sum() * count / (count - 1)))
         return Lead(share, float(gained.sum()) / error if error > 0.0 else 0.0)
