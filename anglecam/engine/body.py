@@ -195,16 +195,32 @@ def turn_near(frame: Frame, body: Body, centre: Floats, arm: float, guess: float
     tried: Floats = guess + step * np.arange(-6.0, 7.0)
     of_parts = gains_about(frame, body, centre, tried, shift)
     gains = of_parts.sum(axis=1)
-    at = int(np.clip(np.argmax(gains), 1, len(tried) - 2))
-    curvature = float(gains[at - 1] + gains[at + 1] - 2.0 * gains[at])
+    at, along, curvature = highest(gains)
     if curvature >= 0.0:
         return NOT_SEEN
-    along = float(np.clip(0.5 * (gains[at - 1] - gains[at + 1]) / curvature, -1.0, 1.0))
     # the slopes of the parts add up to zero at the maximum; how far they scatter shows by how much it is off
     bends = of_parts[at + 1] + of_parts[at - 1] - 2.0 * of_parts[at]
     slopes = 0.5 * (of_parts[at + 1] - of_parts[at - 1]) + along * bends
     ratio = float((slopes**2).sum()) / -curvature * PARTS / (PARTS - 1)
     return Turn(tried[at] + step * along, step / np.sqrt(-curvature), ratio, float(gains.max()))
+
+
+def highest(gains: Floats) -> tuple[int, float, float]:
+    """Return where evenly spaced gains (m,) are highest, by the parabola through the best inner one and its neighbours.
+
+    Returns
+    -------
+    at : int
+        Number of the best one.
+    along : float
+        By how many steps the maximum of the parabola lies beyond it, at most one; 0 where there is none.
+    curvature : float
+        Of the parabola, nats per step squared.
+    """
+    at = int(np.clip(np.argmax(gains), 1, len(gains) - 2))
+    curvature = float(gains[at - 1] + gains[at + 1] - 2.0 * gains[at])
+    slope = 0.5 * float(gains[at - 1] - gains[at + 1])
+    return at, float(np.clip(slope / curvature, -1.0, 1.0)) if curvature < 0.0 else 0.0, curvature
 
 
 def with_ratio(sigma: Floats, ratio: Floats) -> Floats:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from anglecam.data.typing import Floats
-from anglecam.engine.body import Body, Frame, body_of, frame_of, poses_about
+from anglecam.engine.body import Body, Frame, body_of, frame_of, highest, poses_about
 from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample
 from anglecam.engine.score import Score, score
@@ -16,7 +16,8 @@ from anglecam.engine.target_learning import learn_target
 
 _ROUNDS = 3
 """Of learning and locating in turn: a turning body, whose turns it begins at, has had as many."""
-_TRIED_PX = np.arange(-3.0, 3.5, 0.5)
+_STEP_PX = 0.5
+_TRIED_PX = _STEP_PX * np.arange(-6.0, 7.0)
 """Shifts along the line, and across it, by which a place may be off."""
 
 
@@ -80,9 +81,5 @@ def _most_likely(sample: Sample, shifts: Floats, axis: Floats) -> Floats:
 def _best(frame: Frame, body: Body, shift: Floats, axis: Floats) -> tuple[float, float]:
     """Return by how much further along an axis a body is most likely, px, and the weight of that, 1/px²."""
     poses = poses_about(np.zeros(2), np.zeros(len(_TRIED_PX)), shift + _TRIED_PX[:, None] * axis)
-    gains = body.gains(frame, poses).sum(axis=1)
-    at = int(np.clip(np.argmax(gains), 1, len(gains) - 2))
-    step = float(_TRIED_PX[1] - _TRIED_PX[0])
-    bend = float(gains[at - 1] + gains[at + 1] - 2.0 * gains[at])
-    aside = 0.5 * float(gains[at - 1] - gains[at + 1]) / bend if bend < 0.0 else 0.0
-    return float(_TRIED_PX[at] + np.clip(aside, -1.0, 1.0) * step), max(-bend, 0.0) / step**2
+    at, along, curvature = highest(body.gains(frame, poses).sum(axis=1))
+    return float(_TRIED_PX[at]) + along * _STEP_PX, max(-curvature, 0.0) / _STEP_PX**2

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Picture = NDArray[np.float32]
+from anglecam.engine.target import Picture
+
 _MAD2 = 1.4826**2
 """Variance of normal values over the squared median of their magnitudes."""
 

@@ -51,11 +51,16 @@ def test_the_line_of_a_slide_is_found_where_that_of_the_turns_is_another():
     sample = _sample([_box(s * axis, 0.0, k) for k, s in enumerate(SHIFT)])
     fit = refine(sample, Proposal("far", FAR, -SHIFT / 350.0))
     assert fit is not None
-    aside = replace(fit.proposal, centre_px=fit.proposal.centre_px - [0.0, 0.2 * FAR[1]])
-    slide = slide_of(sample, replace(fit, proposal=replace(aside, centre_px=aside.centre_px + [50.0, 0.0])))
-    found = np.array([pose[:, 2] for pose in slide.poses if pose is not None])
-    off = (found - found.mean(axis=0)) @ np.array([-axis[1], axis[0]]) / np.hypot(*axis)
-    assert np.abs(off).max() < 0.3
+    lever = np.hypot(*(fit.proposal.centre_px - [60.0, 47.0]))
+    aside = replace(fit.proposal, centre_px=fit.proposal.centre_px + 0.1 * lever * axis)  # a line that is 6° off
+    across = np.array([-axis[1], axis[0]]) / np.hypot(*axis)
+
+    def off_px(poses):
+        found = np.array([pose[:, :2] @ [60.0, 47.0] + pose[:, 2] for pose in poses if pose is not None])
+        return np.abs((found - found.mean(axis=0)) @ across).max()
+
+    assert off_px(aside.poses(sample)) > 1.0
+    assert off_px(slide_of(sample, replace(fit, proposal=aside)).poses) < 0.3
 
 
 def test_what_turns_is_not_taken_for_a_slide():

@@ -194,6 +194,31 @@ def effective_centre(normal: Floats, by_unknown: Floats) -> Floats:
     return np.stack([share.real, share.imag])
 
 
+def group_scatter(normal: Floats, gradient: Floats, groups: NDArray[np.intp]) -> tuple[float, int]:
+    """Return the sum of squares of the groups' departures from the common angle, in units of their noise.
+
+    Neighbouring tiles share a codec's blocks and their errors are correlated, so only groups are independent.
+
+    Parameters
+    ----------
+    normal, gradient : ndarray
+        (tiles, frames, 3, 3) and (tiles, frames, 3), divided by the variances.
+    groups : ndarray
+        (tiles,) group of each tile.
+
+    Returns
+    -------
+    total : float
+        Sum over groups and frames.
+    count : int
+        Number of terms.
+    """
+    belongs = (groups == np.arange(groups.max() + 1)[:, None]).astype(float)
+    information, score = belongs @ normal[..., 0, 0], belongs @ gradient[..., 0]
+    seen = information > 0
+    return float((score[seen] ** 2 / information[seen]).sum()), int(seen.sum())
+
+
 def disagreement_of_groups(covariance: Floats, scores: Floats, groups: NDArray[np.intp], acting: Floats) -> float:
     """Return the effective centre's variance from the disagreement of groups of tiles over that expected from noise.
 

@@ -33,6 +33,7 @@ from anglecam.vision.registration.centre_equations import (
     centre_equations,
     disagreement_of_groups,
     effective_centre,
+    group_scatter,
 )
 from anglecam.vision.registration.own_centres import have_own_centres
 from anglecam.vision.registration.pivot_wander import excess_displacement, frame_displacements, pivot_wander
@@ -44,7 +45,7 @@ from anglecam.vision.registration.tiles import (
     Tiles,
     collect_tiles,
 )
-from anglecam.vision.registration.turn import BodyAppearance, group_scatter
+from anglecam.vision.registration.turn import BodyAppearance
 
 _FEWEST_TILES = 3
 _GROUPS = 6

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.transforms import rotation
 from anglecam.vision.registration.appearance import HIDDEN_MISFIT, TileAppearance, TileFit
+from anglecam.vision.registration.centre_equations import group_scatter
 from anglecam.vision.registration.tile_weights import copied_share, weigh_tiles
 from anglecam.vision.registration.tiles import TILE_SIDE_PX, FrameView, MotionPlane, tile_middles, tile_reach
 from anglecam.vision.registration.turn_kernel import frame_equations
@@ -384,28 +385,3 @@ def covered_views(fits: TileFit) -> NDArray[np.bool_]:
     The misfit alone does not exclude a featureless object, because it fits any tile that is dimmed to nothing.
     """
     return np.asarray((np.abs(fits.light[..., 0]) > _MAX_LIGHT_CHANGE).any(axis=-1))
-
-
-def group_scatter(normal: Floats, gradient: Floats, groups: NDArray[np.intp]) -> tuple[float, int]:
-    """Return the sum of squares of the groups' departures from the common angle, in units of their noise.
-
-    Neighbouring tiles share a codec's blocks and their errors are correlated, so only groups are independent.
-
-    Parameters
-    ----------
-    normal, gradient : ndarray
-        (tiles, frames, 3, 3) and (tiles, frames, 3), divided by the variances.
-    groups : ndarray
-        (tiles,) group of each tile.
-
-    Returns
-    -------
-    total : float
-        Sum over groups and frames.
-    count : int
-        Number of terms.
-    """
-    belongs = (groups == np.arange(groups.max() + 1)[:, None]).astype(float)
-    information, score = belongs @ normal[..., 0, 0], belongs @ gradient[..., 0]
-    seen = information > 0
-    return float((score[seen] ** 2 / information[seen]).sum()), int(seen.sum())
