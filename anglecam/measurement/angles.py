@@ -5,7 +5,7 @@ The definition of the angle, of its sign and of its zero is here, for marks that
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,6 +126,8 @@ def coarse_angles(
         np.sqrt(np.einsum("ni,nij,nj->n", v, noise, v)) for v in (out, np.column_stack([-out[:, 1], out[:, 0]]))
     )
     errors = place_errors(mark, off, across, along)
+    # the distance from the pivot does not show an error of the camera's roll
+    errors = replace(errors, noise_px=np.hypot(errors.noise_px, lever * detections.roll_sigma[ok]))
     # of a mark seen obliquely, other parts become visible as it rotates, and they lie at other heights
     thick = _THICK * float(np.median(np.sqrt([r.area_px2 for r in regions])))
     return angles_of_places(mark, detections.pivot, errors, detections.lens, time[ok], rig, command, thick_px=thick)
@@ -189,7 +191,7 @@ def _angles_of_body(
 
     The body reaches beyond a middle that is near the pivot, as a wheel's is: the line then ends where the body does.
     """
-    turn, noise = body.turn[ok], body.sigma[ok]
+    turn, noise = body.turn[ok], np.hypot(body.sigma[ok], detections.roll_sigma[ok])
     arm = detections.lens.rectify(body.centre_px) - detections.pivot.centre_px
     arm *= max(1.0, body.extent_px / max(float(np.hypot(*arm)), _LEAST_ARM_PX))
     mark = detections.pivot.centre_px + rotate_each(arm, turn)

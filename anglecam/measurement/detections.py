@@ -95,6 +95,18 @@ class Detections:
             return filmed
         return np.array([move.to_frame(place) for move, place in zip(self.camera_moves, filmed, strict=True)])
 
+    @property
+    def rolls(self) -> Floats:
+        """(frames,) roll of the camera, rad; NaN where it is unknown."""
+        moves = self.camera_moves
+        return np.zeros(len(self.time)) if moves is None else np.array([move.roll for move in moves])
+
+    @property
+    def roll_sigma(self) -> Floats:
+        """(frames,) standard uncertainty of the roll, rad: no picture of the body shows this error of its turn."""
+        moves = self.camera_moves
+        return np.zeros(len(self.time)) if moves is None else np.sqrt([move.covariance[2, 2] for move in moves])
+
 
 def frames_to_keep(film: Film) -> int:
     """Return how many frames the first reading keeps."""

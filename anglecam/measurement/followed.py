@@ -159,8 +159,9 @@ def _measured(
         registered = register_clip(film, start, detections.lens, progress, detections.turns)
         why_coarse = registered if isinstance(registered, str) else None
         if isinstance(registered, Registered):
-            registered = replace(registered, turn=registered.turn - _rolls(detections))
-            start = replace(start, turn=start.turn - _rolls(detections))
+            noise = np.hypot(registered.noise, detections.roll_sigma)
+            registered = replace(registered, turn=registered.turn - detections.rolls, noise=noise)
+            start = replace(start, turn=start.turn - detections.rolls)
             found = np.isfinite(registered.turn)
             ok |= found & smeared_marks(detections, start, registered, float(np.median(angles.lever_px)))
             carried = carried_marks(detections, ok, registered)
@@ -180,15 +181,6 @@ def _measured(
     )
     doubt = why_few(status, rig.least_measured) or why_doubtful(detections, ok, angles, rig, hand_held=hand_held)
     return Followed(detections, ok, time, angles, why_coarse, doubt)
-
-
-def _rolls(detections: Detections) -> Floats:
-    """Return (n,) roll of the camera in each frame, rad."""
-    return (
-        np.zeros(len(detections.time))
-        if detections.camera_moves is None
-        else np.array([move.roll for move in detections.camera_moves])
-    )
 
 
 def _mark_rows(detections: Detections) -> Floats:
@@ -222,7 +214,7 @@ def _start(detections: Detections, ok: NDArray[np.bool_], time: Floats, row: Flo
         pivots = detections.lens.rectify(detections.in_picture(pivots))
         filmed = detections.lens.distort(detections.pivot.centre_px)
         covariance = np.array([move.place_covariance(filmed) for move in detections.camera_moves])
-        turn = turn + _rolls(detections)
+        turn = turn + detections.rolls
     return Start(
         turn=turn,
         sigma=sigma,

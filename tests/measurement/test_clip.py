@@ -87,24 +87,20 @@ def drawn(request, tmp_path_factory):
 
 IN_SWEEP = tuple(name for name in SESSIONS if name != "ring, mug")
 """Without a marker and a hint things are measured in `tests/measurement/test_any_mark.py`."""
-BIASED = pytest.mark.xfail(strict=True, reason="the mean error of the clip is larger than its stated uncertainty")
 
 
-def _sessions(biased=()):
-    """Return the sessions, those that are like another with the mark `sweep`."""
-    marks = {name: [pytest.mark.sweep] for name in IN_SWEEP}
-    marks["no marker, no hint, red lamp"] += biased
-    return [pytest.param(name, marks=marks.get(name, ())) for name in SESSIONS]
+SWEPT = [pytest.param(name, marks=[pytest.mark.sweep] if name in IN_SWEEP else ()) for name in SESSIONS]
+"""The sessions, those that are like another with the mark `sweep`."""
 
 
-@pytest.mark.parametrize("drawn", _sessions(biased=[BIASED]), indirect=True)
+@pytest.mark.parametrize("drawn", SWEPT, indirect=True)
 def test_the_whole_error_mean_and_scatter_is_as_large_as_sigma(drawn):
     _, _, ratio, measured, truth = drawn
     error, sigma = _errors(measured.series, truth.angle_deg)
     assert ratio[0] < np.sqrt(((error / sigma) ** 2).mean()) < ratio[1]
 
 
-@pytest.mark.parametrize("drawn", _sessions(), indirect=True)
+@pytest.mark.parametrize("drawn", SWEPT, indirect=True)
 def test_angles_are_right_and_sigma_is_true_beside_a_second_red_object(drawn):
     look, limit, ratio, measured, truth = drawn
     series = measured.series

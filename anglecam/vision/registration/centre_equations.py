@@ -219,6 +219,26 @@ def group_scatter(normal: Floats, gradient: Floats, groups: NDArray[np.intp]) ->
     return float((score[seen] ** 2 / information[seen]).sum()), int(seen.sum())
 
 
+def fitted_terms(normal: Floats, groups: NDArray[np.intp], covariance: Floats) -> float:
+    """Return by how much a fit lowers the expected sum of `group_scatter` of one frame.
+
+    What is left of a group's gradient after the fit has the covariance N − N·P·N, with N its normal matrix and P the
+    covariance of what was fitted. Where that is the turn alone, the terms are 1.
+
+    Parameters
+    ----------
+    normal : ndarray
+        (tiles, 3, 3) for turn and place, divided by the variances.
+    groups : ndarray
+        (tiles,) group of each tile.
+    covariance : ndarray
+        (3, 3) P; zero for what was not fitted.
+    """
+    of_turn = (groups == np.arange(groups.max() + 1)[:, None]).astype(float) @ normal[:, 0]
+    seen = of_turn[of_turn[:, 0] > 0.0]
+    return float((np.einsum("gi,ij,gj->g", seen, covariance, seen) / seen[:, 0]).sum())
+
+
 def disagreement_of_groups(covariance: Floats, scores: Floats, groups: NDArray[np.intp], acting: Floats) -> float:
     """Return the effective centre's variance from the disagreement of groups of tiles over that expected from noise.
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from anglecam.data.typing import Floats, Image
 from anglecam.vision.image.transforms import rotation
 from anglecam.vision.registration.appearance import HIDDEN_MISFIT, TileAppearance, TileFit
-from anglecam.vision.registration.centre_equations import group_scatter
+from anglecam.vision.registration.centre_equations import fitted_terms, group_scatter
 from anglecam.vision.registration.tile_weights import copied_share, weigh_tiles
 from anglecam.vision.registration.tiles import TILE_SIDE_PX, FrameView, MotionPlane, tile_middles, tile_reach
 from anglecam.vision.registration.turn_kernel import frame_equations
@@ -242,7 +242,7 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
         if abs(last.step) < _SETTLED / np.sqrt(last.normal[0, 0]):
             break
     assert last is not None
-    normal, clear, noise_share = last.normal, last.clear, last.noise_share
+    normal, clear, pivot = last.normal, last.clear, last.pivot
     information = last.normals[:, 0, 0]
     pivot_sensitivity = -normal[0, 1:] @ (np.eye(2) - rotation(turn)) / normal[0, 0]
     whole = 1 / float(np.sqrt(normal[0, 0]))
@@ -250,13 +250,15 @@ def find_turn(body: BodyAppearance, view: FrameView, before: Image | None = None
     noise = whole * float(np.sqrt((information / body.excess).sum() / information.sum()))
     # A frame that a codec distorts more than others scatters more between its tiles. So few tiles estimate this only
     # roughly, hence the weighted mean.
-    moved = np.array([last.step, *last.displacement_px])
+    moved = np.array([last.step, *pivot.displacement_px])
     left = last.gradients - last.normals @ moved  # after the last step
-    total, freedom = group_scatter(last.normals[:, None], left[:, None], body.groups)
-    birge2 = (_CLIP_FREEDOM * body.birge**2 + total) / (_CLIP_FREEDOM + max(freedom - 1, 0))
-    pose2 = noise_share * max(birge2 * whole**2 - noise**2, 0.0)
+    total, count = group_scatter(last.normals[:, None], left[:, None], body.groups)
+    freedom = count - fitted_terms(last.normals, body.groups, pivot.covariance)
+    total, freedom = total + pivot.squares, freedom + pivot.freedom
+    birge2 = (_CLIP_FREEDOM * body.birge**2 + total) / (_CLIP_FREEDOM + max(freedom, 0.0))
+    pose2 = pivot.noise_share * max(birge2 * whole**2 - noise**2, 0.0)
     if before is not None:
-        misfit = noise * np.sqrt(noise_share * last.count)
+        misfit = noise * np.sqrt(pivot.noise_share * last.count)
         share = copied_share(view.image, before, middles[clear].round().astype(np.int64), TILE_SIDE_PX // 2)
         pose2 += (_COPY * share * misfit) ** 2
     return TurnEstimate(float(turn), noise, float(np.sqrt(pose2)), pivot_sensitivity, last.usual, clear)
@@ -285,10 +287,24 @@ class _Step:
     """(tiles, 3) of the same."""
     normal: Floats
     """(3, 3) of all tiles."""
+    pivot: _FramePivot
+    """Displacement of the frame's pivot."""
+
+
+@dataclass(frozen=True)
+class _FramePivot:
+    """What a frame shows of the displacement of its pivot."""
+
     displacement_px: Floats
-    """(2,) of the frame's pivot, most probable after this step; zero where it is known."""
+    """(2,) most probable after the step; zero where the pivot is known."""
+    covariance: Floats
+    """(3, 3) of turn and displacement, both unknown, if only the pixels' noise were at work; rad, px."""
     noise_share: float
     """Share of the angle's variance that is caused by the pixels' noise and not by the pivot."""
+    squares: float
+    """Square of the displacement in units of its prior standard deviation."""
+    freedom: float
+    """Expected value of that: what of the prior is no information of this frame; between 0 and 2."""
 
 
 def _step(body: BodyAppearance, view: FrameView, turn: float, middles_px: Floats) -> _Step | None:
@@ -308,20 +324,21 @@ def _step(body: BodyAppearance, view: FrameView, turn: float, middles_px: Floats
     if not clear.any() or not np.isfinite(usual):
         return None
     normal, gradient = normals.sum(axis=0), gradients.sum(axis=0)
-    noise_share, displacement = 1.0, np.zeros(2)
+    known = np.diag([1.0 / max(float(normal[0, 0]), 1e-9), 0.0, 0.0])
+    pivot = _FramePivot(np.zeros(2), known, 1.0, 0.0, 0.0)
     covariance = view.pivot_covariance_px2
     if covariance is None and body.wander_px > 0.0:
         covariance = body.wander_px**2 * np.eye(2)
     if covariance is not None:
-        normal, gradient, noise_share, displacement = _eliminate_pivot(normal, gradient, covariance)
+        normal, gradient, pivot = _eliminate_pivot(normal, gradient, covariance)
     if not normal[0, 0] > 0.0:  # the body has left the picture
         return None
     step = float(gradient[0] / normal[0, 0])
     count = int(fit.count[clear].sum())
-    return _Step(step, usual, count, clear, normals, gradients, normal, displacement, noise_share)
+    return _Step(step, usual, count, clear, normals, gradients, normal, pivot)
 
 
-def _eliminate_pivot(normal: Floats, gradient: Floats, covariance_px2: Floats) -> tuple[Floats, Floats, float, Floats]:
+def _eliminate_pivot(normal: Floats, gradient: Floats, covariance_px2: Floats) -> tuple[Floats, Floats, _FramePivot]:
     """Eliminate the displacement of the frame's pivot, whose prior covariance is given, from the normal equations.
 
     The covariance is taken to be isotropic, so that the body's angle does not matter.
@@ -330,10 +347,8 @@ def _eliminate_pivot(normal: Floats, gradient: Floats, covariance_px2: Floats) -
     -------
     normal, gradient : ndarray
         (3, 3) and (3,).
-    noise_share : float
-        Share of the angle's variance that is caused by the pixels' noise and not by the pivot.
-    displacement : ndarray
-        (2,) most probable one of the pivot after a step of the turn, px.
+    pivot : _FramePivot
+        What was eliminated.
     """
     prior = 1.0 / max(float(np.trace(covariance_px2)) / 2.0, 1e-9)
     place = normal[1:, 1:] + prior * np.eye(2)
@@ -344,8 +359,10 @@ def _eliminate_pivot(normal: Floats, gradient: Floats, covariance_px2: Floats) -
     reduced_gradient = gradient.copy()
     reduced_gradient[0] -= normal[0, 1:] @ solved[:, 1]
     noise_share = 1.0 - prior * float(solved[:, 0] @ solved[:, 0]) / float(reduced[0, 0])
-    displacement = solved[:, 1] - solved[:, 0] * reduced_gradient[0] / reduced[0, 0]
-    return reduced, reduced_gradient, noise_share, np.asarray(displacement, float)
+    moved = np.asarray(solved[:, 1] - solved[:, 0] * reduced_gradient[0] / reduced[0, 0], float)
+    joint = np.asarray(np.linalg.inv(normal + np.diag([0.0, prior, prior])), float)
+    freedom = 2.0 - prior * float(np.trace(joint[1:, 1:]))
+    return reduced, reduced_gradient, _FramePivot(moved, joint, noise_share, prior * float(moved @ moved), freedom)
 
 
 def refine_doubtful_turn(body: BodyAppearance, view: FrameView, reach_px: float) -> FrameView:
