@@ -61,17 +61,22 @@ class Body:
     """The pixels by which a body is located."""
 
     places: Picture
-    """(n, 2) in the coordinates of the body, px."""
+    """(2, n) in the coordinates of the body, px, one part after the other."""
     values: Picture
-    """(n, 4) mean, grey levels, variance, grey levels², and what cosine and sine of the turn add to the mean."""
+    """(4, n) mean, grey levels, variance, grey levels², and what cosine and sine of the turn add to the mean."""
     middle: Floats
     """(2,) mean of the places, px."""
     reach: float
     """Root mean square distance of the places from it, px."""
     stands_for: float
     """Pixels of the body for each of them."""
-    part: NDArray[np.int64]
-    """(n,) part of the body to which each belongs, by direction and distance from the middle."""
+    ends: NDArray[np.int64]
+    """(`PARTS`,) number of pixels of each part, by direction and distance from the middle, and of those before it."""
+
+    @property
+    def count(self) -> int:
+        """Number of its pixels here."""
+        return self.places.shape[1]
 
     def gains(self, frame: Frame, poses: Floats) -> Floats:
         """Return the gains of poses (m, 2, 3), for each of the body's parts (m, `PARTS`)."""
@@ -82,23 +87,22 @@ class Body:
             np.float32(frame.excess),
             self.places,
             self.values,
-            self.part,
-            PARTS,
+            self.ends,
             poses,
         )
         return np.asarray(of_parts) * self.stands_for
 
     def arm(self, centre: Floats) -> float:
         """Return how far the body's outer pixels move for each rad of a turn about a centre, px."""
-        return max(self.reach, float(np.quantile(np.hypot(*(self.places - centre).T), _OUTER)))
+        return max(self.reach, float(np.quantile(np.hypot(*(self.places.T - centre).T), _OUTER)))
 
     def thinned(self, every: int) -> Body:
         """Return every so many-th pixel."""
         return replace(
             self,
-            places=self.places[::every].copy(),
-            values=self.values[::every].copy(),
-            part=self.part[::every].copy(),
+            places=self.places[:, ::every].copy(),
+            values=self.values[:, ::every].copy(),
+            ends=-(-self.ends // every),
             stands_for=self.stands_for * every,
         )
 
@@ -108,18 +112,21 @@ def body_of(target: Target, most: int = _MOST_PIXELS) -> Body | None:
     rows, columns = np.nonzero(target.visibility > 0.5)
     if len(rows) < _LEAST_PIXELS:
         return None
-    chosen = np.random.default_rng(0).permutation(len(rows))[:most] if len(rows) > most else np.arange(len(rows))
-    rows_of, columns_of = rows[chosen], columns[chosen]
-    places = np.column_stack([columns_of, rows_of]) - float(target.pad)
-    of_target = (target.appearance, target.variance, *target.shading)
-    values = np.column_stack([one[rows_of, columns_of] for one in of_target])
-    middle = np.array([columns.mean(), rows.mean()]) - target.pad
-    reach = max(2.0, float(np.sqrt(((places - middle) ** 2).sum(axis=1).mean())))
-    away = np.hypot(*(places - middle).T)
-    sector = (np.arctan2(*(places - middle).T) / (2.0 * np.pi) + 0.5) * _SECTORS
-    part = np.minimum(sector.astype(np.int64), _SECTORS - 1) + _SECTORS * (away > np.median(away))
-    values = values.astype(np.float32)
-    return Body(places.astype(np.float32), values, middle, reach, len(rows) / len(chosen), part)
+    middle, count = np.array([columns.mean(), rows.mean()]) - target.pad, len(rows)
+    if count > most:
+        chosen = np.sort(np.random.default_rng(0).permutation(count)[:most])
+        rows, columns = rows[chosen], columns[chosen]
+    places = np.stack([columns, rows]) - float(target.pad)
+    off = places - middle[:, None]
+    away = np.hypot(*off)
+    reach = max(2.0, float(np.sqrt((away**2).mean())))
+    sector = ((np.arctan2(*off) / (2.0 * np.pi) + 0.5) * _SECTORS).astype(np.int64)
+    part = np.minimum(sector, _SECTORS - 1) + _SECTORS * (away > np.median(away))
+    by_part = np.argsort(part, kind="stable")
+    values = np.stack([one[rows, columns][by_part] for one in (target.appearance, target.variance, *target.shading)])
+    ends = np.searchsorted(part[by_part], np.arange(PARTS), side="right")
+    places = np.ascontiguousarray(places[:, by_part], np.float32)
+    return Body(places, values.astype(np.float32), middle, reach, count / len(rows), ends)
 
 
 def gains_about(frame: Frame, body: Body, centre: Floats, turns: Floats, shift: Floats = STANDS) -> Floats:
@@ -160,9 +167,9 @@ def turns_to_try(body: Body, centre: Floats, size: tuple[int, int], known: Float
     arm = body.arm(centre)
     count = max(36, int(2.0 * np.pi * arm / _SEARCH_PX))
     turns = np.pi * (np.arange(count) * 2.0 / count - 1.0)
-    few = body.thinned(max(1, len(body.places) // 50))
+    few = body.thinned(max(1, body.count // 50))
     poses = poses_about(centre, turns)
-    x, y = np.moveaxis(few.places @ poses[:, :, :2].swapaxes(1, 2) + poses[:, None, :, 2], -1, 0)
+    x, y = (poses[:, :, :2] @ few.places + poses[:, :, 2:]).swapaxes(0, 1)
     inside = ((x >= 0) & (y >= 0) & (x < size[1] - 1) & (y < size[0] - 1)).mean(axis=1) >= _IN_PICTURE
     reach, middle = np.ptp(known) / 2.0 + _BEYOND_PX / arm, np.min(known) + np.ptp(known) / 2.0
     turns = turns[inside | (np.abs(np.angle(np.exp(1j * (turns - middle)))) < reach)]

@@ -106,7 +106,7 @@ def further_bodies(stills: Stills, first: Proposal, most: int = MOST) -> list[Mo
 
 
 def elsewhere(learnt: Learnt) -> list[Moving]:
-    """Return what else turns by the explanations that lost to the first: where the first does not cover it.
+    """Return what else turns by the explanations that lost to the first, if they predict better where they are.
 
     Parameters
     ----------
@@ -118,24 +118,22 @@ def elsewhere(learnt: Learnt) -> list[Moving]:
     list of Moving
         Not fitted anew; `further_bodies` looks for others, too.
     """
-    sample = learnt.wider or learnt.sample
-    known = [learnt.explanations[0].fit.proposal.in_frames(learnt.sample.frames, sample.frames)]
+    first, *others = learnt.explanations
+    others = [one for one in others if one.turns]
+    if not others:
+        return []
+    sample, proposal = learnt.sample, first.fit.proposal
+    known = [first.score]
+    if learnt.wider is not None:
+        sample, proposal = learnt.wider, proposal.in_frames(sample.frames, learnt.wider.frames)
+        known = [score(sample, proposal.name, proposal.poses(sample))]
     found: list[Moving] = []
-    with one_opencv_thread():
-        for one in learnt.explanations[1:]:
-            if one.turns:
-                rest = taken_out(sample, known)
-                lead = _lead(rest.masked, one.fit.proposal, known)
-                if lead >= SURE:
-                    known.append(one.fit.proposal)
-                    found.append(Moving(one.fit.proposal, rest.masked, one.fit, lead, "turns", before=rest.targets))
+    for one in others:
+        lead = min(one.lead, *(one.score.lead(other) for other in known))
+        if lead >= SURE:
+            known.append(one.score)
+            found.append(Moving(one.fit.proposal, sample, one.fit, lead, "turns"))
     return found
-
-
-def _lead(masked: Sample, proposal: Proposal, known: Sequence[Proposal]) -> float:
-    """Return by how much a proposal predicts better than that nothing moves, or with the known bodies only."""
-    mine = score(masked, proposal.name, proposal.poses(masked))
-    return min(mine.lead(rival) for rival in _rivals(masked, known))
 
 
 def _rivals(masked: Sample, known: Sequence[Proposal]) -> list[Score]:

@@ -110,24 +110,23 @@ def multiply_odds(odds, picture, body, body_variance, excess, background, backgr
 
 
 @njit(inline="always")
-def _between(picture, x, y):  # type: ignore[no-untyped-def]
-    """Interpolate linearly; the place lies inside."""
-    column, row = int(x), int(y)
-    u, v = x - np.float32(column), y - np.float32(row)
-    above = picture[row, column] + u * (picture[row, column + 1] - picture[row, column])
-    below = picture[row + 1, column] + u * (picture[row + 1, column + 1] - picture[row + 1, column])
-    return above + v * (below - above)
+def _between(picture, at, below, across, down):  # type: ignore[no-untyped-def]
+    """Interpolate a picture linearly between a pixel, that to its right, and those below them."""
+    next_to = np.uint32(1)
+    upper = picture[at] + across * (picture[at + next_to] - picture[at])
+    lower = picture[below] + across * (picture[below + next_to] - picture[below])
+    return upper + down * (lower - upper)
 
 
 @njit(
     "float64[:, ::1](float32[:, ::1], float32[:, ::1], float32[:, ::1], float32, float32[:, ::1], float32[:, ::1], "
-    "int64[::1], int64, float64[:, :, ::1])",
+    "int64[::1], float64[:, :, ::1])",
     cache=True,
     nogil=True,
     fastmath=_MATHS,
     error_model="numpy",
 )
-def pose_gains(picture, background, precision, excess, places, body, part, parts, poses):  # type: ignore[no-untyped-def]
+def pose_gains(picture, background, precision, excess, places, body, ends, poses):  # type: ignore[no-untyped-def]
     """Return the gain L of each pose, by parts of the body.
 
     Between pixels, picture and background are interpolated alike, which averages the noise of either.
@@ -143,14 +142,12 @@ def pose_gains(picture, background, precision, excess, places, body, part, parts
     excess : float
         By how much the variance of a pixel is larger in this picture than usual, grey levels².
     places : ndarray
-        (n, 2) float32, the body's pixels in its own coordinates.
+        (2, n) float32, the body's pixels in its own coordinates, one part after the other.
     body : ndarray
-        (n, 4) float32, their mean, grey levels, and variance, grey levels²; cosine and sine of the turn add two more
-        columns, grey levels, to the mean.
-    part : ndarray
-        (n,) part to which each of them belongs.
-    parts : int
-        Number of parts.
+        (4, n) float32, their mean, grey levels, and variance, grey levels²; cosine and sine of the turn add the two
+        other rows, grey levels, to the mean.
+    ends : ndarray
+        (parts,) number of pixels of each part and those before it.
     poses : ndarray
         (m, 2, 3) from the body's coordinates to the picture.
 
@@ -160,36 +157,52 @@ def pose_gains(picture, background, precision, excess, places, body, part, parts
         (m, parts) nats.
     """
     height, width = picture.shape
-    gains, product = np.zeros((len(poses), parts)), np.ones(parts)
-    n = len(places)
-    sharp = np.float32(1.0) / (body[:, 1] + excess)
-    off, off_behind, precise, behind = np.empty((4, n), np.float32)
-    of_part = np.empty(n, np.int64)
+    n, parts = places.shape[1], len(ends)
+    gains = np.zeros((len(poses), parts))
+    x_of, y_of, mean, with_cosine, with_sine = places[0], places[1], body[0], body[2], body[3]
+    sharp = np.float32(1.0) / (body[1] + excess)
+    pictured, behind, precisions = picture.ravel(), background.ravel(), precision.ravel()
+    line, wide, high = np.int32(width), np.float32(width - 1), np.float32(height - 1)
+    zero, half = np.float32(0.0), np.float32(0.5)
+    across, down = np.empty(n, np.float32), np.empty(n, np.float32)
+    corner, nearest = np.empty(n, np.int32), np.empty(n, np.int32)
+    off, off_behind, precise, precise_behind = np.empty((4, n), np.float32)
     for m in range(len(poses)):
         a, b, c = np.float32(poses[m, 0, 0]), np.float32(poses[m, 0, 1]), np.float32(poses[m, 0, 2])
         d, e, f = np.float32(poses[m, 1, 0]), np.float32(poses[m, 1, 1]), np.float32(poses[m, 1, 2])
-        shown = 0
+        # apart from what is read at these places, this is done for many pixels at once
         for i in range(n):
-            x = a * places[i, 0] + b * places[i, 1] + c
-            y = d * places[i, 0] + e * places[i, 1] + f
-            if x < 0.0 or y < 0.0 or x >= width - 1 or y >= height - 1:
-                continue
-            seen = _between(picture, x, y)
-            off[shown] = seen - (body[i, 0] + a * body[i, 2] + b * body[i, 3])
-            if not off[shown] * off[shown] >= 0.0:
-                continue
-            off_behind[shown] = seen - _between(background, x, y)
-            precise[shown], of_part[shown] = sharp[i], part[i]
-            behind[shown] = precision[int(y + np.float32(0.5)), int(x + np.float32(0.5))]
-            shown += 1
-        for i in range(shown):
-            as_background = _density(off_behind[i], behind[i])
-            known = off_behind[i] * off_behind[i] * behind[i] >= 0.0
-            off[i] = _density(off[i], precise[i]) / (as_background if known else _UNKNOWN)
-        for first in range(0, shown, _TOGETHER):
-            for i in range(first, min(first + _TOGETHER, shown)):
-                product[of_part[i]] *= off[i]
-            for k in range(parts):
-                gains[m, k] += log(product[k])
-                product[k] = 1.0
+            x = a * x_of[i] + b * y_of[i] + c
+            y = d * x_of[i] + e * y_of[i] + f
+            inside = (x >= zero) & (y >= zero) & (x < wide) & (y < high)
+            x, y = x if inside else zero, y if inside else zero
+            column, row = np.int32(x), np.int32(y)
+            across[i], down[i] = x - np.float32(column), y - np.float32(row)
+            corner[i] = row * line + column if inside else np.int32(-1)
+            nearest[i] = np.int32(y + half) * line + np.int32(x + half)
+        first = 0
+        for k in range(parts):
+            shown = 0
+            for i in range(first, ends[k]):
+                if corner[i] < 0:
+                    continue
+                at, below = np.uint32(corner[i]), np.uint32(corner[i] + line)
+                seen = _between(pictured, at, below, across[i], down[i])
+                away = seen - (mean[i] + a * with_cosine[i] + b * with_sine[i])
+                if not away * away >= zero:
+                    continue
+                off[shown], precise[shown] = away, sharp[i]
+                off_behind[shown] = seen - _between(behind, at, below, across[i], down[i])
+                precise_behind[shown] = precisions[np.uint32(nearest[i])]
+                shown += 1
+            for i in range(shown):
+                as_background = _density(off_behind[i], precise_behind[i])
+                known = off_behind[i] * off_behind[i] * precise_behind[i] >= zero
+                off[i] = _density(off[i], precise[i]) / (as_background if known else _UNKNOWN)
+            for start in range(0, shown, _TOGETHER):
+                product = 1.0
+                for i in range(start, min(start + _TOGETHER, shown)):
+                    product *= off[i]
+                gains[m, k] += log(product)
+            first = ends[k]
     return gains

@@ -182,7 +182,7 @@ def sensitivities(
 def _searched(frames: list[Frame], body: Body, centre: Floats, turn: Floats, shifts: Floats) -> Floats:
     """Return the turns with those that are unknown sought wherever the body may be."""
     tried = turns_to_try(body, centre, frames[0].picture.shape, turn[np.isfinite(turn)])
-    few = body.thinned(max(1, len(body.places) // 250))
+    few = body.thinned(max(1, body.count // 250))
     found = turn.copy()
     for k in np.flatnonzero(~np.isfinite(turn) & np.isfinite(shifts).all(axis=1)):
         gains = gains_about(frames[k], few, centre, tried, shifts[k]).sum(axis=1)

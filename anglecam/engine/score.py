@@ -116,9 +116,9 @@ class Score:
         sums = np.empty(len(where))
         for k, counts in enumerate(where):
             picture, mean, variance = (
-                one[k].astype(np.float32) for one in (other.pictures, self.pictures, self.variances)
+                one[k][counts].astype(np.float32)[None] for one in (other.pictures, self.pictures, self.variances)
             )
-            sums[k] = float(log_density(picture, mean, variance)[counts].sum(dtype=float))
+            sums[k] = float(log_density(picture, mean, variance).sum(dtype=float))
         return sums
 
     def over(self, other: Score) -> Lead:

@@ -31,10 +31,10 @@ class Slide:
 
 
 def slide_of(sample: Sample, fit: Fit) -> Slide:
-    """Return what predicts best of a body that moves on a straight line near the way of a turning one's middle.
+    """Return a body that moves on a straight line near the way of a turning one's middle.
 
-    The line and the places on it are those of the turning body, or those at which the unturned body is most likely:
-    the one explanation must not be worse than the other only because the other was fitted.
+    The line, and the places on it, are those at which the unturned body is most likely: the one explanation must not be
+    worse than the other only because the other was fitted.
     """
     poses = fit.proposal.poses(sample)
     rows, columns = np.nonzero(fit.target.visibility)
@@ -44,12 +44,11 @@ def slide_of(sample: Sample, fit: Fit) -> Slide:
     weight = np.maximum(fit.gain[known], 0.0)  # a frame that hardly shows the body says little of its way
     mean = np.average(shifts[known], axis=0, weights=weight)
     axis = np.linalg.svd((shifts[known] - mean) * np.sqrt(weight)[:, None])[2][0]
-    near = mean + ((shifts - mean) @ axis)[:, None] * axis
-    fitted = near
+    shifts = mean + ((shifts - mean) @ axis)[:, None] * axis
     for _ in range(_ROUNDS):
-        fitted = _most_likely(sample, fitted, axis)
-    tried = (_unturned(places) for places in (near, fitted))
-    return max((Slide(poses, score(sample, "slides", poses)) for poses in tried), key=lambda one: one.score.total)
+        shifts = _most_likely(sample, shifts, axis)
+    poses = _unturned(shifts)
+    return Slide(poses, score(sample, "slides", poses))
 
 
 def _unturned(shifts: Floats) -> list[Floats | None]:

@@ -99,7 +99,7 @@ def search_for(sample: Sample, fit: Fit) -> Search:
     assert body is not None
     centre = sample.place(fit.proposal.centre_px)
     arm = body.arm(centre)
-    few = body.thinned(max(1, len(body.places) // _FEW_PIXELS))
+    few = body.thinned(max(1, body.count // _FEW_PIXELS))
     turns = turns_to_try(body, centre, sample.median.shape, fit.proposal.turn[fit.seen])
     search = Search(sample, fit, body, few, centre, arm, turns, max(1.0, fit.ratio), np.empty((0, 2)))
     return replace(search, wrong=_wrong_poses(search))
@@ -122,7 +122,7 @@ def _wrong_poses(search: Search) -> Floats:
         body = body_of(target)
         if body is None:
             continue
-        few = body.thinned(max(1, len(body.places) // _FEW_PIXELS))
+        few = body.thinned(max(1, body.count // _FEW_PIXELS))
         learnt = replace(search, fit=replace(search.fit, target=target), body=body, few=few)
         for k in (k for k in range(1 - half, count, 2) if search.fit.seen[k]):
             right, picture = proposal.turn[k], sample.pictures[k]

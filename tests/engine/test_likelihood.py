@@ -39,30 +39,28 @@ def test_odds_are_the_product_over_pictures():
 @pytest.mark.parametrize("shade", [0.0, 12.0])
 def test_the_gain_of_a_pose_is_the_sum_over_the_body(shade):
     rows, columns = np.nonzero(np.ones((12, 14)))
-    places = np.column_stack([columns, rows]).astype(np.float32)
+    places = np.stack([columns, rows]).astype(np.float32)
     variance = VARIANCE[rows, columns]
-    body = np.column_stack([MEAN[rows + 5, columns + 3], variance, *np.full((2, len(rows)), shade)])
-    part = np.arange(len(rows)) % 3
+    body = np.stack([MEAN[rows + 5, columns + 3], variance, *np.full((2, len(rows)), shade)])
+    ends = np.array([50, 50, len(rows)])
     pose = np.array([[[1.0, 0.0, 3.0], [0.0, 1.0, 5.0]]])
     precision = 1.0 / (BACK_VARIANCE + 1.5)
-    found = pose_gains(
-        PICTURE, BACK, precision, np.float32(1.5), places, np.ascontiguousarray(body, np.float32), part, 3, pose
-    )
+    found = pose_gains(PICTURE, BACK, precision, np.float32(1.5), places, body.astype(np.float32), ends, pose)
     seen, behind = (one[rows + 5, columns + 3] for one in (PICTURE, BACK))
-    log_odds = _expected(seen, body[:, 0] + shade, variance + 1.5)  # unturned: the cosine is 1, the sine 0
+    log_odds = _expected(seen, body[0] + shade, variance + 1.5)  # unturned: the cosine is 1, the sine 0
     log_odds -= _expected(seen, behind, BACK_VARIANCE[rows + 5, columns + 3] + 1.5)
-    expected = [log_odds[part == k].sum() for k in range(3)]
+    expected = [part.sum() for part in np.split(log_odds, ends[:-1])]
     np.testing.assert_allclose(found[0], expected, rtol=1e-4, atol=0.05)
 
 
 def test_any_grey_level_is_as_probable_where_the_background_is_unknown():
     rows, columns = np.nonzero(np.ones((12, 14)))
-    places = np.column_stack([columns, rows]).astype(np.float32)
+    places = np.stack([columns, rows]).astype(np.float32)
     variance = VARIANCE[rows, columns]
-    body = np.column_stack([MEAN[rows, columns], variance, *np.zeros((2, len(rows)))]).astype(np.float32)
+    body = np.stack([MEAN[rows, columns], variance, *np.zeros((2, len(rows)))]).astype(np.float32)
     stands = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
     back = np.full_like(BACK, np.nan)
-    found = pose_gains(PICTURE, back, back, np.float32(0.0), places, body, np.zeros(len(rows), np.int64), 1, stands)
+    found = pose_gains(PICTURE, back, back, np.float32(0.0), places, body, np.array([len(rows)]), stands)
     seen = PICTURE[rows, columns]
-    log_odds = _expected(seen, body[:, 0], variance) - _expected(seen, np.full_like(seen, np.nan), variance)
+    log_odds = _expected(seen, body[0], variance) - _expected(seen, np.full_like(seen, np.nan), variance)
     np.testing.assert_allclose(found[0, 0], log_odds.sum(), rtol=1e-4, atol=0.05)

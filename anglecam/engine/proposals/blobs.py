@@ -137,15 +137,30 @@ def _patches(signed: NDArray[np.float32], level: float) -> Patches:
     for row, i in zip(rows, order, strict=True):
         left, top, width, height, _ = box[i]
         part = np.s_[top : top + height, left : left + width]
-        y, x = np.nonzero(labelled[key[i, 0]][part] == key[i, 1])
-        off = x - x.mean() - 1j * (y - y.mean())
-        row[:] = (off**2).mean(), (np.abs(off) ** 2).mean(), len(x), signed[key[i, 0]][part][y, x].mean()
+        row[:] = _moments(labelled[key[i, 0]][part], key[i, 1], signed[key[i, 0]][part])
     second, spread2, size, contrast = rows[:, 0], rows[:, 1].real, rows[:, 2].real, rows[:, 3].real
     # spread² and |second| are sum and difference of the squared axes
     axes = np.sqrt((spread2 + np.abs(second)) / np.maximum(spread2 - np.abs(second), 0.1))
     spin = np.where(axes > _ELONGATED, second / np.maximum(np.abs(second), 1e-9), 0.0)
     likeness = np.column_stack([0.5 * np.log(size), np.log(contrast), 0.5 * np.log(spread2)])
     return Patches(key[order, 0], up(place[order]), spin, likeness, spread2)
+
+
+@njit("complex128[::1](int32[:, :], int64, float32[:, :])", cache=True, nogil=True)
+def _moments(labels, label, values):  # type: ignore[no-untyped-def]
+    """Return squared offset from the middle, imaginary axis upwards, and its magnitude, number and value of a label.
+
+    All but the number are means over the pixels.
+    """
+    count = x = y = xx = yy = xy = level = 0.0
+    for i in range(labels.shape[0]):
+        for j in range(labels.shape[1]):
+            if labels[i, j] == label:
+                count, level = count + 1.0, level + values[i, j]
+                x, y, xx, yy, xy = x + j, y + i, xx + j * j, yy + i * i, xy + i * j
+    x, y = x / count, y / count
+    xx, yy, xy = xx / count - x * x, yy / count - y * y, xy / count - x * y
+    return np.array([xx - yy - 2.0j * xy, xx + yy + 0.0j, count + 0.0j, level / count + 0.0j])
 
 
 @njit("float64[::1](int64[:], float64[:, ::1], float64[::1], int64)", cache=True, nogil=True)
