@@ -9,6 +9,7 @@ where white noise is the same in all. Where they differ, nothing is concluded.
 from __future__ import annotations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy import stats
 
 from anglecam.data.typing import Floats
@@ -59,7 +60,7 @@ def white_noise(time: Floats, angle: Floats) -> float:
         return 0.0
     either = [_estimates(time, angle), _estimates(np.arange(len(time), dtype=float), angle, time)]
     estimates = min(either, key=lambda one: float(np.median(one)))
-    alike = len(estimates) > 0 and float(estimates.max()) <= _ALIKE * float(estimates.min())
+    alike = float(estimates.max()) <= _ALIKE * float(estimates.min()) < np.inf
     return float(np.median(estimates)) if alike else 0.0
 
 
@@ -86,12 +87,11 @@ def _estimates(place: Floats, angle: Floats, time: Floats | None = None) -> Floa
     usual = float(np.median(step))
     found = list[Floats]()
     for order in _ORDERS:
-        windows = np.lib.stride_tricks.sliding_window_view
-        steps = windows(step, order)
+        steps = sliding_window_view(step, order)
         whole = (steps.max(axis=1) < _MISSING * usual) & (steps.min(axis=1) > 0.0)
         if whole.sum() < _FEWEST:
             return np.array([np.inf])
-        places, angles = (windows(one, order + 1)[whole] for one in (place, angle))
+        places, angles = (sliding_window_view(one, order + 1)[whole] for one in (place, angle))
         # divided differences, scaled to keep the standard deviation of independent errors
         apart = (places[:, :, None] - places[:, None, :]) / np.ptp(places, axis=1)[:, None, None]
         apart[:, np.arange(order + 1), np.arange(order + 1)] = 1.0

@@ -52,8 +52,9 @@ def test_frames_after_a_gap_are_no_neighbours():
     assert white_noise(time, angle) == pytest.approx(NOISE, rel=0.3)
 
 
-def test_too_few_frames_show_no_noise():
-    assert white_noise(np.arange(30) / 30, np.random.default_rng(7).standard_normal(30)) == 0.0
+@pytest.mark.parametrize("time", [np.arange(30) / 30, np.delete(np.arange(120) / 30, np.arange(5, 120, 6))])
+def test_too_few_frames_in_a_row_show_no_noise(time):
+    assert white_noise(time, np.random.default_rng(7).standard_normal(len(time))) == 0.0
 
 
 def test_only_the_scatter_beyond_what_is_stated_is_added():
