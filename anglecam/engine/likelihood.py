@@ -111,7 +111,7 @@ def multiply_odds(odds, picture, body, body_variance, excess, background, backgr
 
 @njit(inline="always")
 def _between(picture, at, below, across, down):  # type: ignore[no-untyped-def]
-    """Interpolate a picture linearly between a pixel, that to its right, and those below them."""
+    """Interpolate linearly between the pixels ``at`` and ``below``, and the ones to their right, of a flat picture."""
     next_to = np.uint32(1)
     upper = picture[at] + across * (picture[at + next_to] - picture[at])
     lower = picture[below] + across * (picture[below + next_to] - picture[below])
@@ -159,6 +159,7 @@ def pose_gains(picture, background, precision, excess, places, body, ends, poses
     height, width = picture.shape
     n, parts = places.shape[1], len(ends)
     gains = np.zeros((len(poses), parts))
+    # rows that are arrays of their own and indices without a sign: otherwise the loops are checked and not vectorised
     x_of, y_of, mean, with_cosine, with_sine = places[0], places[1], body[0], body[2], body[3]
     sharp = np.float32(1.0) / (body[1] + excess)
     pictured, behind, precisions = picture.ravel(), background.ravel(), precision.ravel()
@@ -170,7 +171,7 @@ def pose_gains(picture, background, precision, excess, places, body, ends, poses
     for m in range(len(poses)):
         a, b, c = np.float32(poses[m, 0, 0]), np.float32(poses[m, 0, 1]), np.float32(poses[m, 0, 2])
         d, e, f = np.float32(poses[m, 1, 0]), np.float32(poses[m, 1, 1]), np.float32(poses[m, 1, 2])
-        # apart from what is read at these places, this is done for many pixels at once
+        # this loop reads no picture, so that the compiler turns it into instructions for many pixels at once
         for i in range(n):
             x = a * x_of[i] + b * y_of[i] + c
             y = d * x_of[i] + e * y_of[i] + f

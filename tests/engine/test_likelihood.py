@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import ndimage, stats
 
 from anglecam.engine.likelihood import log_density, multiply_odds, pose_gains
 
@@ -64,3 +64,25 @@ def test_any_grey_level_is_as_probable_where_the_background_is_unknown():
     seen = PICTURE[rows, columns]
     log_odds = _expected(seen, body[0], variance) - _expected(seen, np.full_like(seen, np.nan), variance)
     np.testing.assert_allclose(found[0, 0], log_odds.sum(), rtol=1e-4, atol=0.05)
+
+
+def test_between_pixels_the_picture_is_interpolated_and_beyond_it_nothing_is_said():
+    rows, columns = np.nonzero(np.ones((30, 40)))
+    places = np.stack([columns, rows]).astype(np.float32)
+    body = np.stack([np.full(len(rows), 90.0), np.full(len(rows), 40.0), *np.zeros((2, len(rows)))]).astype(np.float32)
+    cos, sin = np.cos(0.4), np.sin(0.4)
+    pose = np.array([[[cos, sin, -7.3], [-sin, cos, 5.6]]])
+    picture = PICTURE.copy()
+    picture[6, 9] = np.nan
+    precision = np.full_like(BACK, 1.0 / 30.0)
+    ends = np.array([len(rows) // 2, len(rows)])
+    found = pose_gains(picture, BACK, precision, np.float32(0.0), places, body, ends, pose)
+    x, y = pose[0, :, :2] @ places + pose[0, :, 2:]
+    height, width = PICTURE.shape
+    inside = (x >= 0) & (y >= 0) & (x < width - 1) & (y < height - 1)
+    seen, behind = (ndimage.map_coordinates(one, [y, x], order=1, mode="nearest") for one in (picture, BACK))
+    log_odds = _expected(seen, body[0], body[1]) - _expected(seen, behind, np.full_like(seen, 30.0))
+    counts = inside & np.isfinite(seen)
+    assert 0 < counts.sum() < inside.sum() < len(rows)
+    expected = [part.sum() for part in np.split(np.where(counts, log_odds, 0.0), ends[:-1])]
+    np.testing.assert_allclose(found[0], expected, rtol=1e-3, atol=0.05)

@@ -148,9 +148,10 @@ def _patches(signed: NDArray[np.float32], level: float) -> Patches:
 
 @njit("complex128[::1](int32[:, :], int64, float32[:, :])", cache=True, nogil=True)
 def _moments(labels, label, values):  # type: ignore[no-untyped-def]
-    """Return squared offset from the middle, imaginary axis upwards, and its magnitude, number and value of a label.
+    """Return four figures of the pixels of a label: (4,) complex.
 
-    All but the number are means over the pixels.
+    The means of the squared offset from their middle, imaginary axis upwards, and of its squared magnitude, their
+    number, and the mean of their values.
     """
     count = x = y = xx = yy = xy = level = 0.0
     for i in range(labels.shape[0]):
