@@ -127,7 +127,7 @@ def coarse_angles(
     )
     errors = place_errors(mark, off, across, along)
     # the distance from the pivot does not show an error of the camera's roll
-    errors = replace(errors, noise_px=np.hypot(errors.noise_px, lever * detections.roll_sigma[ok]))
+    errors = replace(errors, noise_px=np.hypot(errors.noise_px, lever * detections.turn_sigma[ok]))
     # of a mark seen obliquely, other parts become visible as it rotates, and they lie at other heights
     thick = _THICK * float(np.median(np.sqrt([r.area_px2 for r in regions])))
     return angles_of_places(mark, detections.pivot, errors, detections.lens, time[ok], rig, command, thick_px=thick)
@@ -191,7 +191,7 @@ def _angles_of_body(
 
     The body reaches beyond a middle that is near the pivot, as a wheel's is: the line then ends where the body does.
     """
-    turn, noise = body.turn[ok], np.hypot(body.sigma[ok], detections.roll_sigma[ok])
+    turn, noise = body.turn[ok], np.hypot(body.sigma[ok], detections.turn_sigma[ok])
     arm = detections.lens.rectify(body.centre_px) - detections.pivot.centre_px
     arm *= max(1.0, body.extent_px / max(float(np.hypot(*arm)), _LEAST_ARM_PX))
     mark = detections.pivot.centre_px + rotate_each(arm, turn)

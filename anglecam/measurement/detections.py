@@ -81,6 +81,8 @@ class Detections:
     """What moves in the film, where a body is followed without a mark."""
     found: FoundMark | None = None
     """The mark by a sample of frames; ``None`` where a body is followed without one."""
+    scatter: float = 0.0
+    """Standard deviation by which the turns differ from frame to frame beyond what the pictures explain, rad."""
 
     @property
     def places_px(self) -> Floats:
@@ -102,10 +104,11 @@ class Detections:
         return np.zeros(len(self.time)) if moves is None else np.array([move.roll for move in moves])
 
     @property
-    def roll_sigma(self) -> Floats:
-        """(frames,) standard uncertainty of the roll, rad: no picture of the body shows this error of its turn."""
+    def turn_sigma(self) -> Floats:
+        """(frames,) standard uncertainty of turns that no picture of the body shows, rad: by camera and scatter."""
         moves = self.camera_moves
-        return np.zeros(len(self.time)) if moves is None else np.sqrt([move.covariance[2, 2] for move in moves])
+        roll2 = np.zeros(len(self.time)) if moves is None else [move.covariance[2, 2] for move in moves]
+        return np.sqrt(roll2 + np.square(self.scatter))
 
 
 def frames_to_keep(film: Film) -> int:

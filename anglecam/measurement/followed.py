@@ -28,6 +28,7 @@ from anglecam.measurement.fine_angles import fine_angles
 from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
 from anglecam.measurement.trust import why_doubtful, why_few, why_no_rotation, why_not_as_declared
+from anglecam.measurement.white_noise import beyond_stated
 from anglecam.progress import Progress, unseen
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
@@ -153,14 +154,14 @@ def _measured(
     row = _mark_rows(detections)
     time = measurement_time(detections.time, row, detections.size[1], rig.camera.row_time_s)
     angles = coarse_angles(detections, ok, time, rig, command)
+    registered: Registered | str | None = None
     why_coarse: str | None = "the body has too few features" if detections.moves else "the mark does not move"
     if detections.moves:
         start = _start(detections, ok, time, row, angles, rig)
         registered = register_clip(film, start, detections.lens, progress, detections.turns)
         why_coarse = registered if isinstance(registered, str) else None
         if isinstance(registered, Registered):
-            noise = np.hypot(registered.noise, detections.roll_sigma)
-            registered = replace(registered, turn=registered.turn - detections.rolls, noise=noise)
+            registered = replace(registered, turn=registered.turn - detections.rolls)
             start = replace(start, turn=start.turn - detections.rolls)
             found = np.isfinite(registered.turn)
             ok |= found & smeared_marks(detections, start, registered, float(np.median(angles.lever_px)))
@@ -169,9 +170,12 @@ def _measured(
             ok |= np.array([region is not None for region in carried])
             row = np.where(found, registered.row, row)
             time = measurement_time(detections.time, row, detections.size[1], rig.camera.row_time_s)
-            angles = coarse_angles(detections, ok, time, rig, command)
-            filmed = detections.in_picture(in_all_frames(ok, angles.mark_px))[ok]
-            angles = fine_angles(angles, registered, np.flatnonzero(ok), filmed, time[ok], rig, command)
+    body = registered if isinstance(registered, Registered) else None
+    angles = _angles(detections, body, ok, time, rig, command)
+    scatter = beyond_stated(angles.uncertainty, time[ok], angles.line)
+    if scatter > 0.0:
+        detections = replace(detections, scatter=scatter)
+        angles = _angles(detections, body, ok, time, rig, command)
     cause = why_no_rotation(detections, ok, angles, rig)
     if cause is not None:
         return cause
@@ -181,6 +185,18 @@ def _measured(
     )
     doubt = why_few(status, rig.least_measured) or why_doubtful(detections, ok, angles, rig, hand_held=hand_held)
     return Followed(detections, ok, time, angles, why_coarse, doubt)
+
+
+def _angles(
+    detections: Detections, body: Registered | None, ok: Flags, time: Floats, rig: Rig, command: Command | None
+) -> Angles:
+    """Return the angles of the measured frames, those of the whole body where it is registered."""
+    angles = coarse_angles(detections, ok, time, rig, command)
+    if body is None:
+        return angles
+    filmed = detections.in_picture(in_all_frames(ok, angles.mark_px))[ok]
+    body = replace(body, noise=np.hypot(body.noise, detections.turn_sigma))
+    return fine_angles(angles, body, np.flatnonzero(ok), filmed, time[ok], rig, command)
 
 
 def _mark_rows(detections: Detections) -> Floats:

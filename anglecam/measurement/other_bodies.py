@@ -30,6 +30,7 @@ from anglecam.measurement.detections import Detections
 from anglecam.measurement.followed import Followed
 from anglecam.measurement.rigid_motion import RigidMotion
 from anglecam.measurement.seen_frames import follow, moving_stills, stills_of
+from anglecam.measurement.white_noise import beyond_stated
 from anglecam.progress import Progress, Stage, unseen
 from anglecam.vision.pivot.estimate import PivotEstimate
 
@@ -185,6 +186,10 @@ def _measured(
     rows = detections.in_picture(np.where(ok[:, None], body.centre_px + shifts, np.nan))[:, 1]
     time = measurement_time(seen.time, rows, detections.size[1], rig.camera.row_time_s)
     angles = coarse_angles(detections, ok, time, rig, command)
+    scatter = beyond_stated(angles.uncertainty, time[ok], angles.line)
+    if scatter > 0.0:
+        detections = replace(detections, scatter=scatter)
+        angles = coarse_angles(detections, ok, time, rig, command)
     sigma = np.full(n, np.nan)
     sigma[ok] = _about_centre(angles)
     followed = Followed(detections, ok, time, angles, "it was found after another body was taken out", doubt)
@@ -224,4 +229,5 @@ def _detections(first: Detections, body: RigidMotion) -> Detections:
         doubt=None,
         learnt=None,
         found=None,
+        scatter=0.0,
     )
