@@ -61,7 +61,7 @@ def looks(stills: Stills, hints: Hints = NO_HINTS) -> Iterator[Learnt]:
     Learnt
         Of each look; none where nothing moves.
     """
-    samples = sample_stills(stills)
+    samples = sample_stills(stills, hints.around_mark_px)
     for n, sample in enumerate(samples):
         with one_opencv_thread(), threadpool_limits(1, "blas"):  # matrices this small take longer with more
             learnt = _explained(sample, samples[n + 1 :], stills, hints)
@@ -73,7 +73,7 @@ def _explained(sample: Sample, parts: Sequence[Sample], stills: Stills, hints: H
     if not found:
         return Learnt(sample, ())
     proposal = found[0].fit.proposal
-    closer = sample_part(stills, swept(sample, found[0].fit))
+    closer = sample_part(stills, swept(sample, found[0].fit), hints.around_mark_px)
     if closer is not None and closer.scale > CLOSER * sample.scale:
         again = compete(closer, [proposal.in_frames(sample.frames, closer.frames)])
         if again and (again[0].turns or not found[0].turns):

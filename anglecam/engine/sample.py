@@ -153,13 +153,15 @@ class Stills:
         return np.stack([_seen(image, move, scale, part, size, self.tint) for image, move in shown])
 
 
-def sample_stills(stills: Stills) -> list[Sample]:
+def sample_stills(stills: Stills, held_px: Floats | None = None) -> list[Sample]:
     """Cut frames to where something changes, and reduce them.
 
     Parameters
     ----------
     stills : Stills
         Of the film.
+    held_px : (4,) ndarray, optional
+        Left, top, right, bottom of what every sample shows, px.
 
     Returns
     -------
@@ -171,11 +173,11 @@ def sample_stills(stills: Stills) -> list[Sample]:
     small = min(1.0, LONGEST_PX / max(width, height))
     whole = stills.seen(small)
     boxes = changed_boxes(steady_light(whole[_alike(whole)]))
-    found = (sample_part(stills, box / small) for box in boxes)
+    found = (sample_part(stills, box / small, held_px) for box in boxes)
     return [one for one in found if one is not None]
 
 
-def sample_part(stills: Stills, box_px: Floats) -> Sample | None:
+def sample_part(stills: Stills, box_px: Floats, held_px: Floats | None = None) -> Sample | None:
     """Cut frames to a part of the picture, and reduce them.
 
     Parameters
@@ -184,6 +186,8 @@ def sample_part(stills: Stills, box_px: Floats) -> Sample | None:
         Of the film.
     box_px : (4,) ndarray
         Left, top, right, bottom, px.
+    held_px : (4,) ndarray, optional
+        The same of what it shows besides.
 
     Returns
     -------
@@ -191,6 +195,8 @@ def sample_part(stills: Stills, box_px: Floats) -> Sample | None:
         Without frames that show another picture altogether, such as black ones; ``None`` if they are too few.
     """
     height, width = stills.images[0].shape[:2]
+    if held_px is not None:
+        box_px = np.concatenate([np.minimum(box_px[:2], held_px[:2]), np.maximum(box_px[2:], held_px[2:])])
     left, top, right, bottom = np.clip(np.round(box_px), 0, [width, height] * 2).astype(int).tolist()
     if min(right - left, bottom - top) < _LEAST_SIDE_PX:
         return None

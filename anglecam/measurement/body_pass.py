@@ -15,7 +15,7 @@ from anglecam.engine.body import Turn
 from anglecam.engine.hints import Hints
 from anglecam.engine.learn import Learnt, looks, rank
 from anglecam.engine.path import unsteadiness
-from anglecam.engine.reasons import why_ambiguous, why_jump, why_not_as_hinted, why_nothing_turns
+from anglecam.engine.reasons import why_ambiguous, why_another, why_jump, why_nothing_turns
 from anglecam.engine.refine import sensitivities
 from anglecam.engine.sample import FRAMES
 from anglecam.engine.target import Picture as Grey
@@ -24,7 +24,7 @@ from anglecam.engine.tracking import Search, Track, candidates, chosen, search_f
 from anglecam.io.rig import Rig
 from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.detections import Detections, frame_of_mark
-from anglecam.measurement.pivot import find_pivot
+from anglecam.measurement.pivot import HINT_PX, find_pivot
 from anglecam.measurement.rigid_motion import RigidMotion
 from anglecam.measurement.seen_frames import Seen, follow, moving_stills, picture_of, stills_of
 from anglecam.progress import Progress, Stage, unseen
@@ -38,8 +38,6 @@ _STEADIER = 6
 """Rounds of learning a body again from a steadier motion, at most."""
 _SHIFTED_PX = 0.05
 """By which light, a codec and interpolation shift an edge, px: 0.02 to 0.08 in MJPG films."""
-_HINT_PX = 30.0
-"""Standard uncertainty of a hint at the pivot, which is by eye."""
 
 
 def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> Detections | str:
@@ -106,7 +104,7 @@ def _followed(camera: HeldCamera, rig: Rig, hints: Hints, learnt: Learnt, progre
     jump = why_jump(track.turn, film.first_frame)
     if jump is not None:
         return jump
-    doubt = why_not_as_hinted(learnt, hints) or why_ambiguous(track.ambiguous, film.first_frame)
+    doubt = why_another(learnt, hints, film.first_frame) or why_ambiguous(track.ambiguous, film.first_frame)
     found = _detections(film, rig, seen, rigid_motion(search, track, seen.decoded))
     return found if isinstance(found, str) else replace(found, doubt=doubt, learnt=learnt)
 
@@ -121,7 +119,7 @@ def _hints(film: Film, rig: Rig) -> Hints:
         frame_of_mark(film, mark)  # it has to exist
     return Hints(
         pivot_px=None if pivot.expected is None else np.array(pivot.expected),
-        pivot_sigma_px=_HINT_PX if pivot.at is None else max(_HINT_PX, pivot.sigma_px or 0.0),
+        pivot_sigma_px=HINT_PX if pivot.at is None else max(HINT_PX, pivot.sigma_px or 0.0),
         mark_px=None if mark is None else np.array(mark.as_box),
         mark_frame=0 if mark is None else mark.frame - film.first_frame,
     )

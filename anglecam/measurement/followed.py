@@ -27,7 +27,7 @@ from anglecam.measurement.detections import Detections, in_all_frames
 from anglecam.measurement.fine_angles import fine_angles
 from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
-from anglecam.measurement.trust import why_doubtful, why_few, why_no_rotation, why_not_as_declared
+from anglecam.measurement.trust import why_doubtful, why_few, why_no_rotation, why_still
 from anglecam.measurement.white_noise import beyond_stated
 from anglecam.progress import Progress, unseen
 from anglecam.video.film import Film
@@ -57,6 +57,11 @@ class Followed:
     """Cause why the angle is not that of the whole body; ``None`` where it is."""
     doubt: str | None
     """Why the clip is no success although frames of it are measured; ``None`` where it is one."""
+
+    @property
+    def elsewhere(self) -> bool:
+        """Whether it turns about another point than the hint says."""
+        return self.detections.pivot.elsewhere
 
     @property
     def lost(self) -> float:
@@ -103,20 +108,21 @@ def follow_mark_or_body(
     # nothing else is meant by a colour, nor in the other parts of a film
     final = known is not None or film.undecodable == len(film.times) or rig.mark_rgb is not None
     if isinstance(by_mark, Followed):
-        contradicted = why_not_as_declared(by_mark.detections, by_mark.ok, by_mark.angles, rig) is not None
+        still = why_still(by_mark.detections, by_mark.ok, rig) is not None
         # a declared neutral is a direction of the line to the mark
-        seen = by_mark.doubt is None and (by_mark.lost < _MANY or rig.neutral != "auto")
-        if seen or contradicted or final or camera.unknown:
+        sure = by_mark.doubt is None and not by_mark.elsewhere
+        seen = sure and (by_mark.lost < _MANY or rig.neutral != "auto")
+        if seen or still or final or camera.unknown:
             return by_mark
     cause = camera.unknown or (by_mark if final else None) or detect_body(camera, rig, progress)
     by_body = _measured(film, rig, command, cause, progress) if isinstance(cause, Detections) else cause
     if isinstance(by_mark, Followed) and (isinstance(by_body, str) or by_body.doubt is not None):
         return by_mark
-    if isinstance(by_mark, Followed) and isinstance(by_body, Followed) and by_mark.doubt is None:
-        return _more_certain(by_mark, by_body)
-    if isinstance(by_body, Followed):
+    if isinstance(by_body, str):
+        raise InputError(f"{film.path}: {by_body}")
+    if isinstance(by_mark, str) or by_mark.doubt is not None or (by_mark.elsewhere and not by_body.elsewhere):
         return by_body
-    raise InputError(f"{film.path}: {by_body}")
+    return _more_certain(by_mark, by_body)
 
 
 def _more_certain(by_mark: Followed, by_body: Followed) -> Followed:

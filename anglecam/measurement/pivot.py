@@ -17,10 +17,10 @@ from anglecam.vision.pivot.marker import RoundMarker, count_round_things, find_m
 
 _STILL = 9
 """Frames whose median shows the still background."""
-HINT_PX = 10.0
-"""Standard uncertainty of the rig file's hint at the pivot."""
-_SLANTED_HINT_PX = 25.0
-"""The same where nothing is found so near: a slanted view shifts a marker that lies in front of the plane of motion."""
+HINT_PX = 30.0
+"""Standard uncertainty of each coordinate of the rig file's hint at the pivot, which is by eye."""
+_MARKER_PX = (10.0, 25.0)
+"""The same by which a marker is sought about the hint: nearby first, for a screw may be farther off."""
 _DECLARED_PX = 1.0
 """Standard uncertainty of a pivot that is declared without one."""
 _NEARER = 0.05
@@ -57,7 +57,7 @@ def find_pivot(
     pivot : PivotEstimate or None
         In the plane of motion.
     note : str or None
-        A message where the two disagree.
+        A message where they disagree with each other, or with what is declared.
     """
     if rig.pivot.at is not None:
         return None, *_declared(rig, circle, lens)
@@ -67,7 +67,22 @@ def find_pivot(
     others = 0.0
     if marker is not None and rig.pivot.marker == "auto":
         others = (count_round_things(still) + 1) / (still.shape[0] * still.shape[1])
-    return found, *combine_pivot(marker, circle, _hint(rig, lens), others, _displacement(found, still, lens))
+    pivot, note = combine_pivot(marker, circle, _hint(rig, lens), others, _displacement(found, still, lens))
+    if pivot is not None and pivot.elsewhere and circle is not None:
+        note = "; ".join([_beside_hint(circle, rig, lens), *([note] if note else [])])
+    return found, pivot, note
+
+
+def _beside_hint(circle: Circle, rig: Rig, lens: Lens) -> str:
+    """Return a message about a hint at another place than the centre of rotation."""
+    hint = np.array(rig.pivot.near)
+    x, y = lens.distort(circle.centre_px)
+    off = float(np.hypot(*(circle.centre_px - lens.rectify(hint))))
+    near = "{:g}, {:g}".format(*hint)
+    return (
+        f"what is seen to turn, turns about {x:.0f},{y:.0f}, {off:.0f} px from the hint pivot: {{near: [{near}]}}; both"
+        " count; if something else is meant, point at it: mark: {at: [x, y], frame: k} in rig.yaml"
+    )
 
 
 def _declared(rig: Rig, circle: Circle | None, lens: Lens) -> tuple[PivotEstimate, str | None]:
@@ -82,8 +97,7 @@ def _hint(rig: Rig, lens: Lens) -> PivotEstimate | None:
     if rig.pivot.near is None:
         return None
     J = lens.jacobian(np.array(rig.pivot.near))
-    sigma = HINT_PX if lens.tilt == 0.0 else _SLANTED_HINT_PX
-    return PivotEstimate(lens.rectify(np.array(rig.pivot.near)), sigma**2 * J @ J.T, "hint")
+    return PivotEstimate(lens.rectify(np.array(rig.pivot.near)), HINT_PX**2 * J @ J.T, "hint")
 
 
 def _displacement(marker: RoundMarker | None, still: Image, lens: Lens) -> Floats | None:
@@ -107,8 +121,8 @@ def _still(images: Sequence[Image]) -> Image:
 def _find_marker(still: Image, rig: Rig, circle: Circle | None, lens: Lens) -> RoundMarker | None:
     if rig.pivot.near is not None:
         hint = np.array(rig.pivot.near)
-        near = find_marker(still, hint, HINT_PX**2 * np.eye(2))
-        return near or find_marker(still, hint, _SLANTED_HINT_PX**2 * np.eye(2))
+        found = (find_marker(still, hint, sigma**2 * np.eye(2)) for sigma in _MARKER_PX)
+        return next((marker for marker in found if marker is not None), None)
     if circle is None:
         return find_marker(still, None, None)
     # a short arc determines the direction to its centre well, and the distance badly

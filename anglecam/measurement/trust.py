@@ -18,15 +18,12 @@ from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles
 from anglecam.measurement.detections import Detections
 from anglecam.measurement.one_rigid_mark import FLOOR_PX, MAX_OFF_CIRCLE, PIVOT_SIGMAS, why_not_one_mark, why_not_rigid
-from anglecam.measurement.pivot import HINT_PX
 from anglecam.measurement.what_is_seen import DECLARE_MARK, causes_seen, place_of
 from anglecam.vision.pivot.circle import Circle
 
 _MAX_SCALE_SIGMA = 0.2
 """Relative standard uncertainty of the path's radius from which on the path does not show its centre, as for a pivot
 (`anglecam.vision.pivot.estimate`), and of a body's rotation from which on it is not seen."""
-_HINT_SIGMAS = 3.0
-"""Standard uncertainties by which a hint at the pivot may be off the centre of rotation."""
 _DECLARE = "pivot: {at: [x, y], sigma_px: s} in rig.yaml"
 _TRAVEL_PX = 0.5
 """Least RMS travel of a mark that moves, px. Noise, rain and flicker shift the centroid of a thing at rest by 0.2."""
@@ -156,67 +153,10 @@ def why_doubtful(detections: Detections, ok: Flags, angles: Angles, rig: Rig, *,
     str or None
         With the cause. That the whole body turns proves what its mark alone does not.
     """
-    doubt = detections.doubt or why_not_as_declared(detections, ok, angles, rig)
+    doubt = detections.doubt or why_still(detections, ok, rig)
     if doubt is not None or angles.registered is not None:
         return doubt
     return why_not_rigid(detections, ok) or why_unproven(detections, hand_held=hand_held)
-
-
-def why_not_as_declared(detections: Detections, ok: Flags, angles: Angles, rig: Rig) -> str | None:
-    """Return a message where the mark stands still that the rig declares, or turns about another point.
-
-    Parameters
-    ----------
-    detections : Detections
-        The coarse pass.
-    ok : ndarray
-        (frames,) the measured frames.
-    angles : Angles
-        Of these frames; a whole body shows its pivot itself.
-    rig : Rig
-        What is declared.
-
-    Returns
-    -------
-    str or None
-        With what was seen.
-    """
-    still = why_still(detections, ok, rig)
-    return still if still is not None or angles.registered is not None else why_elsewhere(detections, rig)
-
-
-def why_elsewhere(detections: Detections, rig: Rig) -> str | None:
-    """Return a message where the centre of the mark's path is not where the hint at the pivot is.
-
-    Parameters
-    ----------
-    detections : Detections
-        The coarse pass.
-    rig : Rig
-        Declares the hint.
-
-    Returns
-    -------
-    str or None
-        With both places; ``None`` where they agree, and for a path that does not show its centre.
-    """
-    circle = detections.circle
-    if (
-        rig.pivot.near is None
-        or detections.lens.tilt != 0.0
-        or circle is None
-        or not shows_its_centre(detections.circle)
-    ):
-        return None
-    off = circle.centre_px - detections.lens.rectify(np.array(rig.pivot.near))
-    if off @ np.linalg.solve(circle.centre_covariance_px2 + HINT_PX**2 * np.eye(2), off) < _HINT_SIGMAS**2:
-        return None
-    x, y = detections.lens.distort(circle.centre_px)
-    expected = "{:g}, {:g}".format(*rig.pivot.near)
-    return (
-        f"what moves turns about {x:.0f},{y:.0f}, {np.hypot(*off):.0f} px from the hint pivot: {{near: [{expected}]}};"
-        f" {DECLARE_MARK}"
-    )
 
 
 def why_still(detections: Detections, ok: Flags, rig: Rig) -> str | None:

@@ -185,11 +185,18 @@ def test_of_two_things_that_turn_the_hinted_one_is_measured(tmp_path, hint, shar
     assert np.sqrt((_error(measured, share * SWING) ** 2).mean()) < 0.3
 
 
-def test_a_hint_at_another_place_costs_a_doubt_and_no_measurement(tmp_path):
+def test_a_pivot_hint_at_another_place_costs_a_note_and_no_measurement(tmp_path):
     measured = _measured(tmp_path, _horn, JUMPS, rig=Rig.model_validate({"pivot": {"near": [20, 220]}}))
-    assert measured.doubt is not None
-    assert "is not what is declared (pivot 20,220)" in measured.doubt
+    assert measured.doubt is None
+    assert any("172 px from the hint pivot: {near: [20, 220]}" in note for note in measured.notes)
     assert np.sqrt((_error(measured, JUMPS) ** 2).mean()) < 0.3
+
+
+def test_a_mark_is_declared_where_nothing_moves(tmp_path):
+    rig = Rig.model_validate({"mark": {"at": [20, 220], "frame": 1}})
+    measured = _measured(tmp_path, _horn, JUMPS, rig=rig)
+    assert measured.doubt is not None
+    assert "the mark around 20,220 in frame 1 stands still or moves otherwise" in measured.doubt
 
 
 def test_a_body_is_measured_whose_mark_is_seen_in_some_frames_only(tmp_path):

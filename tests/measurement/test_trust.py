@@ -124,12 +124,13 @@ def test_few_measured_frames_are_counted_with_their_causes():
     )
 
 
-def test_a_hint_away_from_the_point_that_the_motion_shows_is_no_success(tmp_path):
-    film = _film(tmp_path, _swing(40.0))
-    assert measure_clip(film, Rig(pivot=RigPivot(near=(126.0, 36.0)))).doubt is None
-    doubt = measure_clip(film, Rig(pivot=RigPivot(near=(180.0, 70.0)))).doubt
-    assert doubt is not None
-    assert "72 px from the hint pivot" in doubt
+@pytest.mark.parametrize(("near", "px"), [((126.0, 36.0), None), ((280.0, 70.0), 165)])
+def test_a_hint_away_from_the_point_that_the_motion_shows_is_said_and_measured(tmp_path, near, px):
+    measured = measure_clip(_film(tmp_path, _swing(40.0)), Rig(pivot=RigPivot(near=near)))
+    said = [note for note in measured.notes if "from the hint pivot" in note]
+    assert measured.doubt is None
+    assert np.hypot(*(measured.angles.pivot.centre_px - [120.0, 30.0])) < 3.0
+    assert [f"{px} px from the hint" in note for note in said] == ([] if px is None else [True])
 
 
 @pytest.fixture(scope="module")

@@ -36,6 +36,8 @@ class PivotEstimate:
     """``declared``, or one or more of ``marker``, ``centre of rotation`` and ``hint``."""
     doubt: str | None = None
     """Message where it rests on a round thing that the mark's path does not verify."""
+    elsewhere: bool = False
+    """Whether the motion shows another centre than the hint says."""
 
 
 def combine_pivot(
@@ -66,7 +68,7 @@ def combine_pivot(
     circle : Circle, optional
         The mark's path, if the mark moved.
     hint : PivotEstimate, optional
-        What is declared about the pivot's place; used where the path does not determine it.
+        What is declared about the pivot's place.
     round_things_per_px2 : float
         Density of other round things in the picture, 1/px²; zero where the marker is declared.
     displacement_px2 : ndarray, optional
@@ -110,7 +112,7 @@ def combine_pivot(
         )
     if cases[0].away > _DISAGREE:
         note = _disagreement(expected, marker, distance)
-    return PivotEstimate(centre, covariance, f"marker and {expected.source}", doubt), note
+    return PivotEstimate(centre, covariance, f"marker and {expected.source}", doubt, expected.elsewhere), note
 
 
 def disagreement_with_path(declared: PivotEstimate, circle: Circle) -> str | None:
@@ -166,16 +168,20 @@ def _disagreement(expected: PivotEstimate, marker: RoundMarker, distance: float)
 
 
 def _expected(circle: Circle | None, hint: PivotEstimate | None) -> PivotEstimate | None:
-    """Return the pivot by the mark's motion, and by the hint where the motion does not determine it."""
-    if circle is not None and circle.covariance_px2[2, 2] < (_MAX_RADIUS_SIGMA * circle.radius_px) ** 2:
-        return PivotEstimate(circle.centre_px, circle.centre_covariance_px2, "centre of rotation")
-    if hint is None or circle is None or not np.isfinite(circle.covariance_px2).all():
+    """Return the pivot by the mark's motion and by the hint, each by its inverse covariance.
+
+    A short arc determines the direction to its centre well, and the distance badly. Where motion and hint contradict
+    each other, one of them is less certain than it states: the covariance grows by χ² over its expectation (Birge,
+    Physical Review 40, 1932).
+    """
+    if circle is None or not np.isfinite(circle.covariance_px2).all():
         return hint
-    # A short arc determines the direction to its centre well, and the distance badly.
-    difference = circle.centre_px - hint.centre_px
-    spread = hint.covariance_px2 + circle.centre_covariance_px2
+    shown = circle.covariance_px2[2, 2] < (_MAX_RADIUS_SIGMA * circle.radius_px) ** 2
+    if hint is None:
+        return PivotEstimate(circle.centre_px, circle.centre_covariance_px2, "centre of rotation") if shown else None
+    difference, spread = circle.centre_px - hint.centre_px, hint.covariance_px2 + circle.centre_covariance_px2
     gain = hint.covariance_px2 @ np.linalg.inv(spread)
-    if difference @ np.linalg.solve(spread, difference) > _DISAGREE:
-        return hint
-    covariance = np.asarray(hint.covariance_px2 - gain @ hint.covariance_px2, dtype=float)
-    return PivotEstimate(hint.centre_px + gain @ difference, covariance, "hint and centre of rotation")
+    away = float(difference @ np.linalg.solve(spread, difference))
+    covariance = (hint.covariance_px2 - gain @ hint.covariance_px2) * max(1.0, away / len(difference))
+    source = "hint and centre of rotation"
+    return PivotEstimate(hint.centre_px + gain @ difference, np.asarray(covariance), source, elsewhere=away > _DISAGREE)

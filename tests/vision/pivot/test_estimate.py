@@ -53,6 +53,22 @@ def test_a_hint_is_a_pivot_where_the_path_is_too_short():
     assert np.hypot(*(pivot.centre_px - [50.0, 60.0])) < 3.0 * np.sqrt(np.trace(pivot.covariance_px2))
 
 
+def test_a_hint_counts_by_its_uncertainty_and_a_contradiction_makes_both_less_certain():
+    rng = np.random.default_rng(1)
+    at = np.radians(np.linspace(-10, 10, 200))
+    circle = fit_circle(100 * np.column_stack([np.cos(at), np.sin(at)]) + 0.05 * rng.standard_normal((200, 2)))
+    alone, _ = combine_pivot(None, circle)
+    near = PivotEstimate(circle.centre_px + [1.0, 0.0], np.eye(2), "hint")
+    agreed, _ = combine_pivot(None, circle, near)
+    far = PivotEstimate(circle.centre_px + [200.0, 0.0], 30.0**2 * np.eye(2), "hint")
+    contradicted, _ = combine_pivot(None, circle, far)
+    assert agreed.covariance_px2[0, 0] < min(1.0, 0.5 * alone.covariance_px2[0, 0])
+    assert not agreed.elsewhere
+    assert contradicted.elsewhere
+    assert np.abs(contradicted.centre_px - circle.centre_px).max() < 3.0 * np.sqrt(contradicted.covariance_px2[0, 0])
+    assert contradicted.covariance_px2[0, 0] > 10.0 * alone.covariance_px2[0, 0]
+
+
 def test_a_marker_off_hint_and_path_is_named_with_both():
     pivot, note = combine_pivot(_marker(50.0, 160.0), fit_circle(_path((50, 60))[:12]), HINT)
     assert pivot.source == "hint and centre of rotation"
