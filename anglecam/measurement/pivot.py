@@ -18,7 +18,9 @@ from anglecam.vision.pivot.marker import RoundMarker, count_round_things, find_m
 _STILL = 9
 """Frames whose median shows the still background."""
 HINT_PX = 30.0
-"""Standard uncertainty of each coordinate of the rig file's hint at the pivot, which is by eye."""
+"""Standard uncertainty of each coordinate of the rig file's hint at the pivot, which is by eye, if it is a rough one."""
+_USUAL_HINT_PX = 10.0
+"""The same as a rule. A slanted view shifts a marker that lies in front of the plane of motion."""
 _MARKER_PX = (10.0, 25.0)
 """The same by which a marker is sought about the hint: nearby first, for a screw may be farther off."""
 _DECLARED_PX = 1.0
@@ -97,7 +99,8 @@ def _hint(rig: Rig, lens: Lens) -> PivotEstimate | None:
     if rig.pivot.near is None:
         return None
     J = lens.jacobian(np.array(rig.pivot.near))
-    return PivotEstimate(lens.rectify(np.array(rig.pivot.near)), HINT_PX**2 * J @ J.T, "hint")
+    sigma = _USUAL_HINT_PX if lens.tilt == 0.0 else HINT_PX
+    return PivotEstimate(lens.rectify(np.array(rig.pivot.near)), sigma**2 * J @ J.T, "hint")
 
 
 def _displacement(marker: RoundMarker | None, still: Image, lens: Lens) -> Floats | None:

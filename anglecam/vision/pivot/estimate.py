@@ -20,6 +20,8 @@ camera than the mark."""
 _ALIGNED = 0.3
 """The same, that it has another round thing on the line through the pivot along which a short arc cannot place it.
 Mechanisms are symmetric: screws and joints of the frame lie on that line more often than beside it."""
+_ROUGH = 3.0
+"""Times the usual uncertainty of a hint that a rough one has."""
 _CERTAIN = 0.95
 """Probability from which on a round thing counts as the pivot's marker."""
 
@@ -170,18 +172,23 @@ def _disagreement(expected: PivotEstimate, marker: RoundMarker, distance: float)
 def _expected(circle: Circle | None, hint: PivotEstimate | None) -> PivotEstimate | None:
     """Return the pivot by the mark's motion and by the hint, each by its inverse covariance.
 
-    A short arc determines the direction to its centre well, and the distance badly. Where motion and hint contradict
-    each other, one of them is less certain than it states: the covariance grows by χ² over its expectation (Birge,
-    Physical Review 40, 1932).
+    A short arc determines the direction to its centre well, and the distance badly. A hint is a rough one if the motion
+    is then more probable. Where the two contradict each other all the same, one of them is less certain than it states:
+    the covariance grows by χ² over its expectation (Birge, Physical Review 40, 1932).
     """
     if circle is None or not np.isfinite(circle.covariance_px2).all():
         return hint
     shown = circle.covariance_px2[2, 2] < (_MAX_RADIUS_SIGMA * circle.radius_px) ** 2
     if hint is None:
         return PivotEstimate(circle.centre_px, circle.centre_covariance_px2, "centre of rotation") if shown else None
-    difference, spread = circle.centre_px - hint.centre_px, hint.covariance_px2 + circle.centre_covariance_px2
-    gain = hint.covariance_px2 @ np.linalg.inv(spread)
-    away = float(difference @ np.linalg.solve(spread, difference))
-    covariance = (hint.covariance_px2 - gain @ hint.covariance_px2) * max(1.0, away / len(difference))
+    difference = circle.centre_px - hint.centre_px
+    hints = [hint.covariance_px2, _ROUGH**2 * hint.covariance_px2]
+    spreads = [one + circle.centre_covariance_px2 for one in hints]
+    aways = [float(difference @ np.linalg.solve(spread, difference)) for spread in spreads]
+    k = int(np.argmin([away + np.linalg.slogdet(spread)[1] for away, spread in zip(aways, spreads, strict=True)]))
+    gain = hints[k] @ np.linalg.inv(spreads[k])
+    covariance = (hints[k] - gain @ hints[k]) * max(1.0, aways[k] / len(difference))
     source = "hint and centre of rotation"
-    return PivotEstimate(hint.centre_px + gain @ difference, np.asarray(covariance), source, elsewhere=away > _DISAGREE)
+    return PivotEstimate(
+        hint.centre_px + gain @ difference, np.asarray(covariance), source, elsewhere=aways[k] > _DISAGREE
+    )

@@ -60,7 +60,7 @@ def test_a_hint_counts_by_its_uncertainty_and_a_contradiction_makes_both_less_ce
     alone, _ = combine_pivot(None, circle)
     near = PivotEstimate(circle.centre_px + [1.0, 0.0], np.eye(2), "hint")
     agreed, _ = combine_pivot(None, circle, near)
-    far = PivotEstimate(circle.centre_px + [200.0, 0.0], 30.0**2 * np.eye(2), "hint")
+    far = PivotEstimate(circle.centre_px + [200.0, 0.0], 10.0**2 * np.eye(2), "hint")
     contradicted, _ = combine_pivot(None, circle, far)
     assert agreed.covariance_px2[0, 0] < min(1.0, 0.5 * alone.covariance_px2[0, 0])
     assert not agreed.elsewhere
