@@ -18,9 +18,10 @@ from anglecam.vision.pivot.marker import RoundMarker, count_round_things, find_m
 _STILL = 9
 """Frames whose median shows the still background."""
 HINT_PX = 30.0
-"""Standard uncertainty of each coordinate of the rig file's hint at the pivot, which is by eye, if it is a rough one."""
+"""Standard uncertainty of each coordinate of a rough hint at the pivot, and of any in a slanted view, which shifts a
+marker that lies in front of the plane of motion."""
 _USUAL_HINT_PX = 10.0
-"""The same as a rule. A slanted view shifts a marker that lies in front of the plane of motion."""
+"""The same of a hint as it usually is: by eye."""
 _MARKER_PX = (10.0, 25.0)
 """The same by which a marker is sought about the hint: nearby first, for a screw may be farther off."""
 _DECLARED_PX = 1.0
