@@ -235,21 +235,26 @@ def in_light(picture: NDArray[np.float32], median: NDArray[np.float32]) -> NDArr
 
     Light and exposure multiply the light that falls on a pixel, and so, by whatever power the camera applies, its grey
     level. The logarithm of the factor is a quadratic function of the place: light falls aslant, and lenses darken
-    towards the corners. What moves has no weight (Tukey's biweight), nor what is black or saturated.
+    towards the corners. What moves has no weight (Tukey's biweight). A pixel that is saturated, or black, says that the
+    light is as bright as it shows at least, or at most (Tobin, Econometrica 26, 1958).
     """
-    fair = (median > _DARK) & (picture > _DARK) & (median < _BRIGHT) & (picture < _BRIGHT)
-    rows, columns = (some[:: max(1, fair.sum() // _LIGHT_PIXELS)] for some in np.nonzero(fair))
+    fair = (median > _DARK) & (median < _BRIGHT) & np.isfinite(picture)
+    limited = (picture >= _BRIGHT) | (picture <= _DARK)
+    exact, bounds = (_thinned(fair & some) for some in (~limited, limited))
     height, width = picture.shape
-    if len(rows) < _LEAST_LIGHT_PIXELS:
+    if len(exact) < _LEAST_LIGHT_PIXELS:
         return picture
+    rows, columns = np.concatenate([exact, bounds]).T
+    shown, known = picture[rows, columns], np.arange(len(rows)) < len(exact)
     terms = _quadratic(columns / width, rows / height)
-    ratio = np.log(picture[rows, columns] / median[rows, columns])
+    ratio = np.log(np.clip(shown, _DARK, _BRIGHT) / median[rows, columns])
     prior = np.diag([0.0, *np.full(terms.shape[1] - 1, _PRIOR)])
-    factor = np.array([np.median(ratio), *np.zeros(terms.shape[1] - 1)])
+    factor = np.array([np.median(ratio[known]), *np.zeros(terms.shape[1] - 1)])
     for _ in range(_LIGHT_ROUNDS):
         off = ratio - terms @ factor
-        scale = max(_LEAST_LIGHT, _MAD * float(np.median(np.abs(off))))
-        weight = np.maximum(0.0, 1.0 - (off / (_TUKEY * scale)) ** 2) ** 2
+        says = known | np.where(shown >= _BRIGHT, off > 0.0, off < 0.0)
+        scale = max(_LEAST_LIGHT, _MAD * float(np.median(np.abs(off[says]))))
+        weight = np.where(says, np.maximum(0.0, 1.0 - (off / (_TUKEY * scale)) ** 2) ** 2, 0.0)
         weighted = terms.T * weight
         factor = np.linalg.solve(weighted @ terms + prior, weighted @ ratio)
     light = np.exp(_quadratic_of(height, width) @ factor).reshape(height, width)
@@ -258,6 +263,11 @@ def in_light(picture: NDArray[np.float32], median: NDArray[np.float32]) -> NDArr
     steady = np.where(picture >= _BRIGHT, np.maximum(steady, median), steady)
     steady = np.where(picture <= _DARK, np.minimum(steady, median), steady)
     return np.asarray(steady, np.float32)
+
+
+def _thinned(some: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return rows and columns (n, 2) of evenly drawn ones of some pixels."""
+    return np.argwhere(some)[:: max(1, some.sum() // _LIGHT_PIXELS)]
 
 
 def _quadratic(x: Floats, y: Floats) -> Floats:

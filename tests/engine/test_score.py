@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from anglecam.engine.sample import Sample, Stills, sample_of, sample_stills, steady_light
+from anglecam.engine.sample import Sample, Stills, in_light, sample_of, sample_stills, steady_light
 from anglecam.engine.score import NOTHING, Proposal, score
 from anglecam.engine.target_learning import learn_target
 
@@ -110,6 +110,24 @@ def test_light_that_changes_is_taken_out():
     steady = np.stack([_bar(t, k) for k, t in enumerate(TURN)])
     ratio = steady_light(lit)[:, 80:, :] / steady[:, 80:, :]
     assert np.abs(np.median(ratio, axis=(1, 2)) / np.median(ratio) - 1.0).max() < 0.01
+
+
+@pytest.mark.parametrize("brighter", [1.2, 1.4])
+def test_a_saturated_picture_says_that_the_light_is_as_bright_at_least(brighter):
+    """A bright frame shows a wall white, and what is dark before it moves: the light follows from both."""
+    rng = np.random.default_rng(0)
+    seen = np.full((2, 120, 160), 205.0)
+    seen[:, :10, 10:20] = seen[:, :10, 140:150] = seen[0, 30:110, 78:82] = 60.0
+    for row in range(30, 110):
+        seen[1, row, 78 + int((110 - row) * 0.4) :][:4] = 60.0
+    median, moved = np.float32(seen)
+    across, down = np.meshgrid(np.linspace(-1.0, 1.0, 160), np.linspace(-1.0, 1.0, 120))
+    light = brighter * (1.0 + 0.05 * across) * (1.0 - 0.15 * down**2)
+    picture = np.clip(moved * light + rng.normal(0.0, 2.0, moved.shape), 0.0, 255.0)
+    off = np.abs(in_light(np.float32(picture), median) / moved - 1.0)
+    wall = (moved > 100.0) & (median > 100.0)
+    assert off[wall].max() < 0.12
+    assert off[moved < 100.0].mean() < 0.2
 
 
 def test_a_sample_is_cut_to_what_changes():
