@@ -52,11 +52,6 @@ def obeys(fit: Fit, sample: Sample, hints: Hints) -> bool:
         spread = fit.covariance_px2 + hints.pivot_sigma_px**2 * np.eye(2)
         if off @ np.linalg.solve(spread, off) > _FAR:
             return False
-    return shown_by_mark(fit, sample, hints)
-
-
-def shown_by_mark(fit: Fit, sample: Sample, hints: Hints) -> bool:
-    """Return whether nothing contradicts that a body is where it was pointed at."""
     return beside_mark(fit, sample, hints) <= np.sqrt(_FAR)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from anglecam.data.typing import Flags, Floats
 from anglecam.engine.competition import OFF_CENTRE, RIGHT, SURE
-from anglecam.engine.hints import Hints, shown_by_mark
+from anglecam.engine.hints import Hints, obeys
 from anglecam.engine.learn import Learnt
 
 _UNSURE = 10
@@ -86,24 +86,26 @@ def why_jump(turn: Floats, first_frame: int) -> str | None:
     )
 
 
-def why_another(learnt: Learnt, hints: Hints, first_frame: int) -> str | None:
-    """Return a sentence where what turns is not what was pointed at.
+def why_another(learnt: Learnt, declared: Hints, first_frame: int) -> str | None:
+    """Return a sentence where what turns is not what is declared.
 
     Parameters
     ----------
     learnt : Learnt
         The first explanation is the body that is followed.
-    hints : Hints
-        What is declared.
+    declared : Hints
+        A mark or a fixed pivot. What is only a hint is no declaration.
     first_frame : int
         Number in the film of the first frame that is measured.
     """
     first = learnt.explanations[0]
-    if hints.mark_px is None or shown_by_mark(first.fit, learnt.sample, hints):
+    if obeys(first.fit, learnt.sample, declared):
         return None
     x, y = first.fit.proposal.centre_px
-    left, top = 0.5 * (hints.mark_px[:2] + hints.mark_px[2:])
-    return (
-        f"what is seen to turn, about {x:.0f},{y:.0f}, is not what is declared: the mark around {left:.0f},{top:.0f}"
-        f" in frame {first_frame + hints.mark_frame} stands still or moves otherwise"
-    )
+    meant = []
+    if declared.pivot_px is not None:
+        meant.append("pivot {:.0f},{:.0f}".format(*declared.pivot_px))
+    if declared.mark_px is not None:
+        middle = 0.5 * (declared.mark_px[:2] + declared.mark_px[2:])
+        meant.append("mark around {:.0f},{:.0f} in frame {}".format(*middle, first_frame + declared.mark_frame))
+    return f"what is seen to turn, about {x:.0f},{y:.0f}, is not what is declared ({' and '.join(meant)})"

@@ -104,7 +104,8 @@ def _followed(camera: HeldCamera, rig: Rig, hints: Hints, learnt: Learnt, progre
     jump = why_jump(track.turn, film.first_frame)
     if jump is not None:
         return jump
-    doubt = why_another(learnt, hints, film.first_frame) or why_ambiguous(track.ambiguous, film.first_frame)
+    declared = hints if rig.pivot.at is not None else replace(hints, pivot_px=None)
+    doubt = why_another(learnt, declared, film.first_frame) or why_ambiguous(track.ambiguous, film.first_frame)
     found = _detections(film, rig, seen, rigid_motion(search, track, seen.decoded))
     return found if isinstance(found, str) else replace(found, doubt=doubt, learnt=learnt)
 

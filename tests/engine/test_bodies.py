@@ -192,11 +192,16 @@ def test_a_pivot_hint_at_another_place_costs_a_note_and_no_measurement(tmp_path)
     assert np.sqrt((_error(measured, JUMPS) ** 2).mean()) < 0.3
 
 
-def test_a_mark_is_declared_where_nothing_moves(tmp_path):
-    rig = Rig.model_validate({"mark": {"at": [20, 220], "frame": 1}})
-    measured = _measured(tmp_path, _horn, JUMPS, rig=rig)
+@pytest.mark.parametrize(
+    ("declared", "said"),
+    [
+        ({"mark": {"at": [20, 220], "frame": 1}}, "mark around 20,220 in frame 1"),
+    ],
+)
+def test_what_is_declared_where_nothing_moves_is_no_success(tmp_path, declared, said):
+    measured = _measured(tmp_path, _horn, JUMPS, rig=Rig.model_validate(declared))
     assert measured.doubt is not None
-    assert "the mark around 20,220 in frame 1 stands still or moves otherwise" in measured.doubt
+    assert f"is not what is declared ({said})" in measured.doubt
 
 
 def test_a_body_is_measured_whose_mark_is_seen_in_some_frames_only(tmp_path):
