@@ -13,7 +13,7 @@ from statistics import median
 
 import numpy as np
 
-from anglecam.data.typing import Flags, Floats, Image
+from anglecam.data.typing import Flags, Floats
 from anglecam.engine.body import (
     STANDS,
     Body,
@@ -25,10 +25,10 @@ from anglecam.engine.body import (
     turns_to_try,
     with_ratio,
 )
-from anglecam.engine.path import changes, middle, most_from_motion, steadiest_path, wrapped
-from anglecam.engine.refine import Fit, refine
+from anglecam.engine.path import most_from_motion, steadiest_path, wrapped
+from anglecam.engine.refine import Fit
 from anglecam.engine.sample import Sample
-from anglecam.engine.score import NOTHING, carried_by, score
+from anglecam.engine.score import carried_by
 from anglecam.engine.target import Picture
 from anglecam.engine.target_learning import learn_target
 
@@ -41,7 +41,7 @@ _PEAKS, _CANDIDATES = 48, 24
 _HOPELESS = 0.1
 """Share of the best pose's gain below which another one is not considered. A look-alike has more, unless another body
 is before it."""
-_APART_PX = 6.0
+APART_PX = 6.0
 """Least distance of poses that count as two."""
 _LIKE, _BESIDE_PX = 0.7, 25.0
 """Share of the better pose's gain from which on a pose so near to it may be a look-alike, as of a gear's next tooth."""
@@ -51,13 +51,6 @@ _MAD = 1.4826
 """Standard deviation of normal values over the median of their magnitudes."""
 _LEAST_SPREAD = 0.01
 """Standard deviation of such a share: few frames may agree by chance."""
-_FEWEST = 8
-"""Frames of the sample from which a body is learnt again."""
-_JUMP = 20.0
-"""Usual changes of a step from frame to frame from which on a change may be a jump to a look-alike pose."""
-_AS_WELL = 0.9
-"""Share of the gain of the body as it was learnt that a steadier motion has to have. Of two look-alikes in each frame
-the better one was learnt, by chance, which gains some per cent."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +123,7 @@ def _wrong_poses(search: Search) -> Floats:
             gain = float(gains_about(frame, body, search.centre, np.array([right]), shifts[k]).sum())
             found = [(float(wrapped(one.turn - right)), one.gain) for one in candidates(learnt, picture, shifts[k])]
             if gain > 0.0:
-                wrong += [(turn, 1.0 - less / gain) for turn, less in found if abs(turn) * search.arm > _APART_PX]
+                wrong += [(turn, 1.0 - less / gain) for turn, less in found if abs(turn) * search.arm > APART_PX]
     return np.array(wrong).reshape(-1, 2)
 
 
@@ -152,7 +145,7 @@ def log_odds(search: Search, turn: Floats, gain: Floats) -> Floats:
     odds = gain / search.temper
     if len(odds) < 2:
         return np.asarray(odds)
-    best, near = int(gain.argmax()), _APART_PX / search.arm
+    best, near = int(gain.argmax()), APART_PX / search.arm
     away = np.abs(wrapped(search.wrong[:, 0] - (turn - turn[best])[:, None])) < near
     for i in np.flatnonzero(away.sum(axis=1) >= _FEWEST_ALIKE):
         shares = search.wrong[away[i], 1].tolist()
@@ -198,7 +191,7 @@ def _peaks(search: Search, gains: Floats) -> Floats:
     least = -_HOPELESS * float(left.max(initial=0.0))
     while len(peaks) < _PEAKS and (left >= least).any():
         peaks.append(float(search.turns[int(left.argmax())]))
-        left[np.abs(wrapped(search.turns - peaks[-1])) * search.arm <= _APART_PX] = -np.inf
+        left[np.abs(wrapped(search.turns - peaks[-1])) * search.arm <= APART_PX] = -np.inf
     return np.array(peaks)
 
 
@@ -214,89 +207,7 @@ def _may_be(search: Search, turn: Floats, gain: Floats) -> Flags:
 def _another(search: Search, one: Turn, better: Turn) -> bool:
     """Return whether a pose is another one than a better one: not a lower peak beside it."""
     away = abs(float(wrapped(one.turn - better.turn))) * search.arm
-    return away > (_APART_PX if one.gain > _LIKE * better.gain else _BESIDE_PX)
-
-
-def steadier(
-    search: Search, found: Sequence[Sequence[Turn]], times: Floats, pictures: Sequence[Image | None]
-) -> Search | None:
-    """Return a search for the body that is learnt from a steadier motion, if it explains the sample as well.
-
-    Frames far apart may show a body of like parts now in one pose and now in a look-alike one, and what is learnt from
-    them then looks like both. The motion through all frames tells them apart: the steadiest one alone, or the one by
-    the body as it looks in a stretch of frames through which it turns without a jump.
-
-    Parameters
-    ----------
-    search : Search
-        For the body as it was learnt.
-    found : sequence of sequence of Turn
-        Where it may be in each of n frames.
-    times : ndarray
-        (n,) s.
-    pictures : sequence of ndarray or None
-        n pictures as `Sample.seen` returns them, in bytes; empty where they are not at hand.
-
-    Returns
-    -------
-    Search or None
-        ``None`` where the motion is steady as it is, or no other one explains the sample.
-    """
-    steadiest = _as_well(search, chosen(found, times, replace(search, temper=np.inf, wrong=np.empty((0, 2)))).turn)
-    if steadiest is not None:
-        return steadiest
-    turn = _by_stretch(search, chosen(found, times, search).turn, times, pictures)
-    return None if turn is None else _as_well(search, turn)
-
-
-def _as_well(search: Search, turn: Floats) -> Search | None:
-    """Return a search for the body of a motion (n,), rad, if it is another one and explains the sample as well."""
-    sample, known = search.sample, search.fit.proposal
-    at_sample = turn[sample.frames]
-    both = np.isfinite(at_sample) & np.isfinite(known.turn)
-    if both.sum() < _FEWEST:
-        return None
-    off = (at_sample - known.turn)[both]
-    if np.abs(wrapped(off - middle(off))).max() * search.arm < _APART_PX:
-        return None
-    fit = refine(sample, replace(known, name="steady motion", turn=at_sample))
-    if fit is None:
-        return None
-    nothing, before, after = (
-        score(sample, name, poses, lit=True)
-        for name, poses in (
-            (NOTHING, [None] * len(sample.pictures)),
-            (known.name, known.poses(sample)),
-            (fit.proposal.name, fit.proposal.poses(sample)),
-        )
-    )
-    gained, gains = before.total - nothing.total, after.total - nothing.total
-    return search_for(sample, fit) if gains > _AS_WELL * gained else None
-
-
-def _by_stretch(search: Search, turn: Floats, times: Floats, pictures: Sequence[Image | None]) -> Floats | None:
-    """Return the motion (n,) of the body as it looks in frames through which it turns without a jump.
-
-    ``None`` where it never jumps, or the pictures are not at hand.
-    """
-    seen = np.flatnonzero(np.isfinite(turn))
-    if not pictures or len(seen) < _FEWEST:
-        return None
-    change = np.abs(np.append(0.0, changes(turn[seen], times[seen])[0]))
-    jumps = np.flatnonzero(change > max(_JUMP * float(np.median(change)), _APART_PX / search.arm))
-    runs = [run for run in np.split(seen, jumps + 1) if len(run) >= _FEWEST]
-    if len(jumps) == 0 or not runs:
-        return None
-    longest = max(runs, key=lambda run: float(np.ptp(np.unwrap(turn[run]))))
-    some = longest[np.unique(np.linspace(0, len(longest) - 1, len(search.sample.frames)).round().astype(int))]
-    shown = [picture for k in some if (picture := pictures[k]) is not None]
-    part = replace(search.sample, pictures=np.stack(shown).astype(np.float32), frames=some)
-    fit = refine(part, replace(search.fit.proposal, turn=turn[some]))
-    if fit is None:
-        return None
-    near = search_for(part, fit)
-    again = [[] if p is None else candidates(near, p.astype(np.float32)) for p in pictures]
-    return chosen(again, times, near).turn
+    return away > (APART_PX if one.gain > _LIKE * better.gain else _BESIDE_PX)
 
 
 def chosen(found: Sequence[Sequence[Turn]], times: Floats, search: Search) -> Track:

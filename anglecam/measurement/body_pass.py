@@ -13,14 +13,16 @@ from anglecam.data.series import OK
 from anglecam.data.typing import Floats
 from anglecam.engine.body import Turn
 from anglecam.engine.hints import Hints
+from anglecam.engine.kept_picture import in_grey_levels
 from anglecam.engine.learn import Learnt, looks, rank
 from anglecam.engine.path import unsteadiness
 from anglecam.engine.reasons import why_ambiguous, why_another, why_jump, why_nothing_turns
 from anglecam.engine.refine import sensitivities
+from anglecam.engine.relearning import over_poses, steadier
 from anglecam.engine.sample import FRAMES
 from anglecam.engine.target import Picture as Grey
 from anglecam.engine.tint import tint_of
-from anglecam.engine.tracking import Search, Track, candidates, chosen, search_for, steadier
+from anglecam.engine.tracking import Search, Track, candidates, chosen, search_for
 from anglecam.io.rig import Rig
 from anglecam.measurement.camera_pass import HeldCamera
 from anglecam.measurement.detections import Detections, frame_of_mark
@@ -101,6 +103,9 @@ def _followed(camera: HeldCamera, rig: Rig, hints: Hints, learnt: Learnt, progre
     # of motions that explain the film as well, the steadiest
     resolution = 1.0 / tried[0][0].arm
     search, seen, track = min(tried, key=lambda one: unsteadiness(one[2].turn, one[1].time, resolution))
+    spread = over_poses(search, track.turn, seen.pictures)
+    if spread is not None and (shown := _again(seen, spread)) is not None:
+        search, seen, track = spread, shown, chosen(shown.found, shown.time, spread)
     jump = why_jump(track.turn, film.first_frame)
     if jump is not None:
         return jump
@@ -130,7 +135,7 @@ def _again(seen: Seen, search: Search) -> Seen | None:
     """Return what another search finds in the same pictures; ``None`` where they were not kept."""
     if not seen.pictures:
         return None
-    found = [[] if p is None else candidates(search, p.astype(np.float32)) for p in seen.pictures]
+    found = [[] if p is None else candidates(search, in_grey_levels(p)) for p in seen.pictures]
     return replace(seen, found=found)
 
 

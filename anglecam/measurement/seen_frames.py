@@ -10,6 +10,7 @@ import numpy as np
 from anglecam.data.typing import Floats, Image
 from anglecam.engine.body import Turn
 from anglecam.engine.frame_choice import spread_over_motion, thumbnail
+from anglecam.engine.kept_picture import in_bytes
 from anglecam.engine.sample import FRAMES, Sample, Stills
 from anglecam.engine.target import Picture as Grey
 from anglecam.measurement.camera_pass import HeldCamera
@@ -83,7 +84,7 @@ class Seen:
     moves: list[CameraMove]
     """Of the camera; empty where it stands still."""
     pictures: list[Image | None]
-    """As the body was sought in them; empty where they take too much memory."""
+    """As the body was sought in them, by `in_bytes`; empty where they take too much memory."""
 
 
 def follow(camera: HeldCamera, sample: Sample, find: Find, progress: Progress) -> Seen:
@@ -126,5 +127,5 @@ def follow(camera: HeldCamera, sample: Sample, find: Find, progress: Progress) -
         small = None if unknown or image is None else sample.seen(image, affine)
         found.append([] if small is None else find(picture.index, small))
         if keep:
-            kept.append(None if small is None else np.clip(np.round(small), 0, 255).astype(np.uint8))
+            kept.append(None if small is None else in_bytes(small))
     return Seen(np.array(time), found, decoded, repeated, moves, kept)
