@@ -1,7 +1,7 @@
-"""Learn a body again once its motion is known: from a steadier motion, and from frames that show all of its poses.
+"""Learn a body again from a steadier motion than the one it was learnt from.
 
-A body is first learnt from frames that are spread over time, whose poses are not known yet. Their motion through all
-frames says more: which of two look-alike poses is right, and which frames show the body before all of its background.
+A body is first learnt from a few frames, in which look-alike poses are not told apart. Its motion through all frames
+says which of them are right.
 """
 
 from __future__ import annotations
@@ -106,44 +106,6 @@ def _by_stretch(search: Search, turn: Floats, times: Floats, pictures: Sequence[
         return None
     again = [[] if p is None else candidates(near, in_grey_levels(p)) for p in pictures]
     return chosen(again, times, near).turn
-
-
-def over_poses(search: Search, turn: Floats, pictures: Sequence[Image | None]) -> Search | None:
-    """Return a search for the body that is learnt from frames which are spread over its poses.
-
-    Frames that are spread over time show a pose in which the body stays over and over: what stays beside it there
-    looks like a part of it. Of n frames, each next one is the one whose pose is farthest from those that are chosen
-    (Gonzalez, Theoretical Computer Science 38, 1985).
-
-    Parameters
-    ----------
-    search : Search
-        For the body as it was learnt from frames that are spread over time.
-    turn : ndarray
-        (n,) rad; NaN where it is not seen.
-    pictures : sequence of ndarray or None
-        n pictures as `Sample.seen` returns them, `in_bytes`; empty where they are not at hand.
-
-    Returns
-    -------
-    Search or None
-        ``None`` where the pictures are not at hand, or nothing follows the motion.
-    """
-    seen = np.flatnonzero(np.isfinite(turn))
-    if not pictures or len(seen) < _FEWEST:
-        return None
-    return _learnt_from(seen[_farthest_first(turn[seen], len(search.sample.frames))], search, turn, pictures)
-
-
-def _farthest_first(turn: Floats, count: int) -> NDArray[np.int64]:
-    """Return the numbers of so many turns (n,), ascending, that are as far apart as possible on the circle."""
-    some = [0]
-    apart = np.abs(wrapped(turn - turn[0]))
-    while len(some) < min(count, len(turn)):
-        some.append(int(apart.argmax()))
-        apart = np.minimum(apart, np.abs(wrapped(turn - turn[some[-1]])))
-        apart[some] = -1.0
-    return np.sort(np.array(some))
 
 
 def _learnt_from(

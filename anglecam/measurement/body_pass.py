@@ -18,7 +18,7 @@ from anglecam.engine.learn import Learnt, looks, rank
 from anglecam.engine.path import unsteadiness
 from anglecam.engine.reasons import why_ambiguous, why_another, why_jump, why_nothing_turns
 from anglecam.engine.refine import sensitivities
-from anglecam.engine.relearning import over_poses, steadier
+from anglecam.engine.relearning import steadier
 from anglecam.engine.sample import FRAMES
 from anglecam.engine.target import Picture as Grey
 from anglecam.engine.tint import tint_of
@@ -103,9 +103,6 @@ def _followed(camera: HeldCamera, rig: Rig, hints: Hints, learnt: Learnt, progre
     # of motions that explain the film as well, the steadiest
     resolution = 1.0 / tried[0][0].arm
     search, seen, track = min(tried, key=lambda one: unsteadiness(one[2].turn, one[1].time, resolution))
-    spread = over_poses(search, track.turn, seen.pictures)
-    if spread is not None and (shown := _again(seen, spread)) is not None:
-        search, seen, track = spread, shown, chosen(shown.found, shown.time, spread)
     jump = why_jump(track.turn, film.first_frame)
     if jump is not None:
         return jump

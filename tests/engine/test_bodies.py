@@ -196,6 +196,7 @@ def test_a_pivot_hint_at_another_place_costs_a_note_and_no_measurement(tmp_path)
     ("declared", "said"),
     [
         ({"mark": {"at": [20, 220], "frame": 1}}, "mark around 20,220 in frame 1"),
+        ({"pivot": {"at": [20, 220]}}, "pivot 20,220"),
     ],
 )
 def test_what_is_declared_where_nothing_moves_is_no_success(tmp_path, declared, said):
