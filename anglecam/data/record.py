@@ -18,8 +18,10 @@ RELEASE_SHARE = 0.02
 SWINGING_SHARE = 0.25
 """Share of the swing's range beyond which it counts as released, whatever its noise and the hand's tremor."""
 REST_RANGE_STEPS = 10.0
-"""Range of the angle in median steps from frame to frame, below which it is noise about a rest; white noise has 5 to
-8."""
+"""Range of the angle in median steps from frame to frame, below which it is noise about a rest or a fast swing; white
+noise has 5 to 8."""
+CHANCE_OF_LINE = 1e-4
+"""Probability below which the strongest line in the spectrum of white noise is a swing."""
 LONGEST_INTERVAL = 1.0
 """Longest median frame interval, s. A series with longer intervals shows no mechanism of this kind; its times are more
 likely in milliseconds."""
@@ -164,8 +166,7 @@ def _from_release(record: Record) -> Record:
     The release is the last frame near the start before the angle leaves it for good. Noise or a tremor of more than
     `RELEASE_SHARE` leaves it, too, but comes back.
     """
-    jitter = float(np.median(np.abs(np.diff(record.angle))))
-    if np.ptp(record.angle) <= REST_RANGE_STEPS * jitter:
+    if _rests(record.angle):
         raise InputError(f"{record.name}: no command, and nothing moves; there is no swing to fit")
     away = np.abs(record.angle - np.median(record.angle[:5])) / np.ptp(record.angle)
     swinging = int(np.argmax(away > SWINGING_SHARE))
@@ -174,3 +175,19 @@ def _from_release(record: Record) -> Record:
     if len(record.time) - first < MIN_FRAMES:
         raise InputError(f"{record.name}: no command, and the angle moves in too few frames to fit a free swing")
     return record.between(record.time[first], np.inf)
+
+
+def _rests(angle: Floats) -> bool:
+    """Return whether angles (n,) are noise about a rest.
+
+    Noise changes from frame to frame by nearly as much as altogether. So does a swing with a dozen frames a period, but
+    it has one frequency: the largest share of the power that one of m frequencies has in white noise exceeds g with
+    probability m(1 − g)^(m − 1) at most (Fisher, Proc. R. Soc. A 125, 1929).
+    """
+    if np.ptp(angle) > REST_RANGE_STEPS * float(np.median(np.abs(np.diff(angle)))):
+        return False
+    power = np.abs(np.fft.rfft(angle - angle.mean())[1:]) ** 2
+    if not power.any():
+        return True
+    share = float(power.max() / power.sum())
+    return len(power) * (1.0 - share) ** (len(power) - 1) > CHANCE_OF_LINE

@@ -9,6 +9,7 @@ import pytest
 
 from anglecam.data.record import record_from_series
 from anglecam.data.series import AngleSeries
+from anglecam.errors import InputError
 from anglecam.identification.identify_records import identify_records
 from anglecam.io.rig import Rig
 
@@ -62,3 +63,30 @@ def test_a_model_that_held_out_recordings_contradict_is_doubted():
         model, fit=nearly, held_out=model.fit, fitted=(replace(fitted, sigma=0.0 * fitted.angle + 0.01),)
     )
     assert not within_noise.doubts
+
+
+def _series(angle_deg: np.ndarray, rate_hz: float = 30.0) -> AngleSeries:
+    count = len(angle_deg)
+    return AngleSeries(
+        "swing", np.arange(count) / rate_hz, np.radians(angle_deg), np.full(count, np.nan), ("ok",) * count
+    )
+
+
+@pytest.mark.parametrize("frames_a_period", [3.3, 6.0, 12.0, 15.0, 22.0])
+def test_a_swing_with_few_frames_a_period_is_no_rest(frames_a_period):
+    frames = np.arange(300)
+    noise = np.random.default_rng(0).normal(0.0, 0.5, len(frames))
+    angle = 30.0 * np.exp(-frames / 400.0) * np.cos(2.0 * np.pi * frames / frames_a_period) + noise
+    assert len(record_from_series(_series(angle), None, zero_known=False).time) > 290
+
+
+@pytest.mark.parametrize("frames", [40, 300, 3000])
+def test_noise_about_a_rest_is_no_swing(frames):
+    refused = 0
+    for seed in range(50):
+        noise = np.random.default_rng(seed).normal(0.0, 0.1, frames)
+        try:
+            record_from_series(_series(noise), None, zero_known=False)
+        except InputError as problem:
+            refused += "nothing moves" in str(problem)
+    assert refused >= 49
