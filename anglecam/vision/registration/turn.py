@@ -324,15 +324,15 @@ def _step(body: BodyAppearance, view: FrameView, turn: float, middles_px: Floats
     if not clear.any() or not np.isfinite(usual):
         return None
     normal, gradient = normals.sum(axis=0), gradients.sum(axis=0)
-    known = np.diag([1.0 / max(float(normal[0, 0]), 1e-9), 0.0, 0.0])
+    if not normal[0, 0] > 0.0:  # the body has left the picture
+        return None
+    known = np.diag([1.0 / float(normal[0, 0]), 0.0, 0.0])
     pivot = _FramePivot(np.zeros(2), known, 1.0, 0.0, 0.0)
     covariance = view.pivot_covariance_px2
     if covariance is None and body.wander_px > 0.0:
         covariance = body.wander_px**2 * np.eye(2)
     if covariance is not None:
         normal, gradient, pivot = _eliminate_pivot(normal, gradient, covariance)
-    if not normal[0, 0] > 0.0:  # the body has left the picture
-        return None
     step = float(gradient[0] / normal[0, 0])
     count = int(fit.count[clear].sum())
     return _Step(step, usual, count, clear, normals, gradients, normal, pivot)

@@ -9,6 +9,7 @@ import yaml
 from anglecam.io.rig import Rig, RigMark
 from anglecam.measurement.clip import measure_clip
 from anglecam.video.open_film import open_film
+from anglecam.vision.registration import turn
 from anglecam.vision.registration.tile_weights import copied_share
 from anglecam.vision.registration.tiles import FrameView
 from anglecam.vision.registration.turn import find_turn
@@ -70,6 +71,19 @@ def test_pixels_outside_the_part_that_is_seen_do_not_matter(swing, tmp_path_fact
         before = np.roll(frame.image, 1, axis=0)
         whole, partly = find_turn(body, view, before), find_turn(body, replace(view, image=other), before)
         assert (whole.turn, whole.noise, whole.pose) == (partly.turn, partly.noise, partly.pose)
+
+
+def test_a_body_of_which_no_tile_says_anything_has_no_turn(swing, tmp_path_factory, monkeypatch):
+    # a seesaw's end left the picture, and the tiles that stayed were flat
+    measured, _ = swing
+    registered = measured.angles.registered
+    frame = next(iter(open_film(next(tmp_path_factory.getbasetemp().rglob("swing.avi"))).frames()))
+    view = FrameView(frame.image, float(registered.turn[0]), registered.appearance.pivot_px)
+    view = replace(view, pivot_covariance_px2=np.eye(2))
+    count = len(registered.appearance.middles_in(view))
+    nothing = 1.0, np.ones(count, bool), np.zeros((count, 3, 3)), np.zeros((count, 3))
+    monkeypatch.setattr(turn, "weigh_tiles", lambda *_: nothing)
+    assert np.isnan(find_turn(registered.appearance, view).turn)
 
 
 def test_the_copied_share_is_that_of_equal_pixels_of_the_tiles_in_the_picture():
