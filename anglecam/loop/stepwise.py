@@ -19,7 +19,7 @@ import numpy as np
 from anglecam.data.record import Record
 from anglecam.effects import LEDGER, Effect
 from anglecam.identification.fit import Fit
-from anglecam.identification.noise import QUANTISED, RESIDUAL, Noise, autoregression
+from anglecam.identification.noise import QUANTISED, RESIDUAL, Noise, autoregression, correlated_share
 from anglecam.loop.candidates import Candidate, fit_candidates, fit_from_candidates, promising
 from anglecam.loop.cross_validation import Prediction, chosen_without, predict_held_out, predicts_better
 from anglecam.loop.fit_effect import fit_with
@@ -267,6 +267,7 @@ def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> tu
     ]
     best = min(fits, key=lambda one: one.cost)
     phi = autoregression(best.residuals, RESIDUAL).phi
+    phi *= correlated_share(best.residuals, phi)
     if task.floor is not None and math.isfinite(task.floor.phi_error):
         most = max(0.0, task.floor.phi + limits.noise_floor_phi_errors * task.floor.phi_error)
         return min(phi, most), phi <= most
