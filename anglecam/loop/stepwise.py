@@ -27,6 +27,7 @@ from anglecam.loop.likelihood import log_likelihood_gain, rms_difference
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_left, effects_of, refit_with_phi, refit_without
 from anglecam.loop.residual_test import ResidualTest, run_residual_test
+from anglecam.loop.rivals import is_possible
 from anglecam.loop.screen import Change, Forecast, changes, directions, forecasts
 from anglecam.loop.size import sizes_determined
 from anglecam.progress import Progress, Stage
@@ -232,6 +233,8 @@ def _add(task: Task, best: Candidate) -> Assessment:
         if cross_validated is None:
             break
         reduced = refit_without(fit, effect, task.fitted)
+        if not is_possible(reduced, task.fitted):
+            continue
         _, fewer = predict_held_out(reduced, task.fitted, task.predicted, task.policy)
         if not predicts_better(fewer, cross_validated, 0.0, task.rng, task.policy):
             fit, cross_validated = reduced, fewer
