@@ -204,8 +204,8 @@ def autoregression(parts: Sequence[Floats], source: str) -> Noise:
 def correlated_share(parts: Sequence[Floats], phi: float) -> float:
     """Return the largest share of the variance of some residuals that can be AR(1) noise, at most 1.
 
-    AR(1) noise is rough, and what a model lacks is smooth: it follows the motion. The differences of high order of AR(1)
-    noise have a known variance.
+    AR(1) noise is rough, and what a model lacks is smooth: it follows the motion. The differences of high order of
+    AR(1) noise have a known variance.
 
     Parameters
     ----------

@@ -21,6 +21,7 @@ from anglecam.loop.cross_validation import Gain, Prediction
 from anglecam.loop.free_form.result import FreeForm
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.residual_test import ResidualTest
+from anglecam.loop.seat import Seat
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -79,6 +80,8 @@ class Verdict:
     """The same of ``held_out``."""
     policy: Policy = DEFAULT
     """The thresholds that led to the verdict."""
+    where: tuple[Seat, ...] = ()
+    """Where what the final model leaves is larger than elsewhere; empty if no structure remains."""
     free_form: FreeForm | None = None
     """A torque that the final model lacks; ``None`` if no structure remains or no such torque improves the
     prediction."""

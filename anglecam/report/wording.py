@@ -8,7 +8,6 @@ from anglecam.data.rounding import with_uncertainty
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.loop.free_form.result import FreeForm
-from anglecam.loop.standing import error_beyond_noise
 from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import fitted_parameters
 
@@ -36,7 +35,7 @@ def sentence(verdict: Verdict) -> str:
     if verdict.verdict == "unexplained":
         return (
             f"Something is missing: the error of the model on {on} is {before}, and none of "
-            f"the effects that anglecam knows explains it with sufficient evidence.{_why_not_the_best(verdict)}"
+            f"the effects that anglecam knows explains it with sufficient evidence."
         )
     rest = "; what remains is more than noise, and no effect that anglecam knows explains it"
     first, *others = [_cause(a.effect, a.alias_set[1:], verdict.after) for a in verdict.accepted]
@@ -45,22 +44,6 @@ def sentence(verdict: Verdict) -> str:
     return (
         f"{causes}; with {this} in the model, its error on {on} falls from {before} to {after}"
         f"{rest if verdict.verdict == 'partly_explained' else ''}."
-    )
-
-
-def _why_not_the_best(verdict: Verdict) -> str:
-    """Return how much of the error the best single effect leaves, where that is too much for it to be named."""
-    best, before = next(iter(verdict.candidates), None), verdict.before_held_out
-    if best is None or best.held_out is None or len(best.held_out.records) != len(before.records):
-        return ""
-    most = verdict.policy.verdict.partly_explained_share
-    noise = verdict.noise if verdict.noise.known else None
-    left = error_beyond_noise(best.held_out, noise) / max(error_beyond_noise(before, noise), 1e-300)
-    if not most < left < 1.0:
-        return ""
-    return (
-        f" The best of them, {plain(best.effect.id)}, leaves {100 * left:.0f} % of it. Where more than noise remains, "
-        f"an effect is named only if it leaves at most {100 * most:.0f} %: other causes resemble one by as much."
     )
 
 
