@@ -24,6 +24,7 @@ from anglecam.identification.noise import RESIDUAL, autoregression, noise_floor
 from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.candidates import Candidate, promising
 from anglecam.loop.cross_validation import compare, predict_held_out, split_records
+from anglecam.loop.explained import shares_explained, why_stopped
 from anglecam.loop.free_form.result import find_free_form
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.profile import interval_of
@@ -238,10 +239,13 @@ def _conclude(
     after, after_held_out = (final.fit, final.held_out) if named or not remains else (before, before_held_out)
     left = final.cross_validated if named else before_held_out
     known_sigma = noise.sigma if noise.known else 0.0
+    shares = shares_explained(task, final, before_held_out, known_sigma) if named else []
     where = seats_of(left.records, left.residuals, known_sigma, task.rng) if remains else ()
     return Verdict(
         VERDICTS[bool(named), remains],
-        tuple(Accepted(effect, _rivals(after, effect, task)) for effect in named),
+        tuple(
+            Accepted(effect, _rivals(after, effect, task), share) for effect, share in zip(named, shares, strict=True)
+        ),
         before,
         after,
         before_held_out,
@@ -257,6 +261,7 @@ def _conclude(
         task.predicted,
         task.policy,
         where,
+        why_stopped(task, last, remains=remains),
     )
 
 

@@ -35,6 +35,9 @@ class Accepted:
     rivals: dict[str, Fit]
     """Effects that the recordings cannot distinguish from it: id → the model with that effect in its place, on the
     fitted recordings."""
+    explains: float = math.nan
+    """Share of the base model's error beyond the noise, in squares, that it takes away beside the effects
+    before it."""
     interval_95: tuple[float, float] = (-math.inf, math.inf)
     """95 % interval of the effect's size, its first parameter, SI; infinite where the recordings set no limit."""
 
@@ -82,6 +85,8 @@ class Verdict:
     """The thresholds that led to the verdict."""
     where: tuple[Seat, ...] = ()
     """Where what the final model leaves is larger than elsewhere; empty if no structure remains."""
+    stopped_by: str = ""
+    """Why no further effect is named, as a sentence."""
     free_form: FreeForm | None = None
     """A torque that the final model lacks; ``None`` if no structure remains or no such torque improves the
     prediction."""
