@@ -33,6 +33,7 @@ from anglecam.loop.remaining_structure import gains_energy, structure_remains
 from anglecam.loop.rivals import find_rivals
 from anglecam.loop.screen import changes, directions, forecasts
 from anglecam.loop.seat import seats_of
+from anglecam.loop.standing import model_that_stands
 from anglecam.loop.stepwise import (
     Assessment,
     Task,
@@ -233,7 +234,8 @@ def _conclude(
     noise = task.noise_within(last.fit) or replace(autoregression(last.fit.residuals, RESIDUAL), sigma=last.fit.rmse)
     remains = structure_remains(task, first, last)
     # the base model may have been fitted in windows, which are not the recordings of this task
-    final = first if gains_energy(last.fit, task.policy) else last
+    final = model_that_stands(task, first, last, before_held_out) if remains else last
+    final = first if gains_energy(final.fit, task.policy) else final
     named = effects_of(final.fit)
     # without an effect the final model is the base model
     after, after_held_out = (final.fit, final.held_out) if named or not remains else (before, before_held_out)

@@ -57,6 +57,14 @@ class VerdictPolicy:
         "withdrawing a correct model because of one recording that it predicts badly",
         "set with films 0007, 0013 and 0015 in view",
     )
+    least_explained_share: float = threshold(
+        0.5,
+        "share of the base model's squared held-out error beyond the noise",
+        "where structure remains, effects are named if together they explain at least this, the larger part",
+        "naming effects that only resemble a cause outside the ledger",
+        "the best single effect of 33 sessions with sixteen causes outside the ledger explained more in eleven: two "
+        "limit cycles, hysteresis, a bent cable, a magnet, an amplifier's step; the share is stated beside each effect",
+    )
     energy_gain_sigmas: float = threshold(
         3.0,
         "standard uncertainties",
