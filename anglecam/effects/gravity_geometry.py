@@ -14,8 +14,11 @@ import numpy as np
 
 from anglecam.effects import ports
 from anglecam.effects.effect import Effect, Parameter, Values
-from anglecam.effects.seen import Seen
+from anglecam.effects.seen import Motion, Seen
 
+LEFT_BY_WEIGHT = 0.05
+"""Share of the weight's stiffness by which it may exceed the whole, as that of a pendulum does whose drag is not in the
+model."""
 DIRECTIONS = (0.25, 0.75, -0.75, 1.0, -0.25, 0.0)
 """Angles of the centre of mass from upright at which a fit starts, in half turns."""
 
@@ -31,6 +34,12 @@ def _load(time: float, theta: float, omega: float, abc: Values, parameters: Valu
 def _starts(seen: Seen) -> list[Values]:
     """Start with a weight as strong as a part of the stiffness, in every direction."""
     return [(0.2 * seen.stiffness, math.pi * direction) for direction in DIRECTIONS]
+
+
+def _possible(parameters: Values, abc: Values, motion: Motion) -> bool:
+    """Return whether servo and springs have no negative stiffness: b is theirs and that of the weight, −G·cos θ0."""
+    strength, neutral = parameters[0], parameters[1]
+    return abc[1] + strength * math.cos(neutral) >= -LEFT_BY_WEIGHT * strength
 
 
 EFFECT = Effect(
@@ -57,4 +66,5 @@ EFFECT = Effect(
     source="the paper, Eqs. (16), (23)",
     load=_load,
     starts=_starts,
+    possible=_possible,
 )

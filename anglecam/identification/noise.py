@@ -18,7 +18,7 @@ from scipy import special
 
 from anglecam.data.record import Record
 from anglecam.data.typing import Floats
-from anglecam.identification.quantisation import quantisation
+from anglecam.identification.quantisation import DIFFERENCES, quantisation
 
 DISTANCE = "distance from the pivot"
 """Source of noise estimated from the mark's distance from the pivot."""
@@ -199,6 +199,30 @@ def autoregression(parts: Sequence[Floats], source: str) -> Noise:
         return Noise(0.0, 0.0, 1.0 / math.sqrt(max(pairs, 1.0)), source)
     phi = float(ar1_coefficient(around))
     return Noise(math.sqrt(total / pairs), phi, math.sqrt((1.0 - phi**2) / pairs), source)
+
+
+def correlated_share(parts: Sequence[Floats], phi: float) -> float:
+    """Return the largest share of the variance of some residuals that can be AR(1) noise, at most 1.
+
+    AR(1) noise is rough, and what a model lacks is smooth: it follows the motion. The differences of high order of
+    AR(1) noise have a known variance.
+
+    Parameters
+    ----------
+    parts : sequence of (n,) ndarray
+        Residuals, evenly spaced.
+    phi : float
+        AR(1) coefficient of the noise.
+    """
+    weights = np.array([(-1.0) ** k * math.comb(DIFFERENCES, k) for k in range(DIFFERENCES + 1)])
+    weights /= np.linalg.norm(weights)
+    apart = np.abs(np.subtract.outer(np.arange(len(weights)), np.arange(len(weights))))
+    of_unit_noise = float(weights @ phi**apart @ weights)
+    rough = np.concatenate([np.convolve(part, weights, "valid") for part in parts if len(part) > DIFFERENCES])
+    variance = float(np.mean(np.concatenate(parts) ** 2))
+    if not len(rough) or variance == 0.0:
+        return 1.0
+    return min(1.0, float(np.mean(rough**2)) / (of_unit_noise * variance))
 
 
 def ar1_coefficient(parts: Sequence[Floats]) -> Floats:

@@ -24,13 +24,15 @@ from anglecam.identification.noise import RESIDUAL, autoregression, noise_floor
 from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.candidates import Candidate, promising
 from anglecam.loop.cross_validation import compare, predict_held_out, split_records
+from anglecam.loop.explained import shares_explained, why_stopped
 from anglecam.loop.free_form.result import find_free_form
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.profile import interval_of
 from anglecam.loop.refit import effects_left, effects_of, plant_of, refit_with_last, refit_with_phi, refit_without
-from anglecam.loop.remaining_structure import is_wrong, structure_remains
+from anglecam.loop.remaining_structure import gains_energy, structure_remains
 from anglecam.loop.rivals import find_rivals
 from anglecam.loop.screen import changes, directions, forecasts
+from anglecam.loop.seat import seats_of
 from anglecam.loop.standing import model_that_stands
 from anglecam.loop.stepwise import (
     Assessment,
@@ -40,7 +42,6 @@ from anglecam.loop.stepwise import (
     applicable,
     assess,
     rank_candidates,
-    smallest_structure,
 )
 from anglecam.loop.stretches import stretches
 from anglecam.loop.verdict import Accepted, Verdict
@@ -226,19 +227,27 @@ def _conclude(
 ) -> Verdict:
     """State the verdict; ``first_task`` is that of ``first``, in windows where the base model loses step."""
     # both models are compared with the AR(1) coefficient of the better model's residual
-    judged = before = refit_with_phi(first.fit, first_task.fitted, last.fit.phi)
+    before = refit_with_phi(first.fit, first_task.fitted, last.fit.phi)
     if task is not first_task:
         before = fit_output_error(first.fit.model, task.fitted, [first.fit.parameters], phi=last.fit.phi)
     before_held_out, _ = predict_held_out(before, task.fitted, task.predicted, task.policy)
     noise = task.noise_within(last.fit) or replace(autoregression(last.fit.residuals, RESIDUAL), sigma=last.fit.rmse)
-    remains = structure_remains(task, first, last, judged)
-    final = _model_that_stands(task, first, last) if remains else last
+    remains = structure_remains(task, first, last)
+    # the base model may have been fitted in windows, which are not the recordings of this task
+    final = model_that_stands(task, first, last, before_held_out) if remains else last
+    final = first if gains_energy(final.fit, task.policy) else final
     named = effects_of(final.fit)
     # without an effect the final model is the base model
     after, after_held_out = (final.fit, final.held_out) if named or not remains else (before, before_held_out)
+    left = final.cross_validated if named else before_held_out
+    known_sigma = noise.sigma if noise.known else 0.0
+    shares = shares_explained(task, final, before_held_out, known_sigma) if named else []
+    where = seats_of(left.records, left.residuals, known_sigma, task.rng) if remains else ()
     return Verdict(
         VERDICTS[bool(named), remains],
-        tuple(Accepted(effect, _rivals(after, effect, task)) for effect in named),
+        tuple(
+            Accepted(effect, _rivals(after, effect, task), share) for effect, share in zip(named, shares, strict=True)
+        ),
         before,
         after,
         before_held_out,
@@ -253,6 +262,8 @@ def _conclude(
         task.fitted,
         task.predicted,
         task.policy,
+        where,
+        why_stopped(task, last, remains=remains),
     )
 
 
@@ -265,14 +276,6 @@ def _with_intervals(verdict: Verdict) -> Verdict:
     intervals = map_in_threads(interval, verdict.accepted)
     pairs = zip(verdict.accepted, intervals, strict=True)
     return replace(verdict, accepted=tuple(replace(one, interval_95=ends) for one, ends in pairs))
-
-
-def _model_that_stands(task: Task, first: Assessment, last: Assessment) -> Assessment:
-    """Return the model with the effects that stand although structure remains; the base model if it is wrong."""
-    final = model_that_stands(task, first, last)
-    # the base model may have been fitted in windows, which are not the recordings of this task
-    none_stands = not effects_of(final.fit)
-    return first if none_stands or is_wrong(task, final, smallest_structure(task, first)) else final
 
 
 def _rivals(fit: Fit, effect: Effect, task: Task) -> dict[str, Fit]:

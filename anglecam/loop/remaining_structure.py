@@ -5,18 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from anglecam.identification.fit import Fit
-from anglecam.identification.noise import LARGEST_PHI
 from anglecam.identification.output_error import predict_output_error
 from anglecam.loop.cross_validation import robust_sigma
 from anglecam.loop.fit_effect import fit_to_more
-from anglecam.loop.likelihood import log_likelihood_gain
 from anglecam.loop.policy import Policy
-from anglecam.loop.refit import effects_of, plant_of
-from anglecam.loop.standing import error_beyond_noise
+from anglecam.loop.refit import plant_of
 from anglecam.loop.stepwise import Assessment, Task, smallest_structure
 
 
-def structure_remains(task: Task, first: Assessment, last: Assessment, before: Fit) -> bool:
+def structure_remains(task: Task, first: Assessment, last: Assessment) -> bool:
     """Return whether the final model leaves structure that no candidate explains.
 
     Parameters
@@ -25,32 +22,15 @@ def structure_remains(task: Task, first: Assessment, last: Assessment, before: F
         What the search worked on.
     first, last : Assessment
         Of the base model and of the final one.
-    before : Fit
-        The base model with the AR(1) coefficient of the final one.
 
     Returns
     -------
     bool
-        Whether the verdict is ``unexplained``, or ``partly_explained`` if an effect stands.
+        Whether the verdict is ``unexplained``, or ``partly_explained`` if the model has an effect.
     """
-    policy = task.policy
-    named, least = bool(effects_of(last.fit)), smallest_structure(task, first)
-    if is_wrong(task, last, least):
-        return True
-    if last.residual_test.passed or last.fit.rmse**2 <= task.camera**2 + least**2:
-        return False
-    driven = any(r.command is not None for r in task.fitted)
-    noise = task.noise_within(last.fit)
-    # the share of a free swing is for disturbances outside the mechanism, which a residual that only drifts is not
-    drifting = last.fit.phi >= LARGEST_PHI
-    share = policy.verdict.unexplained_share if driven or drifting else policy.verdict.undriven_unexplained_share
-    # two measures of what remains: the error beyond the noise floor, and the finer one, what further causes would
-    # explain of the log-likelihood; if the noise is unknown, the whole error counts
-    return (
-        not named
-        or error_beyond_noise(last.cross_validated, noise) > share * error_beyond_noise(first.cross_validated, noise)
-        or _further_gain_share(last, before) > share**2
-    )
+    least = smallest_structure(task, first)
+    negligible = last.fit.rmse**2 <= task.camera**2 + least**2
+    return is_wrong(task, last, least) or not (last.residual_test.passed or negligible)
 
 
 def is_wrong(task: Task, last: Assessment, least: float) -> bool:
@@ -70,7 +50,7 @@ def is_wrong(task: Task, last: Assessment, least: float) -> bool:
     bool
         Whether what it predicts is too far off, or its body gains energy that nothing gives it.
     """
-    return _contradicted(task, last, least) or _gains_energy(last.fit, task.policy)
+    return _contradicted(task, last, least) or gains_energy(last.fit, task.policy)
 
 
 def _contradicted(task: Task, last: Assessment, least: float) -> bool:
@@ -88,19 +68,7 @@ def _contradicted(task: Task, last: Assessment, least: float) -> bool:
     return robust_sigma(fit.residuals[len(task.fitted) :]) > most
 
 
-def _gains_energy(fit: Fit, policy: Policy) -> bool:
+def gains_energy(fit: Fit, policy: Policy) -> bool:
     """Return whether a body without a command would gain energy: something that the model lacks drives it."""
     damping, sigma = float(fit.parameters[0]), float(np.nan_to_num(fit.sigma[0]))
     return not plant_of(fit).driven and damping < -policy.verdict.energy_gain_sigmas * sigma
-
-
-def _further_gain_share(now: Assessment, before: Fit) -> float:
-    """Return the gain that one more effect, or an arbitrary torque curve, would bring as a share of the total gain.
-
-    The total is that further gain and the gain since ``before``. An error of the measurement that follows the angle,
-    such as that of a codec that lags where the body moves, is no further cause.
-    """
-    more = now.residual_test.further_gain
-    if more <= 0.0:
-        return 0.0
-    return more / (more + max(log_likelihood_gain(before.cost, now.fit.cost, len(before.white)), 0.0))

@@ -91,12 +91,14 @@ def _nearest_possible(fit: Fit, records: Sequence[Record]) -> Fit | None:
 
 
 def is_possible(fit: Fit, records: Sequence[Record]) -> bool:
-    """Return whether the parameters of a plant's last effect describe that effect at all; see `Effect.possible`."""
-    plant, effect = plant_of(fit), effects_of(fit)[-1]
-    first = len(fit.parameters) - len(effect.parameters)
+    """Return whether the parameters of a plant describe its effects at all; see `Effect.possible`."""
+    plant = plant_of(fit)
     abc = np.zeros(3)
     abc[: plant.base_count] = fit.parameters[: plant.base_count]
     predicted = np.concatenate([r.angle - left for r, left in zip(records, fit.residuals, strict=True)])
     span = max(float(r.time[-1] - r.time[0]) for r in records)
     motion = Motion(float(predicted.min()), float(predicted.max()), usual_range(predicted), span)
-    return effect.possible(tuple(effect.complete(fit.parameters[first:]).tolist()), tuple(abc.tolist()), motion)
+    return all(
+        effect.possible(tuple(values.tolist()), tuple(abc.tolist()), motion)
+        for effect, values in plant.parameters_by_effect(fit.parameters)
+    )

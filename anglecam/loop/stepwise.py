@@ -19,7 +19,7 @@ import numpy as np
 from anglecam.data.record import Record
 from anglecam.effects import LEDGER, Effect
 from anglecam.identification.fit import Fit
-from anglecam.identification.noise import QUANTISED, RESIDUAL, Noise, autoregression
+from anglecam.identification.noise import QUANTISED, RESIDUAL, Noise, autoregression, correlated_share
 from anglecam.loop.candidates import Candidate, fit_candidates, fit_from_candidates, promising
 from anglecam.loop.cross_validation import Prediction, chosen_without, predict_held_out, predicts_better
 from anglecam.loop.fit_effect import fit_with
@@ -27,6 +27,7 @@ from anglecam.loop.likelihood import log_likelihood_gain, rms_difference
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.refit import effects_left, effects_of, refit_with_phi, refit_without
 from anglecam.loop.residual_test import ResidualTest, run_residual_test
+from anglecam.loop.rivals import is_possible
 from anglecam.loop.screen import Change, Forecast, changes, directions, forecasts
 from anglecam.loop.size import sizes_determined
 from anglecam.progress import Progress, Stage
@@ -232,6 +233,8 @@ def _add(task: Task, best: Candidate) -> Assessment:
         if cross_validated is None:
             break
         reduced = refit_without(fit, effect, task.fitted)
+        if not is_possible(reduced, task.fitted):
+            continue
         _, fewer = predict_held_out(reduced, task.fitted, task.predicted, task.policy)
         if not predicts_better(fewer, cross_validated, 0.0, task.rng, task.policy):
             fit, cross_validated = reduced, fewer
@@ -267,6 +270,7 @@ def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> tu
     ]
     best = min(fits, key=lambda one: one.cost)
     phi = autoregression(best.residuals, RESIDUAL).phi
+    phi *= correlated_share(best.residuals, phi)
     if task.floor is not None and math.isfinite(task.floor.phi_error):
         most = max(0.0, task.floor.phi + limits.noise_floor_phi_errors * task.floor.phi_error)
         return min(phi, most), phi <= most

@@ -21,6 +21,7 @@ from anglecam.loop.cross_validation import Gain, Prediction
 from anglecam.loop.free_form.result import FreeForm
 from anglecam.loop.policy import DEFAULT, Policy
 from anglecam.loop.residual_test import ResidualTest
+from anglecam.loop.seat import Seat
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,6 +35,9 @@ class Accepted:
     rivals: dict[str, Fit]
     """Effects that the recordings cannot distinguish from it: id → the model with that effect in its place, on the
     fitted recordings."""
+    explains: float = math.nan
+    """Share of the base model's error beyond the noise, in squares, that it takes away beside the effects
+    before it."""
     interval_95: tuple[float, float] = (-math.inf, math.inf)
     """95 % interval of the effect's size, its first parameter, SI; infinite where the recordings set no limit."""
 
@@ -79,6 +83,10 @@ class Verdict:
     """The same of ``held_out``."""
     policy: Policy = DEFAULT
     """The thresholds that led to the verdict."""
+    where: tuple[Seat, ...] = ()
+    """Where what the final model leaves is larger than elsewhere; empty if no structure remains."""
+    stopped_by: str = ""
+    """Why no further effect is named, as a sentence."""
     free_form: FreeForm | None = None
     """A torque that the final model lacks; ``None`` if no structure remains or no such torque improves the
     prediction."""

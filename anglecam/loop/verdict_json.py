@@ -15,6 +15,7 @@ from anglecam.loop.candidates import Candidate
 from anglecam.loop.cross_validation import predict_held_out
 from anglecam.loop.free_form.result import FreeForm
 from anglecam.loop.next_experiment.design import Experiment, separating_experiment, write_command
+from anglecam.loop.seat import Seat
 from anglecam.loop.verdict import Verdict
 
 DEGREE = float(np.degrees(1.0))
@@ -89,6 +90,8 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
                 "fixed": _fixed(accepted.effect),
                 "relaxes": accepted.effect.relaxes,
                 "alias_set": list(accepted.alias_set),
+                "explains": accepted.explains,
+                "stopped_by": verdict.stopped_by if accepted is verdict.accepted[-1] else None,
                 "separating_experiment": _what_to_film(accepted.effect, experiment if accepted.rivals else None),
             }
             for accepted in verdict.accepted
@@ -126,8 +129,21 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
             }
             for c in verdict.candidates
         ],
+        "where": [seat_as_dict(one) for one in verdict.where],
         "free_form": None if verdict.free_form is None else free_form_as_dict(verdict.free_form),
         "policy": verdict.policy.as_list(),
+    }
+
+
+def seat_as_dict(seat: Seat) -> dict[str, Any]:
+    """Return a region in which the residual is larger than elsewhere, as ``loop.json`` holds it."""
+    factor = FACTORS[seat.variable]
+    return {
+        "variable": KEYS[seat.variable],
+        "from": factor * seat.start,
+        "to": factor * seat.stop,
+        "share_of_excess": seat.share_of_excess,
+        "q_value": seat.q_value,
     }
 
 

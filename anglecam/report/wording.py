@@ -8,7 +8,6 @@ from anglecam.data.rounding import with_uncertainty
 from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.loop.free_form.result import FreeForm
-from anglecam.loop.standing import error_beyond_noise
 from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import fitted_parameters
 
@@ -36,7 +35,7 @@ def sentence(verdict: Verdict) -> str:
     if verdict.verdict == "unexplained":
         return (
             f"Something is missing: the error of the model on {on} is {before}, and none of "
-            f"the effects that anglecam knows explains it with sufficient evidence.{_why_not_the_best(verdict)}"
+            f"the effects that anglecam knows explains it with sufficient evidence.{where(verdict)}"
         )
     rest = "; what remains is more than noise, and no effect that anglecam knows explains it"
     first, *others = [_cause(a.effect, a.alias_set[1:], verdict.after) for a in verdict.accepted]
@@ -44,26 +43,27 @@ def sentence(verdict: Verdict) -> str:
     this = "this" if len(verdict.accepted) == 1 else "these"
     return (
         f"{causes}; with {this} in the model, its error on {on} falls from {before} to {after}"
-        f"{rest if verdict.verdict == 'partly_explained' else ''}."
+        f"{rest if verdict.verdict == 'partly_explained' else ''}.{where(verdict)}"
     )
 
 
-def _why_not_the_best(verdict: Verdict) -> str:
-    """Return how much of the error the best single effect leaves, where that is too much for it to be named."""
-    best, before = next(iter(verdict.candidates), None), verdict.before_held_out
-    if best is None or best.held_out is None or len(best.held_out.records) != len(before.records):
+def where(verdict: Verdict) -> str:
+    """Return where most of what remains sits, as a sentence; empty if nothing remains, or it is everywhere."""
+    if not verdict.where:
         return ""
-    most = verdict.policy.verdict.partly_explained_share
-    noise = verdict.noise if verdict.noise.known else None
-    left = error_beyond_noise(best.held_out, noise) / max(error_beyond_noise(before, noise), 1e-300)
-    if not most < left < 1.0:
-        return ""
+    most = verdict.where[0]
+    factor, unit = (
+        (np.degrees(1.0), {"velocity": "°/s"}.get(most.variable, "°")) if most.variable in _ANGLES else (1.0, "")
+    )
+    start, stop = (f"{factor * value:.3g}" for value in (most.start, most.stop))
+    unit = " s" if most.variable == "time" else unit
     return (
-        f" The best of them, {plain(best.effect.id)}, leaves {100 * left:.0f} % of it. Where more than noise remains, "
-        f"an effect is named only if it leaves at most {100 * most:.0f} %: other causes resemble one by as much."
+        f" Of what remains {100 * min(1.0, most.share_of_excess):.0f} % is seen at a {QUANTITIES[most.variable]} from "
+        f"{start} to {stop}{unit}."
     )
 
 
+_ANGLES = ("angle", "velocity", "command")
 QUANTITIES = {
     "angle": "angle",
     "velocity": "velocity",
