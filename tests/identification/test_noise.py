@@ -6,10 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from anglecam.data.record import record_from_series
 from anglecam.data.series import AngleSeries
-from anglecam.identification.noise import MEASURED, QUANTISED, REST, autoregression, noise_floor
+from anglecam.identification.noise import (
+    MEASURED,
+    QUANTISED,
+    RESIDUAL,
+    REST,
+    autoregression,
+    correlated_share,
+    noise_floor,
+)
 from anglecam.identification.quantisation import quantisation
 from support.motion import Plant
 from support.series import session
@@ -113,3 +122,25 @@ def test_a_mark_that_a_bodys_rotation_placed_shows_no_noise_and_the_stated_one_c
     assert (noise.source, noise.sigma, noise.filmed) == (MEASURED, pytest.approx(sigma), True)
     assert noise_floor([marked]).sigma == pytest.approx(sigma, rel=0.15)
     assert np.isfinite(noise_floor([marked]).phi_error)  # the distance from the pivot shows the correlation as well
+
+
+def _noise(phi, count, seed):
+    white = np.random.default_rng(seed).standard_normal(count + 100)
+    return lfilter([1.0], [1.0, -phi], white)[100:]
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.6, 0.9])
+def test_all_of_autoregressive_noise_can_be_noise(phi):
+    noises = [_noise(phi, 400, seed) for seed in range(200)]
+    shares = np.array([correlated_share([one], autoregression([one], RESIDUAL).phi) for one in noises])
+    assert np.mean(shares == 1.0) > 0.85
+    assert shares.mean() > 0.98
+
+
+def test_what_follows_the_motion_is_no_correlated_noise():
+    time = np.arange(400) / 50.0
+    left = np.radians(4.0) * np.sin(3.0 * time) + np.radians(0.05) * _noise(0.0, 400, 0)
+    phi = autoregression([left], RESIDUAL).phi
+    assert phi > 0.95
+    assert correlated_share([left], phi) < 0.1
+    assert correlated_share([left[:5]], phi) == 1.0  # nothing can be said
