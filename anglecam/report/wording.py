@@ -9,7 +9,7 @@ from anglecam.effects import Effect
 from anglecam.identification.fit import Fit
 from anglecam.loop.free_form.result import FreeForm
 from anglecam.loop.verdict import Verdict
-from anglecam.loop.verdict_json import fitted_parameters
+from anglecam.loop.verdict_json import FACTORS, fitted_parameters
 
 
 def sentence(verdict: Verdict) -> str:
@@ -35,7 +35,7 @@ def sentence(verdict: Verdict) -> str:
     if verdict.verdict == "unexplained":
         return (
             f"Something is missing: the error of the model on {on} is {before}, and none of "
-            f"the effects that anglecam knows explains it with sufficient evidence.{where(verdict)}"
+            f"the effects that anglecam knows explains it with sufficient evidence.{seat_in_words(verdict)}"
         )
     rest = "; what remains is more than noise, and no effect that anglecam knows explains it"
     first, *others = [_cause(a.effect, a.alias_set[1:], verdict.after) for a in verdict.accepted]
@@ -43,27 +43,23 @@ def sentence(verdict: Verdict) -> str:
     this = "this" if len(verdict.accepted) == 1 else "these"
     return (
         f"{causes}; with {this} in the model, its error on {on} falls from {before} to {after}"
-        f"{rest if verdict.verdict == 'partly_explained' else ''}.{where(verdict)}"
+        f"{rest if verdict.verdict == 'partly_explained' else ''}.{seat_in_words(verdict)}"
     )
 
 
-def where(verdict: Verdict) -> str:
+def seat_in_words(verdict: Verdict) -> str:
     """Return where most of what remains sits, as a sentence; empty if nothing remains, or it is everywhere."""
     if not verdict.where:
         return ""
     most = verdict.where[0]
-    factor, unit = (
-        (np.degrees(1.0), {"velocity": "°/s"}.get(most.variable, "°")) if most.variable in _ANGLES else (1.0, "")
-    )
-    start, stop = (f"{factor * value:.3g}" for value in (most.start, most.stop))
-    unit = " s" if most.variable == "time" else unit
+    start, stop = (f"{FACTORS[most.variable] * value:.3g}" for value in (most.start, most.stop))
     return (
-        f" Of what remains {100 * min(1.0, most.share_of_excess):.0f} % is seen at a {QUANTITIES[most.variable]} from "
-        f"{start} to {stop}{unit}."
+        f" Of what remains {100 * min(1.0, most.share_of_excess):.0f} % is seen where the {QUANTITIES[most.variable]} is "
+        f"{start} to {stop}{UNITS[most.variable]}."
     )
 
 
-_ANGLES = ("angle", "velocity", "command")
+UNITS = {"angle": "°", "velocity": "°/s", "command": "°", "phase": "", "time": " s"}
 QUANTITIES = {
     "angle": "angle",
     "velocity": "velocity",

@@ -163,11 +163,11 @@ def _figures_of(lines: Sequence[Line]) -> list[str]:
 
 
 def exactly(line: Line) -> bool:
-    """Return whether the verdict is right: the right names, or that something is left if no name is right."""
+    """Return whether the verdict is exactly right: the right names, or none if none is right."""
     if not line["true"]:
         return line["verdict"] == "nothing_missing"
     if not set(line["true"]) <= set(LEDGER):
-        return line["verdict"] in ("unexplained", "partly_explained")
+        return line["verdict"] == "unexplained"
     return line["verdict"] == "attributed" and set(line["found"]) == set(line["true"])
 
 

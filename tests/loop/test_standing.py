@@ -23,6 +23,7 @@ def test_what_an_effect_explains_beside_an_unknown_one_is_stated():
     assert first.effect.id == "dead_time"
     assert first.explains > 0.98
     assert sum(one.explains for one in others) < 0.02
+    assert verdict.after_held_out.rmse < 0.15 * verdict.before_held_out.rmse
     assert verdict.stopped_by
 
 
