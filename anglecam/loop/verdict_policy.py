@@ -62,8 +62,8 @@ class VerdictPolicy:
         "share of the base model's squared held-out error beyond the noise",
         "where structure remains, effects are named if together they explain at least this, the larger part",
         "naming effects that only resemble a cause outside the ledger",
-        "the best single effect of 33 sessions with sixteen causes outside the ledger explained more in eleven: two "
-        "limit cycles, hysteresis, a bent cable, a magnet, an amplifier's step, a shifted load, a torque walk; so "
+        "the best single effect of 33 sessions with sixteen causes outside the ledger explained more in 11: two "
+        "limit cycles, hysteresis, a bent cable, a magnet, an amplifier's step, a shifted load, a torque walk: "
         "the verdict says that more is missing, and the share is stated beside each effect",
     )
     energy_gain_sigmas: float = threshold(

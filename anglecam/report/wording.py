@@ -54,8 +54,8 @@ def seat_in_words(verdict: Verdict) -> str:
     most = verdict.where[0]
     start, stop = (f"{FACTORS[most.variable] * value:.3g}" for value in (most.start, most.stop))
     return (
-        f" Of what remains {100 * min(1.0, most.share_of_excess):.0f} % is seen where the {QUANTITIES[most.variable]} is "
-        f"{start} to {stop}{UNITS[most.variable]}."
+        f" Of what remains {100 * min(1.0, most.share_of_excess):.0f} % is seen where the "
+        f"{QUANTITIES[most.variable]} is {start} to {stop}{UNITS[most.variable]}."
     )
 
 
