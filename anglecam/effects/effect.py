@@ -219,6 +219,9 @@ class Effect:
     """What happens where the effect's size is below its null; empty if ``summary`` holds for both signs."""
     possible: Callable[[Values, Values, Motion], bool] = field(default=lambda values, abc, motion: True, repr=False)
     """(parameters, (a, b, c), motion) → whether they describe this effect; a fit elsewhere is some other cause."""
+    largest: Callable[[Values, Values], float] | None = field(default=None, repr=False)
+    """(parameters, (a, b, c)) → the largest size that physics allows beside them, SI. A fit beyond it is repeated with
+    this bound, because the best size that can exist may still be the best explanation."""
 
     def __post_init__(self) -> None:
         if len(self.parameters) + len(self.fixed) > MOST_PARAMETERS:
@@ -233,6 +236,11 @@ class Effect:
         fixed |= {i: values[p.name] for i, p in zip(places, self.parameters, strict=True) if p.name in values}
         left = tuple(p for p in self.parameters if p.name not in values)
         return replace(self, parameters=left, fixed=tuple(sorted(fixed.items())))
+
+    def limited(self, size: float) -> Effect:
+        """Return the effect with a size that physics limits from above, so that recordings need not; SI."""
+        first, *others = self.parameters
+        return replace(self, parameters=(replace(first, upper=size, unlimited=True), *others))
 
     def at_scale(self, rate: float, swing: float) -> Effect:
         """Return the effect with the bounds and starts that a rig requires; see `Parameter.at_scale`."""

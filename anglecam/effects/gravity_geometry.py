@@ -19,6 +19,8 @@ from anglecam.effects.seen import Motion, Seen
 LEFT_BY_WEIGHT = 0.05
 """Share of the weight's stiffness by which it may exceed the whole, as that of a pendulum does whose drag is not in the
 model."""
+ROUNDING = 0.01
+"""Share by which a fit with the largest weight may miss it."""
 DIRECTIONS = (0.25, 0.75, -0.75, 1.0, -0.25, 0.0)
 """Angles of the centre of mass from upright at which a fit starts, in half turns."""
 
@@ -36,10 +38,15 @@ def _starts(seen: Seen) -> list[Values]:
     return [(0.2 * seen.stiffness, math.pi * direction) for direction in DIRECTIONS]
 
 
+def _largest(parameters: Values, abc: Values) -> float:
+    """Return the weight that has the whole stiffness b, and servo and springs none: b is theirs less G·cos θ0."""
+    downwards = -math.cos(parameters[1]) - LEFT_BY_WEIGHT
+    return max(0.0, abc[1]) / downwards if downwards > 0.0 else math.inf
+
+
 def _possible(parameters: Values, abc: Values, motion: Motion) -> bool:
-    """Return whether servo and springs have no negative stiffness: b is theirs and that of the weight, −G·cos θ0."""
-    strength, neutral = parameters[0], parameters[1]
-    return abc[1] + strength * math.cos(neutral) >= -LEFT_BY_WEIGHT * strength
+    """Return whether servo and springs have no negative stiffness."""
+    return parameters[0] <= (1.0 + ROUNDING) * _largest(parameters, abc)
 
 
 EFFECT = Effect(
@@ -67,4 +74,5 @@ EFFECT = Effect(
     load=_load,
     starts=_starts,
     possible=_possible,
+    largest=_largest,
 )

@@ -206,7 +206,7 @@ def autoregression(parts: Sequence[Floats], source: str) -> Noise:
     return Noise(math.sqrt(total / pairs), phi, math.sqrt((1.0 - phi**2) / pairs), source)
 
 
-def correlated_share(parts: Sequence[Floats], phi: float) -> float:
+def correlated_share(parts: Sequence[Floats]) -> float:
     """Return the upper 95 % limit of the share of the variance of some residuals that is AR(1) noise, at most 1.
 
     AR(1) noise is rough, and what a model lacks is smooth: it follows the motion. The differences of high order of
@@ -215,10 +215,13 @@ def correlated_share(parts: Sequence[Floats], phi: float) -> float:
     Parameters
     ----------
     parts : sequence of (n,) ndarray
-        Residuals, evenly spaced.
-    phi : float
-        AR(1) coefficient of the noise.
+        Residuals, evenly spaced. Their coefficient is taken for the noise's, also above `LARGEST_PHI`.
     """
+    around = [part - part.mean() for part in parts]
+    steps = sum(float(np.sum(np.diff(e) ** 2)) for e in around) / max(1, sum(len(e) - 1 for e in around))
+    spread = sum(float(e @ e) for e in around) / sum(map(len, around))
+    # near 1 the correction for the bias is larger than the distance from 1, and this estimate needs none
+    phi = max(float(ar1_coefficient(around)), 1.0 - steps / (2.0 * spread) if spread > 0.0 else 0.0)
     weights = np.array([(-1.0) ** k * math.comb(DIFFERENCES, k) for k in range(DIFFERENCES + 1)])
     weights /= np.linalg.norm(weights)
     apart = np.abs(np.subtract.outer(np.arange(len(weights)), np.arange(len(weights))))

@@ -22,6 +22,8 @@ STAGED_STARTS = 8
 """Start values of a staged parameter from which a fit is made: those with the smallest cost before fitting."""
 FLAT_FACTORS = tuple(np.geomspace(0.5, 2.0, 13).tolist())
 """Multiples of a fitted staged parameter that are tried, 12 % apart."""
+LIMIT_ROUNDS = 4
+"""Most fits with the largest size that can exist."""
 FLAT_ROUNDS = 4
 """Most fits from such multiples."""
 
@@ -81,7 +83,26 @@ def fit_with(
         # the initial states may have ended in a local minimum on the way
         again = fit_output_error(plant, records, [best.parameters], nuisance=nuisance, phi=base.phi)
         best = again if again.cost < best.cost else best
+    best = _within_physics(best, records)
     return with_staged(base, effect, best, records, camera, policy) if staged else best
+
+
+def _within_physics(fit: Fit, records: Sequence[Record]) -> Fit:
+    """Fit again with the largest size of the last effect that can exist, if the fitted one exceeds it.
+
+    The largest size depends on the other parameters, which change with it.
+    """
+    *others, effect = effects_of(fit)
+    for _ in range(LIMIT_ROUNDS if effect.largest else 0):
+        plant = plant_of(fit)
+        values = effect.complete(fit.parameters[-len(effect.parameters) :])
+        abc = (*fit.parameters[: plant.base_count].tolist(), 0.0)[:3]
+        most = effect.largest(tuple(values.tolist()), abc)
+        if values[0] <= most:
+            break
+        limited = replace(plant, effects=(*others, effect.limited(most)))
+        fit = fit_output_error(limited, records, [fit.parameters], nuisance=fit.nuisance, phi=fit.phi)
+    return fit
 
 
 def fit_to_more(

@@ -259,8 +259,9 @@ def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> tu
     It is limited by that of the noise floor.
 
     Structure that a model lacks makes its residual look correlated, and the residual of the best candidate looks least
-    so. A rest, or the distance from the pivot, is independent of any model; its AR(1) coefficient limits how much of
-    the correlation can be noise.
+    so. AR(1) noise is rough and structure is smooth, so the residual's roughness limits how much of its correlation can
+    be noise; but not in a film, whose errors follow the motion and are smooth, too. A rest, or the distance from the
+    pivot, is independent of any model; its AR(1) coefficient is another limit.
     """
     limits = task.policy.stepwise
     likely = forecasts(fit, directions(fit, task.fitted, prediction_changes, task.policy))[: limits.noise_models]
@@ -270,7 +271,8 @@ def _noise_phi(task: Task, fit: Fit, prediction_changes: Sequence[Change]) -> tu
     ]
     best = min(fits, key=lambda one: one.cost)
     phi = autoregression(best.residuals, RESIDUAL).phi
-    phi *= correlated_share(best.residuals, phi)
+    if not (task.floor and task.floor.filmed):
+        phi *= correlated_share(best.residuals)
     if task.floor is not None and math.isfinite(task.floor.phi_error):
         most = max(0.0, task.floor.phi + limits.noise_floor_phi_errors * task.floor.phi_error)
         return min(phi, most), phi <= most

@@ -6,11 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
+from anglecam.data.record import Record
 from anglecam.effects import LEDGER, effect
 from anglecam.identification.output_error import fit_output_error
 from anglecam.loop.close import close_records
+from anglecam.loop.fit_effect import fit_with
 from anglecam.loop.rivals import is_possible
+from anglecam.loop.screen import changes, directions, forecasts
+from anglecam.loop.size import sizes_determined
 from anglecam.loop.stepwise import applicable
 from anglecam.models.plant import Plant
 from benchmarks.blind.sessions import session as drawn_session
@@ -67,6 +72,30 @@ def test_a_periodic_disturbance_repeats_itself_within_the_longest_recording(peri
         parameters=np.array([26.0, 524.0, 508.0, 1.0, frequency, 0.0]),
     )
     assert is_possible(at, records) is possible
+
+
+def test_a_weight_is_fitted_with_no_more_than_the_whole_stiffness_and_is_determined_there():
+    stiffness, n = 12.0, 600
+    softening = -2.0 * stiffness / 6.0  # twice that of a pendulum's sine
+    time = np.arange(n) / 30.0
+    swing = solve_ivp(
+        lambda t, y: [y[1], -0.05 * y[1] - stiffness * y[0] - softening * y[0] ** 3],
+        (0.0, time[-1]),
+        [0.6, 0.0],
+        t_eval=time,
+        rtol=1e-9,
+    )
+    noise = np.random.default_rng(5).normal(0.0, 1e-4, n)
+    record = Record("swing", time, swing.y[0] + noise, None, zero_known=False, sigma=np.full(n, np.nan))
+    base = fit_output_error(Plant(driven=False), [record], [np.array([0.05, 11.0])])
+    weight = effect("gravity_geometry")
+    (forecast,) = forecasts(base, directions(base, [record], changes(base, [record], [weight])))
+    found = fit_with(base, [record], forecast)
+    b, strength, neutral = found.parameters[1:]
+    assert is_possible(found, [record])
+    assert -strength * np.cos(neutral) == pytest.approx(b, rel=0.06)
+    assert found.rmse < 0.6 * base.rmse
+    assert sizes_determined(found, [record])
 
 
 @pytest.mark.sweep
