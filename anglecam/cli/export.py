@@ -27,7 +27,10 @@ def export(
         float, typer.Option("--inertia", help="Moment of inertia of all that moves about the axis, kg·m².")
     ] = 1.0,
 ) -> None:
-    """Write a model for MuJoCo, as URDF or for MATLAB, and say what that format cannot express."""
+    """Write a model for MuJoCo, as URDF or for MATLAB, and say what that format cannot express.
+
+    A model that runs away, that moves against its command or that the recordings do not determine is refused.
+    """
     if to not in ENDINGS:
         raise RigError(f"--to {to}: choose one of {', '.join(ENDINGS)}")
     if not inertia > 0.0:
@@ -43,9 +46,11 @@ def export(
         from anglecam.identification.simulators.mechanism import linear_model, read_mechanism
         from anglecam.identification.simulators.mjcf import mjcf_of
         from anglecam.identification.simulators.urdf import urdf_of
+        from anglecam.identification.simulators.usable import require_usable
 
+    linear, left_out = linear_model(source)
+    require_usable(linear, source)
     if to == "matlab":
-        linear, left_out = linear_model(source)
         write_mat(linear, path)
     else:
         exported = (mjcf_of if to == "mujoco" else urdf_of)(read_mechanism(source), inertia)
