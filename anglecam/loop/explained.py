@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+
+import numpy as np
 
 from anglecam.loop.cross_validation import Prediction, predict_held_out
 from anglecam.loop.refit import effects_of, refit_without
@@ -29,14 +30,18 @@ def shares_explained(task: Task, last: Assessment, before: Prediction, noise_sig
     list of float
         In the order in which the effects were added; each beside those before it.
     """
-    fewer, errors = last.fit, [last.held_out.rmse**2]
+    fewer, shares = last.fit, [whole_share(before, last.held_out, noise_sigma)]
     for effect in reversed(effects_of(last.fit)[1:]):
         fewer = refit_without(fewer, effect, task.fitted)
         held_out, _ = predict_held_out(fewer, task.fitted, task.predicted, task.policy)
-        errors.insert(0, held_out.rmse**2)
-    errors.insert(0, before.rmse**2)
-    excess = errors[0] - noise_sigma**2
-    return [(one - other) / excess if excess > 0.0 else math.nan for one, other in pairwise(errors)]
+        shares.append(whole_share(before, held_out, noise_sigma))
+    return np.diff([0.0, *reversed(shares)]).tolist()
+
+
+def whole_share(before: Prediction, after: Prediction, noise_sigma: float) -> float:
+    """Return the share of the squared error beyond the noise that a model takes away; NaN if there is none beyond."""
+    excess = before.rmse**2 - noise_sigma**2
+    return (before.rmse**2 - after.rmse**2) / excess if excess > 0.0 else math.nan
 
 
 def why_stopped(task: Task, last: Assessment, *, remains: bool) -> str:

@@ -8,8 +8,8 @@ which the held-out frames are predicted no worse is left out.
 from __future__ import annotations
 
 from anglecam.identification.fit import Fit
-from anglecam.identification.noise import Noise
 from anglecam.loop.cross_validation import Prediction, predict_held_out
+from anglecam.loop.explained import whole_share
 from anglecam.loop.refit import effects_of, refit_without
 from anglecam.loop.stepwise import Assessment, Task, assess
 from anglecam.progress import Stage
@@ -43,20 +43,11 @@ def model_that_stands(task: Task, first: Assessment, last: Assessment, before: P
             break
         task.progress(Stage(f"leaving out {needless}"))
         now = assess(task, without[needless])
-    explained = share_explained(before, now.held_out, task.noise_within(now.fit))
+    noise = task.noise_within(now.fit)
+    # at its lower limit: a rest in which something pushed the body would otherwise hide what remains
+    explained = whole_share(before, now.held_out, noise.least_sigma if noise else 0.0)
     return now if explained >= task.policy.verdict.least_explained_share else first
 
 
 def _held_out(task: Task, fit: Fit) -> Prediction:
     return predict_held_out(fit, task.fitted, task.predicted, task.policy)[0]
-
-
-def share_explained(before: Prediction, after: Prediction, noise: Noise | None) -> float:
-    """Return by which share the squared error of a prediction beyond the noise falls.
-
-    The noise is taken at the lower limit of its interval: a rest in which something pushed the body would otherwise
-    hide what remains.
-    """
-    sigma = noise.least_sigma if noise else 0.0
-    excess = before.rmse**2 - sigma**2
-    return (before.rmse**2 - after.rmse**2) / excess if excess > 0.0 else 0.0
