@@ -93,7 +93,9 @@ def _within_physics(fit: Fit, records: Sequence[Record]) -> Fit:
     The largest size depends on the other parameters, which change with it.
     """
     *others, effect = effects_of(fit)
-    for _ in range(LIMIT_ROUNDS if effect.largest else 0):
+    if effect.largest is None:
+        return fit
+    for _ in range(LIMIT_ROUNDS):
         plant = plant_of(fit)
         values = effect.complete(fit.parameters[-len(effect.parameters) :])
         abc = (*fit.parameters[: plant.base_count].tolist(), 0.0)[:3]

@@ -10,6 +10,7 @@ import numpy as np
 
 from anglecam.data.record import Record
 from anglecam.effects import Effect, Parameter, effect
+from anglecam.identification.backbone import Backbone, backbones
 from anglecam.identification.output_error import fit_output_error, predict_output_error
 from anglecam.loop.candidates import Candidate
 from anglecam.loop.cross_validation import predict_held_out
@@ -130,6 +131,7 @@ def verdict_as_dict(verdict: Verdict, experiment: Experiment | None = None) -> d
             for c in verdict.candidates
         ],
         "where": [seat_as_dict(one) for one in verdict.where],
+        "swings": [swing_as_dict(one) for one in backbones([*verdict.fitted, *verdict.held_out])],
         "free_form": None if verdict.free_form is None else free_form_as_dict(verdict.free_form),
         "policy": verdict.policy.as_list(),
     }
@@ -145,6 +147,21 @@ def seat_as_dict(seat: Seat) -> dict[str, Any]:
         "share_of_excess": seat.share_of_excess,
         "q_value": seat.q_value,
     }
+
+
+def swing_as_dict(swing: Backbone) -> dict[str, Any]:
+    """Return the cycles of a free swing as ``loop.json`` holds them."""
+    columns = {
+        "time_s": swing.time,
+        "amplitude_deg": np.degrees(swing.amplitude),
+        "amplitude_sigma_deg": np.degrees(swing.amplitude_sigma),
+        "period_s": swing.period,
+        "period_sigma_s": swing.period_sigma,
+        "decay_per_s": swing.decay,
+        "decay_sigma_per_s": swing.decay_sigma,
+    }
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return {"recording": swing.name, "cycles": [dict(zip(columns, row, strict=True)) for row in rows]}
 
 
 def free_form_as_dict(found: FreeForm) -> dict[str, Any]:

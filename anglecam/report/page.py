@@ -10,6 +10,7 @@ import numpy as np
 
 from anglecam.data.series import AngleSeries
 from anglecam.errors import printable
+from anglecam.identification.backbone import backbones
 from anglecam.identification.identified import Identified
 from anglecam.io.session import CORRECTED, SERIES_ENDING
 from anglecam.loop.cross_validation import block_s
@@ -19,6 +20,7 @@ from anglecam.loop.verdict import Verdict
 from anglecam.loop.verdict_json import NEXT_COMMAND
 from anglecam.report import loop_figures as figures
 from anglecam.report import page_rows as rows
+from anglecam.report.backbone_figure import backbone_figures
 from anglecam.report.curves import curves_as_dict
 from anglecam.report.document import html_of, write_html
 from anglecam.report.free_form_figure import free_form_figures
@@ -200,6 +202,7 @@ def _figures(verdict: Verdict, experiment: Experiment | None, names: Sequence[st
     drawn = {
         "prediction": figures.prediction_panels(verdict.fitted, verdict.before.residuals),
         "residual": figures.residual_panels(verdict.fitted, verdict.before, floor),
+        "swings": [figures.Panel(svg) for svg in backbone_figures(backbones([*verdict.fitted, *verdict.held_out]))],
         "effects": [figures.Panel(svg, name) for name, svg in effect_panels(verdict)],
         "held_out": figures.held_out_panels(before, after),
         "errors": figures.error_panels(before, after, floor),

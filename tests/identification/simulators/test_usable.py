@@ -46,7 +46,7 @@ def test_a_model_of_a_mechanism_is_usable(usable):
     ],
 )
 def test_what_is_no_mechanism_is_refused_with_its_value_and_the_cause(values, sigmas, cause):
-    with pytest.raises(InputError, match="loop.json: ") as refused:
+    with pytest.raises(InputError, match=r"loop\.json: ") as refused:
         require_usable(model(values, sigmas), FILE)
     assert cause in str(refused.value)
 
