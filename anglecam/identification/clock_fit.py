@@ -23,7 +23,7 @@ from anglecam.effects import Effect
 from anglecam.identification.clock_search import coarse_offset
 from anglecam.identification.fit import CLUSTER_FRAMES, Fit
 from anglecam.identification.initial_guess import start_parameters
-from anglecam.identification.noise import RESIDUAL, autoregression
+from anglecam.identification.noise import DOUBTFUL_RESIDUAL, RESIDUAL, angle_uncertainty, autoregression
 from anglecam.identification.output_error import fit_output_error
 from anglecam.models.clocked_plant import DRIFT, OFFSET, ClockedPlant, on_clock
 from anglecam.models.plant import FASTEST
@@ -46,7 +46,8 @@ class ClockFit:
     delays: Floats
     """(R,) time from a command's stamp at zero to its action on the clip's clock: clock offset plus dead time, s."""
     drifts: Floats | None
-    """(R,) excess of the clip's rate over the command's; ``None`` where the recordings do not determine it."""
+    """(R,) excess of the clip's rate over the command's; ``None`` where the recordings do not determine it, or the
+    model leaves so much that it is not told from what the model lacks."""
     covariance: Floats = field(repr=False)
     """(2R, 2R) of the delays and then the drifts, s and 1; (R, R) without drifts."""
     fit: Fit = field(repr=False)
@@ -79,12 +80,14 @@ def fit_clocks(records: Sequence[Record], effects: Sequence[tuple[Effect, Floats
     coarse = np.array([coarse_offset(r) for r in driven])
     moved = [replace(r, command=on_clock(r.command, c)) for r, c in zip(driven, coarse, strict=True)]
     kept = [(e, values) for e, values in effects if e.id not in LEFT_OUT]
+    # what the model lacks may grow along a recording as a drift does: with play, thousands of ppm are found
+    most = DOUBTFUL_RESIDUAL * angle_uncertainty(driven)
     for with_drift in (True, False):
         fit = _fit(moved, kept, with_drift)
         clocks = np.array([nuisance[[OFFSET, DRIFT][: 1 + with_drift]] for nuisance in fit.nuisance])
         covariance = _clock_covariance(fit, 1 + with_drift)
         spread = np.sqrt(np.diag(covariance)[len(driven) :])
-        if not with_drift or bool(np.all(spread < MOST_DRIFT_SIGMA)):
+        if not with_drift or (bool(np.all(spread < MOST_DRIFT_SIGMA)) and not fit.rmse > most > 0.0):
             break
     # the drift is that of the command as it was moved: (t + coarse)(1 + ε) + δ
     drifts = clocks[:, 1] if with_drift else None

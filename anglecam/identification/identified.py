@@ -15,16 +15,11 @@ from anglecam.data.typing import Floats
 from anglecam.identification.clocks import Clocks
 from anglecam.identification.fit import Fit
 from anglecam.identification.multiple_shooting import loses_step, rms_motion
-from anglecam.identification.noise import noise_floor
+from anglecam.identification.noise import DOUBTFUL_RESIDUAL, angle_uncertainty
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
-
-DOUBTFUL_RESIDUAL = 3.0
-"""Multiple of the angle's uncertainty; a model with a larger RMS residual lacks something, so that the stated
-uncertainties of its parameters do not hold. Held-out recordings contradict a model if their error is larger than this
-multiple of the residual, and of the angle's uncertainty."""
 
 
 @dataclass(frozen=True)
@@ -56,9 +51,7 @@ class Identified:
     def doubts(self) -> tuple[str, ...]:
         """Reasons why the parameters or their uncertainties are unreliable, one line each; empty if there are none."""
         doubts = [f"{self.estimator}: {self.no_uncertainty}"] if self.no_uncertainty else []
-        stated = np.concatenate([r.sigma for r in self.fitted])
-        floor = None if np.all(np.isfinite(stated)) else noise_floor(self.fitted)
-        noise = float(np.sqrt(np.mean(stated**2))) if floor is None else floor.sigma
+        noise = angle_uncertainty(self.fitted)
         if noise > 0.0 and self.fit.rmse > DOUBTFUL_RESIDUAL * noise:
             doubts.append(
                 f"the model leaves a residual of {np.degrees(self.fit.rmse):.2g}°, {self.fit.rmse / noise:.0f} times"

@@ -46,6 +46,10 @@ ONE_SIDED_95 = 1.645
 """Upper 95 % limit of a normal variable, in standard deviations."""
 UNKNOWN = math.inf
 """Standard error of an AR(1) coefficient that nothing determines."""
+DOUBTFUL_RESIDUAL = 3.0
+"""Multiple of the angle's uncertainty; a model with a larger RMS residual lacks something, so that the stated
+uncertainties of its parameters do not hold. Held-out recordings contradict a model if their error is larger than this
+multiple of the residual, and of the angle's uncertainty."""
 ESTIMATED = (DISTANCE, REST, REPEATED)
 """Sources of a noise whose size is estimated from a limited number of frames."""
 LARGEST_PHI = 0.98
@@ -181,6 +185,13 @@ def stated_noise(records: Sequence[Record]) -> Noise | None:
     stated = np.concatenate([r.sigma for r in records])
     stated = stated[np.isfinite(stated)]
     return Noise(float(np.sqrt(np.mean(stated**2))), 0.0, UNKNOWN, "stated") if len(stated) else None
+
+
+def angle_uncertainty(records: Sequence[Record]) -> float:
+    """Return the RMS standard uncertainty of the angles, rad: as stated, otherwise the noise; 0 if nothing shows it."""
+    stated = np.concatenate([r.sigma for r in records])
+    floor = None if np.all(np.isfinite(stated)) else noise_floor(records)
+    return float(np.sqrt(np.mean(stated**2))) if floor is None else floor.sigma
 
 
 def autoregression(parts: Sequence[Floats], source: str) -> Noise:

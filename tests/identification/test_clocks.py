@@ -13,6 +13,7 @@ from anglecam.identification.clock_search import coarse_offset
 from anglecam.identification.clocks import clocks_of
 from anglecam.identification.identify_records import identify_records
 from anglecam.io.rig import Rig
+from anglecam.models.plant import Plant
 from support.motion import Plant as TruePlant
 from support.motion import Recording
 from support.series import record, session
@@ -115,3 +116,17 @@ def test_an_angle_that_moves_in_its_last_frame_only_shows_no_offset():
     still = session(TruePlant(), 0)[0]
     still = replace(still, angle=np.append(np.full(len(still.time) - 1, 0.5), 0.9))
     assert coarse_offset(still.between(0.0, still.time[-1])) == 0.0
+
+
+def test_what_the_model_lacks_is_not_taken_for_a_drift():
+    stuck = Plant((effect("backlash"),))
+    records = []
+    for one in session(TruePlant(), 7)[:3]:
+        noise = np.random.default_rng(7).normal(0.0, np.radians(0.02), len(one.time))
+        angle = stuck.predict(np.array([26.0, 524.0, 508.0, np.radians(0.4)]), one.time, one.command, np.zeros(2))
+        records.append(replace(one, angle=angle + noise, sigma=np.full(len(noise), np.radians(0.02))))
+    without = fit_clocks(records)
+    assert without.drifts is None
+    assert without.covariance.shape == (3, 3)
+    known = fit_clocks(records, [(effect("backlash"), np.radians([0.3]))])
+    assert np.all(np.abs(known.drifts) < 4.0 * np.sqrt(np.diag(known.covariance)[3:]))
