@@ -47,12 +47,25 @@ NO_HINTS = Hints()
 
 def obeys(fit: Fit, sample: Sample, hints: Hints) -> bool:
     """Return whether a body turns about the hinted pivot and is where it was pointed at."""
-    if hints.pivot_px is not None:
-        off = fit.proposal.centre_px - hints.pivot_px
-        spread = fit.covariance_px2 + hints.pivot_sigma_px**2 * np.eye(2)
-        if off @ np.linalg.solve(spread, off) > _FAR:
-            return False
+    if not agrees_with_pivot(fit.proposal.centre_px, fit.covariance_px2, hints):
+        return False
     return beside_mark(fit, sample, hints) <= np.sqrt(_FAR)
+
+
+def agrees_with_pivot(centre_px: Floats, covariance_px2: Floats, hints: Hints) -> bool:
+    """Return whether a centre (2,) with its covariance (2, 2) may be the hinted pivot."""
+    if hints.pivot_px is None:
+        return True
+    off = centre_px - hints.pivot_px
+    return bool(off @ np.linalg.solve(covariance_px2 + hints.pivot_sigma_px**2 * np.eye(2), off) <= _FAR)
+
+
+def agrees_with_click(place_px: Floats, radius_px: float, hints: Hints) -> bool:
+    """Return whether a thing of some radius at a place (2,) may be what was pointed at in that frame."""
+    if hints.mark_px is None:
+        return True
+    off = place_px - np.clip(place_px, hints.mark_px[:2], hints.mark_px[2:])
+    return bool(np.hypot(*off) - radius_px <= np.sqrt(_FAR) * _CLICK_PX)
 
 
 def beside_mark(fit: Fit, sample: Sample, hints: Hints) -> float:

@@ -61,7 +61,7 @@ def detect_body(camera: HeldCamera, rig: Rig, progress: Progress = unseen) -> De
     """
     film = camera.film
     progress(Stage("looking for what turns"))
-    hints = _hints(film, rig)
+    hints = hints_of(film, rig)
     pictures = moving_stills(film)
     if hints.mark_px is not None and all(picture.index != hints.mark_frame for picture in pictures):
         pictures = sorted([*pictures, picture_of(film, hints.mark_frame)], key=lambda picture: picture.index)
@@ -116,7 +116,8 @@ def _candidates(search: Search, _: int, picture: Grey) -> list[Turn]:
     return candidates(search, picture)
 
 
-def _hints(film: Film, rig: Rig) -> Hints:
+def hints_of(film: Film, rig: Rig) -> Hints:
+    """Return what a rig says about mark and pivot of a film; raises `InputError` if it has no such frame."""
     mark, pivot = rig.pointed_mark, rig.pivot
     if mark is not None:
         frame_of_mark(film, mark)  # it has to exist

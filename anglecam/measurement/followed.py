@@ -20,7 +20,7 @@ from anglecam.data.typing import Flags, Floats
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles, coarse_angles, turns
-from anglecam.measurement.body_pass import detect_body
+from anglecam.measurement.body_pass import detect_body, hints_of
 from anglecam.measurement.camera_pass import FilmAtRest, HeldCamera
 from anglecam.measurement.carried_marks import carried_marks, smeared_marks, with_marks
 from anglecam.measurement.detections import Detections, in_all_frames
@@ -29,6 +29,7 @@ from anglecam.measurement.mark_pass import detect_mark
 from anglecam.measurement.registration_pass import Registered, Start, register_clip
 from anglecam.measurement.trust import why_doubtful, why_few, why_no_rotation, why_still
 from anglecam.measurement.white_noise import beyond_stated
+from anglecam.measurement.without_hint import UNUSED, is_meant, without_hints
 from anglecam.progress import Progress, unseen
 from anglecam.video.film import Film
 from anglecam.vision.mark.found_mark import FoundMark
@@ -102,6 +103,32 @@ def follow_mark_or_body(
     InputError
         Where nothing turns about a fixed pivot: one line with the causes.
     """
+    bare = None if known is not None or camera.unknown else without_hints(rig)
+    if bare is None:
+        return _follow(camera, rig, command, progress, known)
+    hinted = _tried(camera, rig, command, progress)
+    if isinstance(hinted, Followed) and hinted.doubt is None:
+        return hinted
+    found = _tried(camera, bare, command, progress)
+    if isinstance(found, Followed) and found.doubt is None and is_meant(found.detections, hints_of(camera.film, rig)):
+        notes = (*found.detections.notes, UNUSED)
+        return replace(found, detections=replace(found.detections, notes=notes))
+    if isinstance(hinted, InputError):
+        raise hinted  # what the hint names is the cause to state
+    return hinted
+
+
+def _tried(camera: HeldCamera, rig: Rig, command: Command | None, progress: Progress) -> Followed | InputError:
+    try:
+        return _follow(camera, rig, command, progress)
+    except InputError as cause:
+        return cause
+
+
+def _follow(
+    camera: HeldCamera, rig: Rig, command: Command | None, progress: Progress, known: FoundMark | None = None
+) -> Followed:
+    """Measure the mark or the body with a rig as it is; raise `InputError` where nothing turns."""
     film = camera.film
     mark = detect_mark(film, rig, camera, progress, known)
     by_mark = mark if isinstance(mark, str) else _measured(film, rig, command, mark, progress)
