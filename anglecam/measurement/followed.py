@@ -17,6 +17,7 @@ from anglecam.camera.shutter import measurement_time
 from anglecam.data.command import Command
 from anglecam.data.series import OK
 from anglecam.data.typing import Flags, Floats
+from anglecam.engine.hints import Hints
 from anglecam.errors import InputError
 from anglecam.io.rig import Rig
 from anglecam.measurement.angles import Angles, coarse_angles, turns
@@ -36,11 +37,11 @@ from anglecam.vision.mark.found_mark import FoundMark
 from anglecam.vision.status import UNDECODABLE
 
 _MANY = 0.05
-"""Share of the frames without an angle of the mark from which on the body is looked for, too. It saves that time in
-films in which the body could add few frames; it does not choose between the two."""
+"""Share of the frames without an angle from which on the body is looked for beside the mark, and what is found without
+a hint beside what is found with it. It saves that time where these could add few frames; it does not choose."""
 _ANOTHER = 3.0
-"""Usual difference of the mark's angle from the body's, in standard uncertainties, beyond which they are two bodies:
-of one it is 0.67."""
+"""Usual difference of two angles, in standard uncertainties, beyond which they are those of two bodies: of one it is
+0.67."""
 
 
 @dataclass(frozen=True)
@@ -107,12 +108,16 @@ def follow_mark_or_body(
     if bare is None:
         return _follow(camera, rig, command, progress, known)
     hinted = _tried(camera, rig, command, progress)
-    if isinstance(hinted, Followed) and hinted.doubt is None:
-        return hinted
+    sure = hinted if isinstance(hinted, Followed) and hinted.doubt is None else None
+    if sure is not None and sure.lost < _MANY:
+        return sure
     found = _tried(camera, bare, command, progress)
-    if isinstance(found, Followed) and found.doubt is None and is_meant(found.detections, hints_of(camera.film, rig)):
+    # what was followed with the hint is a better witness of what it means than a click
+    meant = hints_of(camera.film, rig) if sure is None else Hints(pivot_px=sure.detections.pivot.centre_px)
+    if isinstance(found, Followed) and found.doubt is None and is_meant(found.detections, meant):
         notes = (*found.detections.notes, UNUSED)
-        return replace(found, detections=replace(found.detections, notes=notes))
+        found = replace(found, detections=replace(found.detections, notes=notes))
+        return found if sure is None else _more_certain(sure, found)
     if isinstance(hinted, InputError):
         raise hinted  # what the hint names is the cause to state
     return hinted
@@ -152,27 +157,27 @@ def _follow(
     return _more_certain(by_mark, by_body)
 
 
-def _more_certain(by_mark: Followed, by_body: Followed) -> Followed:
-    """Return the mark's angles or those of the body, whichever leave less unknown of the film.
+def _more_certain(first: Followed, second: Followed) -> Followed:
+    """Return the angles that leave less unknown of the film.
 
     The expected logarithmic score of a forecast decides (Good, Journal of the Royal Statistical Society B 14, 1952):
-    where a frame is not measured, the angle is known as well as the spread of the motion. A body that does not turn as
-    the mark does is another one than the mark is on.
+    where a frame is not measured, the angle is known as well as the spread of the motion. If the second does not turn
+    as the first does, it is another body than the one that is meant.
     """
-    both = by_mark.ok & by_body.ok
-    marks, bodies = (
-        (in_all_frames(one.ok, one.angles.line), in_all_frames(one.ok, one.angles.sigma)) for one in (by_mark, by_body)
+    both = first.ok & second.ok
+    ones, others = (
+        (in_all_frames(one.ok, one.angles.line), in_all_frames(one.ok, one.angles.sigma)) for one in (first, second)
     )
-    off = np.exp(1j * (marks[0] - bodies[0])[both])
-    off = np.angle(off / off.mean()) / np.hypot(marks[1], bodies[1])[both] if both.any() else np.array([np.inf])
+    off = np.exp(1j * (ones[0] - others[0])[both])
+    off = np.angle(off / off.mean()) / np.hypot(ones[1], others[1])[both] if both.any() else np.array([np.inf])
     if np.median(np.abs(off)) > _ANOTHER:
-        return by_mark
-    spread = max(float(np.std(np.unwrap(one.angles.line))) for one in (by_mark, by_body))
+        return first
+    spread = max(float(np.std(np.unwrap(one.angles.line))) for one in (first, second))
     unknown = [
         float(np.log(np.minimum(np.where(np.isfinite(sigma), sigma, spread), spread)).mean())
-        for _, sigma in (marks, bodies)
+        for _, sigma in (ones, others)
     ]
-    return by_mark if unknown[0] <= unknown[1] else by_body
+    return first if unknown[0] <= unknown[1] else second
 
 
 def _measured(
