@@ -23,7 +23,7 @@ def without_hints(rig: Rig) -> Rig | None:
 
 
 def is_meant(found: Detections, hints: Hints) -> bool:
-    """Return whether what was found without hints is what they mean; false also where that cannot be seen.
+    """Return whether what turns, found without hints, is what they mean; false also where that cannot be seen.
 
     Parameters
     ----------
@@ -32,6 +32,8 @@ def is_meant(found: Detections, hints: Hints) -> bool:
     hints : Hints
         Of the rig.
     """
+    if not found.moves:
+        return False  # of a mark that is declared and stands still nothing is measured
     if hints.mark_px is None:
         return agrees_with_pivot(found.pivot.centre_px, found.pivot.covariance_px2, hints)
     if found.learnt is not None:
