@@ -2,7 +2,7 @@
 
     θ(t) = m + A·sin(2π(t − τ)/T)     from one upward crossing of the middle to the next
 
-A straight line has one period at all amplitudes; a pendulum's grows with the amplitude (the backbone curve). Linear
+A linear spring gives one period at all amplitudes; a pendulum's grows with the amplitude (the backbone curve). Linear
 damping takes away the same share of the amplitude in each cycle, dry friction the same amount, drag the more the larger
 it is (the damping curve). Over exactly one period harmonics are orthogonal to the sine, so that they shift neither A
 nor T. Kerschen, Worden, Vakakis, Golinval, Mech. Syst. Signal Process. 20, 2006, 505-592, sec. 4.

@@ -190,8 +190,10 @@ def stated_noise(records: Sequence[Record]) -> Noise | None:
 def angle_uncertainty(records: Sequence[Record]) -> float:
     """Return the RMS standard uncertainty of the angles, rad: as stated, otherwise the noise; 0 if nothing shows it."""
     stated = np.concatenate([r.sigma for r in records])
-    floor = None if np.all(np.isfinite(stated)) else noise_floor(records)
-    return float(np.sqrt(np.mean(stated**2))) if floor is None else floor.sigma
+    if np.all(np.isfinite(stated)):
+        return float(np.sqrt(np.mean(stated**2)))
+    floor = noise_floor(records)
+    return 0.0 if floor is None else floor.sigma
 
 
 def autoregression(parts: Sequence[Floats], source: str) -> Noise:

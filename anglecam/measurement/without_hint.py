@@ -37,8 +37,9 @@ def is_meant(found: Detections, hints: Hints) -> bool:
     if hints.mark_px is None:
         return agrees_with_pivot(found.pivot.centre_px, found.pivot.covariance_px2, hints)
     if found.learnt is not None:
-        learnt = found.learnt
-        return hints.mark_frame in learnt.sample.frames and obeys(learnt.explanations[0].fit, learnt.sample, hints)
+        fit, sample = found.learnt.explanations[0].fit, found.learnt.sample
+        seen = hints.mark_frame in sample.frames[fit.seen]
+        return seen and obeys(fit, sample, hints)
     region = found.regions[hints.mark_frame]
     if region is None or not agrees_with_pivot(found.pivot.centre_px, found.pivot.covariance_px2, hints):
         return False
